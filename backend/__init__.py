@@ -1,0 +1,1 @@
+"""What the engineer does: drives, axes, jobs, tools, the server and the command line."""

@@ -1,0 +1,1 @@
+"""Pure analysis on arrays: no drives, no buses, no I/O."""

@@ -1,0 +1,1 @@
+"""Motion and measurement tools; each is a cancellable job."""

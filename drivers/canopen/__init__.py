@@ -1,0 +1,1 @@
+"""CANopen over python-can and canopen."""

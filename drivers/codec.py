@@ -1,0 +1,61 @@
+"""Bytes to values and back: pure functions, little endian (CiA 301 clause 7.1.4)."""
+
+from __future__ import annotations
+
+import struct
+
+from drivers.errors import OutOfRange, ProtocolError
+from profiles.schema import INTEGER_RANGE, DataType, Raw
+
+_FORMAT: dict[str, str] = {
+    "BOOL": "<B", "INT8": "<b", "UINT8": "<B", "INT16": "<h", "UINT16": "<H",
+    "INT32": "<i", "UINT32": "<I", "INT64": "<q", "UINT64": "<Q", "REAL32": "<f",
+}  # fmt: skip
+
+
+def size_of(data_type: DataType) -> int | None:
+    """Length in bytes, or None for text and octets, whose length the drive decides."""
+    form = _FORMAT.get(data_type)
+    return struct.calcsize(form) if form else None
+
+
+def encode(data_type: DataType, raw: Raw) -> bytes:
+    """Raw value to bytes.
+
+    Raises:
+        OutOfRange: not a number of this type, or outside it.
+    """
+    if data_type in ("STRING", "OCTETS"):
+        return raw.encode("utf-8") if isinstance(raw, str) else bytes([int(raw)])
+    if isinstance(raw, (str, bool)) and data_type != "BOOL":
+        raise OutOfRange(f"{raw!r} is not a {data_type} number", value=raw)
+    if data_type == "REAL32":
+        return struct.pack("<f", float(raw))
+    if float(raw) != int(raw):
+        raise OutOfRange(f"{raw} is not a whole number, {data_type} needs one", value=raw)
+    low, high = INTEGER_RANGE[data_type]
+    if not low <= int(raw) <= high:
+        raise OutOfRange(
+            f"{raw} does not fit {data_type} ({low} to {high})", value=raw, limit=f"{low}…{high}"
+        )
+    return struct.pack(_FORMAT[data_type], int(raw))
+
+
+def decode(data_type: DataType, data: bytes) -> Raw:
+    """Bytes to raw value.
+
+    Raises:
+        ProtocolError: the length does not fit the type.
+    """
+    if data_type == "STRING":
+        return data.split(b"\0", 1)[0].decode("utf-8", "replace").strip()
+    if data_type == "OCTETS":
+        return data.hex(" ")
+    form = _FORMAT[data_type]
+    if len(data) != struct.calcsize(form):
+        raise ProtocolError(
+            f"{len(data)} bytes came for a {data_type} of {struct.calcsize(form)} bytes",
+            remedy="the drive's firmware may be of another version: compare with its dictionary",
+        )
+    value: int | float = struct.unpack(form, data)[0]
+    return value

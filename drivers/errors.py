@@ -1,0 +1,109 @@
+"""The one error tree of servodeck.
+
+::
+
+    DriveError
+    ├── LinkTimeout      no answer in time; the outcome of a write is unknown
+    ├── LinkLost         the wire or adapter is gone; nothing reaches the drive
+    ├── ProtocolError    an answer came that the protocol does not allow
+    ├── Rejected         the drive understood and refused (abort or exception code)
+    ├── OutOfRange       the value does not fit the parameter; nothing was sent
+    ├── NotAllowed       access, state or permission forbids it; nothing was sent
+    └── Busy             somebody or something else holds the axis or the bus
+
+Third-party exceptions are translated to these once, at the driver's edge.
+"""
+
+from __future__ import annotations
+
+
+class DriveError(Exception):
+    """Base of all errors about drives.
+
+    Attributes name what a user needs: which drive, which parameter, which value, which limit
+    and what to do next (``remedy``). All are optional and already part of the message.
+    """
+
+    kind = "drive-error"
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        drive: str | None = None,
+        parameter: str | None = None,
+        value: object = None,
+        limit: str | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.message = message
+        self.drive = drive
+        self.parameter = parameter
+        self.value = value
+        self.limit = limit
+        self.remedy = remedy
+
+    def at(self, drive: str | None = None, parameter: str | None = None) -> DriveError:
+        """The same error with the drive or parameter filled in where it was not known below."""
+        self.drive = self.drive or drive
+        self.parameter = self.parameter or parameter
+        return self
+
+
+class LinkTimeout(DriveError):
+    """No answer in time. A timed-out write has an unknown outcome and must be read back."""
+
+    kind = "link-timeout"
+
+
+class LinkLost(DriveError):
+    """The wire or the adapter is gone."""
+
+    kind = "link-lost"
+
+
+class ProtocolError(DriveError):
+    """An answer that the protocol does not allow: bad CRC, wrong length, wrong toggle bit."""
+
+    kind = "protocol-error"
+
+
+class Rejected(DriveError):
+    """The drive refused. ``code`` is the SDO abort code or Modbus exception code."""
+
+    kind = "rejected"
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        code: int,
+        drive: str | None = None,
+        parameter: str | None = None,
+        value: object = None,
+        limit: str | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        super().__init__(
+            message, drive=drive, parameter=parameter, value=value, limit=limit, remedy=remedy
+        )
+        self.code = code
+
+
+class OutOfRange(DriveError):
+    """The value cannot be a value of this parameter."""
+
+    kind = "out-of-range"
+
+
+class NotAllowed(DriveError):
+    """Read-only, wrong state, missing permission or unmet precondition."""
+
+    kind = "not-allowed"
+
+
+class Busy(DriveError):
+    """Held by another job, person or transaction."""
+
+    kind = "busy"

@@ -1,0 +1,211 @@
+"""The seam between drives and buses.
+
+A `Link` is one opened bus. It moves bytes and knows nothing of units or meaning. Values travel
+in CANopen byte order (little endian, CiA 301 clause 7.1.4) on every kind of link; a serial link
+converts to and from its registers. Links are asynchronous outside; each runs its blocking code
+on one thread of its own, so that there is one transaction at a time per bus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from drivers.errors import DriveError
+from profiles.schema import DataType, LinkKind
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """Where a value lives. ``index`` is None for what only a Modbus register reaches."""
+
+    index: int | None
+    subindex: int
+    type: DataType
+    register: int | None = None
+
+    def __str__(self) -> str:
+        if self.index is None:
+            return f"register {self.register:#06x}"
+        return f"{self.index:04X}:{self.subindex:02X}"
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One drive seen by a scan. Fields are None where the link cannot tell."""
+
+    station: int
+    vendor_id: int | None = None
+    product_code: int | None = None
+    revision: int | None = None
+    serial: int | None = None
+    name: str = ""
+    alias: int | None = None
+    hardware: str = ""
+    firmware: str = ""
+    state: str = ""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class LinkQuality:
+    """Counters since opening. ``details`` holds kind-specific figures with units in the name."""
+
+    connected: bool
+    transactions: int = 0
+    timeouts: int = 0
+    crc_errors: int = 0
+    framing_errors: int = 0
+    retries: int = 0
+    lost_frames: int = 0
+    wkc_errors: int = 0
+    round_trip_ms: float | None = None
+    state: str = ""
+    details: dict[str, float | int | str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkEvent:
+    """Something the bus said by itself."""
+
+    kind: Literal["emergency", "boot", "lost", "back", "state", "overload", "fault"]
+    station: int | None
+    text: str
+    code: int | None = None
+
+
+Progress = Callable[[float, str], None]
+"""Called with a fraction 0…1 and a sentence. Must not block."""
+
+Unsubscribe = Callable[[], None]
+
+
+class Link(Protocol):
+    """One opened bus. See the module docstring for byte order and threading."""
+
+    kind: LinkKind
+    url: str
+    cyclic: Cyclic | None
+
+    async def open(self) -> None:
+        """Open the adapter.
+
+        Raises:
+            LinkLost: no such adapter, no permission, or in use; the message says which.
+        """
+
+    async def close(self) -> None:
+        """Close it. Calling again does nothing."""
+
+    async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
+        """Look for drives; cancel by cancelling the task."""
+
+    async def read(self, station: int, address: Address) -> bytes:
+        """Read one value, little endian, exactly as long as its type (text: as sent)."""
+
+    async def read_many(
+        self, station: int, addresses: Sequence[Address]
+    ) -> list[bytes | DriveError]:
+        """Read several, batched as the bus allows. One failure does not spoil the others."""
+
+    async def write(self, station: int, address: Address, data: bytes) -> None:
+        """Write one value. A timed-out write raises LinkTimeout and is never repeated here."""
+
+    def quality(self, station: int | None = None) -> LinkQuality:
+        """Counters for one station or the whole bus. Never blocks."""
+
+    def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
+        """Be told of events, on the event loop's thread."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScopeBlock:
+    """A run of equally spaced samples.
+
+    ``samples`` has shape [n, k] for k ``channels`` in raw units scaled by nobody; ``t0_s`` is the
+    time of the first sample on the link's clock (monotonic), ``dt_s`` the spacing. ``dropped`` counts
+    samples lost since the previous block of this stream; ``valid`` [n] is False where the working
+    counter or the timing says that a sample cannot be trusted.
+    """
+
+    sequence: int
+    t0_s: float
+    dt_s: float
+    channels: tuple[str, ...]
+    samples: npt.NDArray[np.float64]
+    dropped: int = 0
+    valid: npt.NDArray[np.bool_] | None = None
+    times_s: npt.NDArray[np.float64] | None = None
+    """True sampling times [n] of a polled block; None where the spacing is exact."""
+
+
+@dataclass(frozen=True, slots=True)
+class CyclicSignal:
+    """One process-data signal of one station, named ``channel`` in the blocks."""
+
+    station: int
+    address: Address
+    channel: str
+
+
+@dataclass(frozen=True, slots=True)
+class Envelope:
+    """Limits enforced every cycle; None means no limit of that kind. Raw drive units."""
+
+    position_min: float | None = None
+    position_max: float | None = None
+    speed_max: float | None = None
+    torque_max: float | None = None
+    following_error_max: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """One value per cycle for one setpoint object of one station.
+
+    ``values`` has shape [n] in raw units. ``renew_s`` is the life of the setpoint after the
+    last value or renewal: with none the loop ramps down by itself and leaves Operation enabled.
+    """
+
+    station: int
+    target: Address
+    values: npt.NDArray[np.int64]
+    envelope: Envelope
+    offset_target: Address | None = None
+    offset_values: npt.NDArray[np.int64] | None = None
+    renew_s: float = 0.2
+
+
+class Cyclic(Protocol):
+    """Synchronous process data of a bus that has them (EtherCAT, CANopen with SYNC)."""
+
+    async def configure(
+        self, inputs: Sequence[CyclicSignal], outputs: Sequence[CyclicSignal], cycle_s: float
+    ) -> tuple[CyclicSignal, ...]:
+        """Map signals and return those that fit; the rest is for polling.
+
+        Raises:
+            NotAllowed: the mapping exceeds a limit of the drive, named in the message.
+        """
+
+    async def start(self) -> None:
+        """Go to Operational and exchange process data."""
+
+    async def stop(self) -> None:
+        """Ramp down whatever moves, then leave Operational."""
+
+    async def play(self, trajectories: Sequence[Trajectory]) -> int:
+        """Play trajectories in step; returns the cycle counter of the first value."""
+
+    async def renew(self, station: int) -> None:
+        """Extend the life of the setpoints of ``station`` by its renewal time."""
+
+    async def halt(self, station: int | None = None) -> None:
+        """Controlled stop now, for one station or all; setpoints end."""
+
+    def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
+        """Deliver samples on the event loop's thread."""

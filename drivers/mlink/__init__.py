@@ -1,0 +1,1 @@
+"""MLink (RS485): Modbus RTU frames with the object-to-register rule of EZmotion."""

@@ -1,0 +1,1 @@
+"""Modbus RTU: framing, and a Link over register tables."""

@@ -1,0 +1,1 @@
+"""Mechanics of virtual drives: inertia chain, friction, travel and their exact response."""

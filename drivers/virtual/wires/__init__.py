@@ -1,0 +1,1 @@
+"""Slave ends of the buses."""

@@ -1,0 +1,131 @@
+"""Reads the YAML of a drive family into a checked, frozen Profile.
+
+A family is a folder ``profiles/<drive>/`` of ``*.yaml`` files. Each file holds a mapping whose
+keys are fields of `Profile`; lists of the same field in several files are joined in file-name
+order, so that a long parameter list can be one file per chapter. The parsed result is cached
+beside the user's other caches, keyed by the content of every file and of the schema.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import platformdirs
+import yaml
+from pydantic import ValidationError
+
+from profiles.schema import Profile
+
+_HERE = Path(__file__).parent
+
+
+class ProfileError(Exception):
+    """A profile file is wrong; the message names the file or drive, the place and the remedy."""
+
+
+def drive_names() -> tuple[str, ...]:
+    """Names of all families that have a folder, sorted."""
+    return tuple(sorted(p.parent.name for p in _HERE.glob("*/profile.yaml")))
+
+
+@cache
+def load_profile(drive: str) -> Profile:
+    """Load one family.
+
+    Raises:
+        ProfileError: unknown drive, broken YAML, or a record that the schema refuses.
+    """
+    folder = _HERE / drive
+    files = sorted(folder.glob("*.yaml"))
+    if drive not in drive_names():
+        raise ProfileError(f"no profile named {drive!r}; there are: {', '.join(drive_names())}")
+    cached = _cache_path(drive, files)
+    if (profile := _read_cache(cached)) is not None:
+        return profile
+    profile = parse_profile({path.name: path.read_text("utf-8") for path in files})
+    _write_cache(cached, profile)
+    return profile
+
+
+def load_all() -> dict[str, Profile]:
+    """All families by name."""
+    return {name: load_profile(name) for name in drive_names()}
+
+
+def parse_profile(texts: dict[str, str]) -> Profile:
+    """Join YAML texts (file name to content) and check them.
+
+    Raises:
+        ProfileError: with file name and line for broken YAML, with the record for bad data.
+    """
+    merged: dict[str, Any] = {}
+    for name, text in texts.items():
+        try:
+            data = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        except yaml.YAMLError as error:
+            raise ProfileError(f"{name}: {error}") from error
+        if not isinstance(data, dict):
+            raise ProfileError(f"{name}: the file must hold a mapping of profile fields")
+        for field, value in data.items():
+            if isinstance(value, list) and isinstance(merged.get(field), list):
+                merged[field] = merged[field] + value
+            elif field in merged:
+                raise ProfileError(f"{name}: {field!r} is already given by another file")
+            else:
+                merged[field] = value
+    try:
+        return Profile.model_validate(merged)
+    except ValidationError as error:
+        raise ProfileError(_explain(merged, error)) from error
+
+
+def _explain(merged: dict[str, Any], error: ValidationError) -> str:
+    lines = [f"profile {merged.get('drive', '?')}: {error.error_count()} errors"]
+    for item in error.errors()[:20]:
+        record: Any = merged
+        for step in item["loc"][:2]:
+            try:
+                record = record[step]
+            except (KeyError, IndexError, TypeError):
+                break
+        label = record.get("key") or record.get("code") or "" if isinstance(record, dict) else ""
+        lines.append(f"  {'.'.join(map(str, item['loc']))} ({label}): {item['msg']}")
+    return "\n".join(lines)
+
+
+def _cache_path(drive: str, files: list[Path]) -> Path:
+    digest = hashlib.sha256()
+    for path in [_HERE / "schema.py", Path(__file__), *files]:
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    folder = Path(os.environ.get("SERVODECK_CACHE") or platformdirs.user_cache_dir("servodeck"))
+    return folder / f"profile-{drive}-{digest.hexdigest()[:20]}.pickle"
+
+
+def _read_cache(path: Path) -> Profile | None:
+    try:
+        if path.stat().st_uid != os.getuid():  # a pickle from another user is not to be trusted
+            return None
+        loaded = pickle.loads(path.read_bytes())  # noqa: S301 - our own file, owner checked
+    except (OSError, AttributeError, EOFError, ImportError, pickle.UnpicklingError):
+        return None
+    return loaded if isinstance(loaded, Profile) else None
+
+
+def _write_cache(path: Path, profile: Profile) -> None:
+    """Best effort: a read-only or full disk costs speed, not function."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        for old in path.parent.glob(f"profile-{profile.drive}-*.pickle"):
+            old.unlink(missing_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as handle:
+            handle.write(pickle.dumps(profile))
+        Path(handle.name).replace(path)
+    except OSError:
+        return

@@ -1,0 +1,540 @@
+"""The shape of a drive profile.
+
+Everything is frozen and refuses unknown fields, so that a typing slip in a YAML file is an
+error at load time and never a silently missing limit. The vocabulary is closed: a new literal
+is added only for something a manual documents.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+DataType = Literal[
+    "BOOL", "INT8", "UINT8", "INT16", "UINT16", "INT32", "UINT32",
+    "INT64", "UINT64", "REAL32", "STRING", "OCTETS",
+]  # fmt: skip
+Access = Literal["ro", "rw", "wo"]
+PdoMapping = Literal["none", "rx", "tx", "rxtx"]
+Effective = Literal["now", "stopped", "reenable", "write_settings", "power_cycle"]
+Settable = Literal["any", "stopped"]
+LinkKind = Literal["ethercat", "canopen", "modbus", "mlink"]
+Raw = int | float | str
+
+#: Limits of the integer types, inclusive (ETG.1000.6 table of basic data types).
+INTEGER_RANGE: dict[str, tuple[int, int]] = {
+    "BOOL": (0, 1),
+    "INT8": (-(2**7), 2**7 - 1),
+    "UINT8": (0, 2**8 - 1),
+    "INT16": (-(2**15), 2**15 - 1),
+    "UINT16": (0, 2**16 - 1),
+    "INT32": (-(2**31), 2**31 - 1),
+    "UINT32": (0, 2**32 - 1),
+    "INT64": (-(2**63), 2**63 - 1),
+    "UINT64": (0, 2**64 - 1),
+}
+
+
+class Frozen(BaseModel):
+    """Base of every profile record."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Parameter(Frozen):
+    """One object-dictionary entry or numbered drive parameter.
+
+    The engineering value is ``raw * scale + offset`` in ``unit``. Limits and default are raw
+    values and are ``None`` where the manual prints none.
+    """
+
+    key: str = Field(pattern=r"^([0-9A-F]{4}:[0-9A-F]{2}|PA_[0-9A-F]+)$")
+    number: str | None = None
+    name: str
+    group: str
+    type: DataType
+    access: Access = "rw"
+    pdo: PdoMapping = "none"
+    unit: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+    min_raw: int | float | None = None
+    max_raw: int | float | None = None
+    default_raw: Raw | None = None
+    enum: dict[int, str] = Field(default_factory=dict)
+    bits: dict[str, str] = Field(
+        default_factory=dict, description="'3' or '6-4' (high-low) to the field's meaning"
+    )
+    effective: Effective = "now"
+    settable: Settable = "any"
+    modbus_register: int | None = None
+    motor_individual: bool = Field(
+        default=False, description="belongs to one motor or station; never cloned by default"
+    )
+    help: str = ""
+    source: str = Field(description="manual:line, for example 004:5432")
+    also_printed: tuple[str, ...] = Field(
+        default=(), description="what another place of the manual prints instead"
+    )
+    notes: str = ""
+
+    @cached_property
+    def index(self) -> int | None:
+        """Object index, or None for a parameter that only Modbus reaches."""
+        return None if self.key.startswith("PA_") else int(self.key[:4], 16)
+
+    @cached_property
+    def subindex(self) -> int | None:
+        """Object subindex, or None for a parameter that only Modbus reaches."""
+        return None if self.key.startswith("PA_") else int(self.key[5:], 16)
+
+    @property
+    def is_integer(self) -> bool:
+        """True for BOOL and all INTn/UINTn types."""
+        return self.type in INTEGER_RANGE
+
+    @property
+    def raw_limits(self) -> tuple[int | float | None, int | float | None]:
+        """Printed limits, falling back to those of the integer type."""
+        low, high = INTEGER_RANGE.get(self.type, (None, None))
+        return (
+            low if self.min_raw is None else self.min_raw,
+            high if self.max_raw is None else self.max_raw,
+        )
+
+    def to_raw(self, value: float) -> int | float:
+        """Engineering value to the nearest raw value."""
+        raw = (value - self.offset) / self.scale
+        return round(raw) if self.is_integer else raw
+
+    def to_value(self, raw: Raw) -> Raw:
+        """Raw value to engineering value; text and unscaled integers pass unchanged."""
+        if isinstance(raw, str) or (self.scale == 1.0 and self.offset == 0.0):
+            return raw
+        # Scales such as 0.1 are not exact in binary: 12 digits hide that, nothing else.
+        return float(f"{raw * self.scale + self.offset:.12g}")
+
+    @model_validator(mode="after")
+    def _limits_in_order(self) -> Parameter:
+        if self.min_raw is not None and self.max_raw is not None and self.min_raw > self.max_raw:
+            raise ValueError(f"{self.key}: min_raw {self.min_raw} above max_raw {self.max_raw}")
+        return self
+
+
+class Fault(Frozen):
+    """A fault or warning with what to do about it."""
+
+    code: str = Field(description="as the drive reports it: 0x7305, Er.013, AL.101, 1001 …")
+    name: str
+    kind: Literal["fault", "warning"] = "fault"
+    severity: str = Field(default="", description="the manual's own class of the fault")
+    code_raw: int | None = Field(default=None, description="value of 603Fh, None where unprinted")
+    match: tuple[BitMatch, ...] = Field(default=(), description="bits that also tell of it")
+    led: str = Field(default="", description="what the drive's lamp or panel shows")
+    causes: tuple[str, ...] = ()
+    remedies: tuple[str, ...] = ()
+    reset: str = Field(default="", description="when and how it can be reset")
+    source: str
+    also_printed: tuple[str, ...] = ()
+    notes: str = ""
+
+
+class BitMatch(Frozen):
+    """``key`` has ``bit`` set."""
+
+    key: str
+    bit: int = Field(ge=0, le=63)
+
+
+class WriteStep(Frozen):
+    """Write a raw value."""
+
+    do: Literal["write"]
+    key: str
+    raw: Raw
+
+
+class WaitStep(Frozen):
+    """Leave the drive alone: no traffic to it for this long (a drive that is storing to flash)."""
+
+    do: Literal["wait"]
+    seconds: float = Field(gt=0)
+
+
+class PollStep(Frozen):
+    """Read until ``(raw & mask) == equals``; a value in ``failed`` ends the procedure at once."""
+
+    do: Literal["poll"]
+    key: str
+    equals: int
+    mask: int = 0xFFFFFFFF
+    failed: tuple[int, ...] = ()
+    timeout_s: float = Field(default=10.0, gt=0)
+
+
+class ConfirmStep(Frozen):
+    """The user must agree to this text before anything further is written."""
+
+    do: Literal["confirm"]
+    text: str
+
+
+class ReconnectStep(Frozen):
+    """The drive restarts; wait until it answers again."""
+
+    do: Literal["reconnect"]
+    timeout_s: float = Field(default=20.0, gt=0)
+
+
+Step = Annotated[
+    WriteStep | WaitStep | PollStep | ConfirmStep | ReconnectStep, Field(discriminator="do")
+]
+
+
+class Procedure(Frozen):
+    """A named sequence. Well-known names have a place of their own on the page.
+
+    Well-known: save, restore, reset, write_settings, zero_position, clear_history,
+    fault_reset, tuning_begin, tuning_end, identify.
+    """
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
+    title: str
+    help: str
+    requires_stop: bool = True
+    steps: tuple[Step, ...]
+    warning: str = ""
+    source: str
+    notes: str = ""
+
+
+class HomingMethod(Frozen):
+    """One value of 6098h."""
+
+    method: int
+    name: str
+    help: str
+    direction: Literal["positive", "negative", "none"] = "none"
+    signal: Literal["limit", "home", "index", "torque", "current_position", "other"] = "other"
+    uses_index: bool = False
+    uses_limit: bool = False
+    parameters: tuple[str, ...] = ()
+    source: str
+    notes: str = ""
+
+
+class IoFunction(Frozen):
+    """A selectable function of a terminal."""
+
+    code: int
+    name: str
+    help: str = ""
+
+
+class IoTerminal(Frozen):
+    """A digital terminal: which parameter selects its function and polarity."""
+
+    name: str
+    direction: Literal["in", "out"]
+    function_key: str | None = None
+    polarity_key: str | None = None
+    functions: tuple[IoFunction, ...] = ()
+    source: str
+    notes: str = ""
+
+
+class NotchSlot(Frozen):
+    """Parameters of one notch in the drive; which of them exist depends on the encoding."""
+
+    enable_key: str | None = None
+    enable_bit: int | None = None
+    frequency_key: str | None = None
+    width_key: str | None = None
+    depth_key: str | None = None
+    a1_key: str | None = None
+    a2_key: str | None = None
+    b1_key: str | None = None
+    b2_key: str | None = None
+
+
+class NotchSpec(Frozen):
+    """How this family writes notches down."""
+
+    encoding: Literal["coefficients", "hz_width", "hz_levels", "hz_width_db"]
+    slots: tuple[NotchSlot, ...]
+    sample_time_s: float | None = None
+    apply_key: str | None = None
+    apply_raw: int | None = None
+    source: str
+    notes: str = ""
+
+
+class StiffnessTable(Frozen):
+    """Rigidity or stiffness levels: level to raw values of ``columns`` (parameter keys)."""
+
+    level_key: str
+    mode_key: str | None = None
+    manual_raw: int | None = None
+    table_raw: int | None = None
+    columns: tuple[str, ...]
+    column_units: tuple[str, ...] = ()
+    rows: dict[int, tuple[float, ...]]
+    source: str
+    notes: str = ""
+
+
+class GainSpec(Frozen):
+    """Which parameters hold the loop gains, and what their values mean.
+
+    ``convention``: *bandwidth* (loop bandwidth in Hz), *gain* (1/s position, Hz speed,
+    ms integral time), *unit* (numbers without a printed physical meaning).
+    """
+
+    convention: Literal["bandwidth", "gain", "unit"]
+    position: str | None = None
+    speed: str | None = None
+    integral: str | None = None
+    torque_filter: str | None = None
+    current_bandwidth: str | None = None
+    inertia: str | None = Field(default=None, description="load or total inertia parameter")
+    inertia_meaning: Literal["ratio_percent", "ratio", "total", "load"] | None = None
+    source: str
+    notes: str = ""
+
+
+class Signal(Frozen):
+    """A quantity that the scope, the axis and the tools know by role, and where it lives."""
+
+    role: Literal[
+        "status_word", "control_word", "mode", "mode_display", "error_code",
+        "position_actual", "position_demand", "position_target", "position_offset",
+        "velocity_actual", "velocity_demand", "velocity_target", "velocity_offset",
+        "torque_actual", "torque_demand", "torque_target", "torque_offset",
+        "following_error", "dc_voltage", "temperature", "current_actual", "load_ratio",
+        "digital_inputs", "digital_outputs", "rated_torque", "rated_current", "rated_speed",
+        "max_torque", "torque_limit_positive", "torque_limit_negative",
+        "profile_velocity", "profile_acceleration", "profile_deceleration",
+        "quick_stop_deceleration", "max_speed", "homing_method", "home_offset",
+        "homing_speed_switch", "homing_speed_zero", "homing_acceleration",
+        "software_limit_min", "software_limit_max", "following_error_window",
+        "following_error_time", "supported_modes", "motor_inertia", "load_inertia",
+    ]  # fmt: skip
+    key: str
+    notes: str = ""
+
+
+class UnitSpec(Frozen):
+    """Units of the motion objects and where the resolution comes from."""
+
+    position: str = "inc"
+    velocity: str = Field(default="inc/s", description="inc/s, rpm, 0.1 rpm …")
+    acceleration: str = Field(default="inc/s²", description="inc/s², rpm/s, ms (ramp time) …")
+    torque: str = "‰ rated"
+    counts_per_rev: int | None = Field(
+        default=None, description="position increments per motor revolution with default gearing"
+    )
+    encoder_counts_per_rev: int | None = None
+    gear_numerator: str | None = None
+    gear_denominator: str | None = None
+    feed: str | None = None
+    feed_revolutions: str | None = None
+    ramp_reference_rpm: float | None = Field(
+        default=None, description="speed that a ramp given as a time refers to"
+    )
+    source: str = ""
+    notes: str = ""
+
+
+class PdoSet(Frozen):
+    """One PDO: its mapping object and default contents as ``key`` list."""
+
+    index: int
+    direction: Literal["rx", "tx"]
+    entries: tuple[str, ...]
+    fixed: bool = False
+    source: str
+
+
+class PdoSpec(Frozen):
+    """Process data of one family."""
+
+    sets: tuple[PdoSet, ...]
+    default_rx: int
+    default_tx: int
+    max_entries: int
+    max_bytes: int | None = None
+    remappable: bool = True
+    cycle_min_us: int | None = None
+    cycle_max_us: int | None = None
+    sync_modes: tuple[str, ...] = ()
+    source: str
+    notes: str = ""
+
+
+class Watchdog(Frozen):
+    """What stops the axis when the link dies."""
+
+    present: bool
+    key: str | None = None
+    help: str = ""
+    source: str = ""
+
+
+class LinkSpec(Frozen):
+    """How this family is reached over one kind of link."""
+
+    kind: LinkKind
+    watchdog: Watchdog
+    word_order: Literal["low_first", "high_first"] | None = None
+    default_baudrate: int | None = None
+    baudrates: tuple[int, ...] = ()
+    default_parity: Literal["N", "E", "O"] | None = None
+    default_station: int | None = None
+    max_registers: int | None = Field(default=None, description="longest block one request reads")
+    max_gap: int | None = Field(default=None, description="unused registers a block may bridge")
+    complete_access: bool = False
+    foe: bool = False
+    wiring: str = ""
+    source: str
+    notes: str = ""
+
+
+class Identity(Frozen):
+    """What a scan must see to recognise the family. None: not printed in the manual."""
+
+    maker: str
+    model: str
+    vendor_id: int | None = None
+    product_code: int | None = None
+    revision: int | None = None
+    name_patterns: tuple[str, ...] = Field(
+        default=(), description="regular expressions on 1008h or the SII name"
+    )
+    source: str = ""
+    notes: str = ""
+
+
+class Quirk(Frozen):
+    """A documented oddity that code acts upon. The vocabulary is closed."""
+
+    kind: Literal[
+        "write_settings", "eeprom_on_every_write", "saving_mask", "limit_bits_swapped",
+        "own_status_word", "enable_pause", "trigger_bits_manual", "mode_change_at_standstill",
+        "mode_change_pause", "mode_before_enable", "no_following_error_bit",
+        "error_code_low_byte", "warning_bit_7", "home_found_bit_15", "save_readback_ambiguous",
+        "sdo_pause_on_save", "gear_on_init", "brake_by_pdo", "unit_switch", "write_protect",
+        "partial_manual", "types_unreliable", "no_watchdog", "positive_limit_first",
+    ]  # fmt: skip
+    key: str | None = None
+    raw: int | None = None
+    milliseconds: float | None = None
+    help: str
+    source: str
+
+
+class Conflict(Frozen):
+    """Two places of the manual that contradict each other, where no single parameter fits."""
+
+    text: str
+    source: str
+
+
+class Profile(Frozen):
+    """Everything that is known about a drive family."""
+
+    drive: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
+    title: str
+    manual: str = Field(description="number of the manual in the sources, for example 004")
+    partial: bool = False
+    identity: Identity
+    links: tuple[LinkSpec, ...]
+    units: UnitSpec
+    supported_modes: tuple[int, ...]
+    parameters: tuple[Parameter, ...]
+    faults: tuple[Fault, ...] = ()
+    procedures: tuple[Procedure, ...] = ()
+    homing_methods: tuple[HomingMethod, ...] = ()
+    terminals: tuple[IoTerminal, ...] = ()
+    signals: tuple[Signal, ...] = ()
+    pdo: PdoSpec | None = None
+    notch: NotchSpec | None = None
+    stiffness: tuple[StiffnessTable, ...] = ()
+    gains: GainSpec | None = None
+    quirks: tuple[Quirk, ...] = ()
+    conflicts: tuple[Conflict, ...] = ()
+    chapters: dict[str, str] = Field(
+        default_factory=dict,
+        description="manual chapter to what of it is in the profile, for the coverage report",
+    )
+
+    @cached_property
+    def by_key(self) -> dict[str, Parameter]:
+        """Parameters by key."""
+        return {p.key: p for p in self.parameters}
+
+    @cached_property
+    def by_role(self) -> dict[str, Parameter]:
+        """Parameters by signal role; only roles that this family has."""
+        return {s.role: self.by_key[s.key] for s in self.signals}
+
+    def parameter(self, key: str) -> Parameter | None:
+        """The parameter with this key or maker's number (case-insensitive), or None."""
+        found = self.by_key.get(key) or self.by_key.get(key.upper())
+        if found is None:
+            found = next((p for p in self.parameters if p.number and p.number == key), None)
+        return found
+
+    def link(self, kind: str) -> LinkSpec | None:
+        """How this family is reached over ``kind``, or None."""
+        return next((spec for spec in self.links if spec.kind == kind), None)
+
+    def procedure(self, name: str) -> Procedure | None:
+        """The procedure of this name, or None."""
+        return next((p for p in self.procedures if p.name == name), None)
+
+    def quirk(self, kind: str) -> Quirk | None:
+        """The quirk of this kind, or None."""
+        return next((q for q in self.quirks if q.kind == kind), None)
+
+    @model_validator(mode="after")
+    def _references_exist(self) -> Profile:
+        if len(self.by_key) != len(self.parameters):
+            seen: set[str] = set()
+            twice = sorted({p.key for p in self.parameters if p.key in seen or seen.add(p.key)})
+            raise ValueError(f"{self.drive}: parameter keys appear twice: {', '.join(twice)}")
+        missing = sorted({key for key in _referenced_keys(self) if key not in self.by_key})
+        if missing:
+            raise ValueError(f"{self.drive}: unknown parameters referred to: {', '.join(missing)}")
+        return self
+
+
+def _referenced_keys(profile: Profile) -> list[str]:
+    """Every parameter key that faults, procedures, tables and signals refer to."""
+    found: list[str] = []
+
+    def walk(node: Any) -> None:
+        if isinstance(node, Frozen):
+            for name in type(node).model_fields:
+                value = getattr(node, name)
+                if isinstance(value, str) and (name == "key" or name.endswith("_key")):
+                    found.append(value)
+                else:
+                    walk(value)
+        elif isinstance(node, tuple):
+            for item in node:
+                walk(item)
+
+    for part in (
+        profile.faults, profile.procedures, profile.terminals, profile.signals,
+        profile.notch, profile.stiffness, profile.quirks, profile.links,
+    ):  # fmt: skip
+        walk(part)
+    for table in profile.stiffness:
+        found.extend(table.columns)
+    for method in profile.homing_methods:
+        found.extend(method.parameters)
+    for pdo_set in profile.pdo.sets if profile.pdo else ():
+        found.extend(pdo_set.entries)
+    return found
