@@ -1,0 +1,248 @@
+"""Messages of the websocket ``/api/v1/live``. Text frames are JSON of these types.
+
+Binary frames carry scope blocks, little endian::
+
+    u32 magic 0x424B4353 ("SCKB")   u32 subscription   u32 sequence   u32 dropped samples
+    u16 n rows   u16 k channels   u32 flags (bit 0: true times follow)
+    f64 t0_s   f64 dt_s
+    [n] f64 times_s (only with flag bit 0)
+    [n*k] f32 samples in engineering units, row after row; NaN where a value is not valid
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, TypeAdapter
+
+from backend.api.models import (
+    AxisState,
+    DriveSummary,
+    JobInfo,
+    Lease,
+    LogEntry,
+    Message,
+    ParameterValue,
+    Problem,
+)
+
+# --- page to server -----------------------------------------------------------------
+
+
+class WatchState(Message):
+    """Send AxisState of these drives as it changes (replaces the earlier choice)."""
+
+    type: Literal["watch_state"] = "watch_state"
+    drives: list[str] = Field(max_length=64)
+
+
+class WatchValues(Message):
+    """Poll and send these parameters of one drive (replaces the earlier choice of that drive)."""
+
+    type: Literal["watch_values"] = "watch_values"
+    drive: str
+    keys: list[str] = Field(max_length=200)
+    period_s: float = Field(default=0.5, ge=0.05, le=60)
+
+
+class JogStart(Message):
+    """Begin to jog; the axis must be enabled or may be enabled (``enable``).
+
+    The job ends when the renewals stop, the socket closes or the lease is lost.
+    """
+
+    type: Literal["jog_start"] = "jog_start"
+    drive: str
+    direction: Literal[-1, 1]
+    speed: float = Field(gt=0, description="in the axis' velocity unit")
+    acceleration: float = Field(gt=0, description="in the axis' acceleration unit")
+    travel_limit: float = Field(gt=0, description="greatest distance from where the jog began")
+    torque_limit: float = Field(gt=0, le=400, description="% of rated")
+
+
+class JogRenew(Message):
+    """The button is still held. Send at 20 Hz or faster."""
+
+    type: Literal["jog_renew"] = "jog_renew"
+    drive: str
+
+
+class JogStop(Message):
+    """The button was released."""
+
+    type: Literal["jog_stop"] = "jog_stop"
+    drive: str
+    reason: str = ""
+
+
+class StopAll(Message):
+    """STOP. Same as POST /stop, on the connection that is already open."""
+
+    type: Literal["stop"] = "stop"
+    drive: str | None = None
+
+
+class LeaseTake(Message):
+    """Take, or give back, control of an axis."""
+
+    type: Literal["lease"] = "lease"
+    drive: str
+    take: bool
+
+
+class ScopeChannel(Message):
+    """One trace."""
+
+    drive: str
+    key: str
+
+
+class ScopeStart(Message):
+    """Deliver samples of these channels (replaces an earlier one of the same ``subscription``)."""
+
+    type: Literal["scope_start"] = "scope_start"
+    subscription: int = Field(ge=1, le=2**31)
+    channels: list[ScopeChannel] = Field(min_length=1, max_length=32)
+    period_s: float = Field(default=0.0, ge=0, le=10, description="0: as fast as the link goes")
+
+
+class ScopeStop(Message):
+    """End a subscription."""
+
+    type: Literal["scope_stop"] = "scope_stop"
+    subscription: int
+
+
+class Ping(Message):
+    """Round-trip measurement; answered by Pong."""
+
+    type: Literal["ping"] = "ping"
+    n: int
+
+
+FromPage = Annotated[
+    WatchState
+    | WatchValues
+    | JogStart
+    | JogRenew
+    | JogStop
+    | StopAll
+    | LeaseTake
+    | ScopeStart
+    | ScopeStop
+    | Ping,
+    Field(discriminator="type"),
+]
+from_page: TypeAdapter[FromPage] = TypeAdapter(FromPage)
+
+# --- server to page -----------------------------------------------------------------
+
+
+class Hello(Message):
+    """First message on every connection."""
+
+    type: Literal["hello"] = "hello"
+    connection: str
+    version: str
+
+
+class StateChanged(Message):
+    """Axis state, at 10 Hz at most."""
+
+    type: Literal["state"] = "state"
+    state: AxisState
+
+
+class DrivesChanged(Message):
+    """The list of drives, or quality, lease or counts of one, changed."""
+
+    type: Literal["drives"] = "drives"
+    drives: list[DriveSummary]
+
+
+class ValuesChanged(Message):
+    """New readings; also sent to everybody when anybody writes."""
+
+    type: Literal["values"] = "values"
+    drive: str
+    values: list[ParameterValue]
+
+
+class JobChanged(Message):
+    """Progress of a job."""
+
+    type: Literal["job"] = "job"
+    job: JobInfo
+
+
+class LeaseChanged(Message):
+    """Control of an axis changed hands."""
+
+    type: Literal["lease_changed"] = "lease_changed"
+    drive: str
+    lease: Lease
+
+
+class JogEnded(Message):
+    """The jog of this connection ended, and why."""
+
+    type: Literal["jog_ended"] = "jog_ended"
+    drive: str
+    reason: str
+    problem: Problem | None = None
+
+
+class ScopeInfo(Message):
+    """How a subscription's channels are sampled."""
+
+    type: Literal["scope_info"] = "scope_info"
+    subscription: int
+    channels: list[ScopeChannelInfo]
+    problem: Problem | None = None
+
+
+class ScopeChannelInfo(Message):
+    """Name, unit and timing of one trace."""
+
+    drive: str
+    key: str
+    name: str
+    unit: str
+    synchronous: bool
+
+
+class Logged(Message):
+    """A new entry of the tool's log."""
+
+    type: Literal["log"] = "log"
+    entry: LogEntry
+
+
+class Refused(Message):
+    """A message of the page could not be carried out."""
+
+    type: Literal["refused"] = "refused"
+    request: str
+    problem: Problem
+
+
+class Pong(Message):
+    """Answer to Ping."""
+
+    type: Literal["pong"] = "pong"
+    n: int
+
+
+ToPage = (
+    Hello
+    | StateChanged
+    | DrivesChanged
+    | ValuesChanged
+    | JobChanged
+    | LeaseChanged
+    | JogEnded
+    | ScopeInfo
+    | Logged
+    | Refused
+    | Pong
+)

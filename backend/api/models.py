@@ -1,0 +1,506 @@
+"""Messages of the HTTP interface: the only source of OpenAPI and of the page's client."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Raw = int | float | str
+
+
+class Message(BaseModel):
+    """Base: unknown fields are refused, so that a misspelt limit is an error."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class Problem(BaseModel):
+    """RFC 9457 problem details, with what a person needs to act."""
+
+    type: str = Field(examples=["urn:servodeck:out-of-range"])
+    title: str
+    status: int
+    detail: str
+    drive: str | None = None
+    parameter: str | None = None
+    value: Raw | None = None
+    limit: str | None = None
+    remedy: str | None = None
+    code: int | None = Field(default=None, description="SDO abort or Modbus exception code")
+
+
+class Health(Message):
+    """The server is alive."""
+
+    version: str
+    time: datetime
+    demo: bool
+
+
+class Session(Message):
+    """Who is asking."""
+
+    person: str
+    role: Literal["viewer", "operator", "administrator"]
+    login_required: bool
+
+
+class SerialPort(Message):
+    """A serial adapter of this machine."""
+
+    path: str
+    description: str
+    url: str = Field(description="bus URL to start from")
+    usable: bool
+    problem: str = ""
+
+
+class NetworkInterface(Message):
+    """A network interface that could carry EtherCAT."""
+
+    name: str
+    up: bool
+    url: str
+    usable: bool
+    problem: str = ""
+
+
+class Interfaces(Message):
+    """What this machine can connect through."""
+
+    serial: list[SerialPort]
+    network: list[NetworkInterface]
+    can: list[str] = Field(description="bus URLs to start from")
+    virtual: list[str] = Field(description="buses of the running demo bench")
+
+
+class Quality(Message):
+    """Counters of one link or station since it was opened."""
+
+    connected: bool
+    state: str
+    transactions: int
+    timeouts: int
+    crc_errors: int
+    framing_errors: int
+    retries: int
+    lost_frames: int
+    wkc_errors: int
+    round_trip_ms: float | None
+    details: dict[str, float | int | str]
+
+
+class Bus(Message):
+    """An opened bus."""
+
+    url: str
+    kind: str
+    quality: Quality
+
+
+class ScanRequest(Message):
+    """Look for drives on a bus."""
+
+    url: str
+    stations: list[int] | None = Field(default=None, description="only these; all where None")
+    stop_after_first: bool = False
+
+
+class ProfileMatch(Message):
+    """A profile that fits what was found, and how sure that is."""
+
+    profile: str
+    title: str
+    confidence: Literal["certain", "likely", "possible"]
+    why: str
+
+
+class FoundDrive(Message):
+    """One drive seen by a scan."""
+
+    url: str
+    station: int
+    vendor_id: int | None
+    product_code: int | None
+    revision: int | None
+    serial: int | None
+    name: str
+    alias: int | None
+    hardware: str
+    firmware: str
+    state: str
+    notes: list[str]
+    matches: list[ProfileMatch]
+    connected_as: str | None = Field(description="id of the drive that already uses this station")
+
+
+class ConnectRequest(Message):
+    """Make a found station a drive of this bench."""
+
+    url: str
+    station: int = Field(ge=0, le=65535)
+    profile: str
+    name: str = Field(default="", max_length=60)
+
+
+class DriveUpdate(Message):
+    """Name or notes of a drive."""
+
+    name: str | None = Field(default=None, min_length=1, max_length=60)
+    notes: str | None = Field(default=None, max_length=4000)
+
+
+class PortInfo(Message):
+    """One connection of a drive."""
+
+    url: str
+    kind: str
+    station: int
+    watchdog: bool
+    watchdog_help: str
+
+
+class Lease(Message):
+    """Who may move and write this axis now; nobody where ``holder`` is None."""
+
+    holder: str | None
+    since: datetime | None
+    mine: bool = False
+
+
+class DriveSummary(Message):
+    """A drive of the bench."""
+
+    id: str
+    name: str
+    notes: str
+    profile: str
+    title: str
+    maker: str
+    partial: bool
+    ports: list[PortInfo]
+    connected: bool
+    serial: int | None
+    firmware: str
+    identity_warning: str = Field(description="non-empty when another drive answers here")
+    unsaved: int = Field(description="parameters in the drive but not in its memory")
+    pending: int = Field(description="parameters waiting for write-settings, enable or power-off")
+    lease: Lease
+    quality: Quality
+
+
+class ActiveFault(Message):
+    """A fault or warning that is present now."""
+
+    code: str
+    name: str
+    kind: Literal["fault", "warning"]
+    causes: list[str]
+    remedies: list[str]
+    reset: str
+    source: str
+
+
+class AxisState(Message):
+    """State of an axis, in engineering units where units are named."""
+
+    drive: str
+    time: datetime
+    fresh: bool = Field(description="False when the last reading failed; values are then old")
+    problem: str = Field(description="why the reading failed, or empty")
+    state: str
+    status_word: int | None
+    mode: int | None
+    mode_name: str
+    modes: list[int] = Field(description="modes this drive supports")
+    goals: list[str] = Field(description="states that can be asked for now")
+    target_reached: bool
+    internal_limit: bool
+    mode_bits: dict[str, bool] = Field(description="meaning of bits 12 and 13 in this mode")
+    position: float | None
+    velocity: float | None
+    torque: float | None
+    following_error: float | None
+    dc_voltage: float | None
+    temperature: float | None
+    units: dict[str, str] = Field(description="unit of each of the values above")
+    faults: list[ActiveFault]
+    blocked_by: list[str] = Field(description="causes that keep the axis from being enabled")
+    moving_job: str | None
+
+
+class TransitionRequest(Message):
+    """Drive the CiA 402 state machine to a state."""
+
+    goal: Literal[
+        "Switch on disabled",
+        "Ready to switch on",
+        "Switched on",
+        "Operation enabled",
+        "Quick stop active",
+    ]
+    mode: int | None = Field(default=None, description="mode of operation to set before")
+
+
+class ParameterInfo(Message):
+    """Description of a parameter, as in the profile."""
+
+    key: str
+    number: str | None
+    name: str
+    group: str
+    type: str
+    access: Literal["ro", "rw", "wo"]
+    pdo: str
+    unit: str
+    scale: float
+    offset: float
+    min_raw: int | float | None
+    max_raw: int | float | None
+    default_raw: Raw | None
+    enum: dict[int, str]
+    bits: dict[str, str]
+    effective: str
+    settable: str
+    motor_individual: bool
+    help: str
+    source: str
+    also_printed: list[str]
+    notes: str
+    reachable: bool = Field(description="False when no connected port can carry it")
+    unreachable_why: str = ""
+
+
+class ParameterValue(Message):
+    """What the drive said last."""
+
+    key: str
+    raw: Raw | None
+    value: Raw | None = Field(description="in the parameter's unit")
+    time: datetime | None
+    error: str = ""
+    unsaved: bool = False
+    pending: str = Field(
+        default="", description="what must happen before it acts: write_settings, reenable …"
+    )
+
+
+class ParameterRow(ParameterInfo):
+    """Description and value."""
+
+    reading: ParameterValue
+
+
+class ParameterWrite(Message):
+    """A new value: exactly one of ``raw`` and ``value``."""
+
+    raw: Raw | None = None
+    value: Raw | None = None
+
+
+class ParameterWrites(Message):
+    """Several new values, raw, written one after the other; the first failure does not stop the rest."""
+
+    values: dict[str, ParameterWrite] = Field(max_length=2000)
+
+
+class WriteResult(Message):
+    """Result of one write, with the value that was read back."""
+
+    key: str
+    ok: bool
+    reading: ParameterValue
+    problem: Problem | None = None
+
+
+class StepInfo(Message):
+    """One step of a procedure in words."""
+
+    text: str
+
+
+class ProcedureInfo(Message):
+    """A named sequence of the profile."""
+
+    name: str
+    title: str
+    help: str
+    warning: str
+    requires_stop: bool
+    confirm: list[str] = Field(description="texts the user must agree to")
+    steps: list[str]
+    source: str
+    notes: str
+
+
+class ProcedureRequest(Message):
+    """Run a procedure."""
+
+    confirmed: bool = False
+
+
+class JobInfo(Message):
+    """A piece of long work."""
+
+    id: str
+    kind: str
+    drive: str | None
+    title: str
+    state: Literal["running", "done", "failed", "cancelled"]
+    progress: float = Field(ge=0, le=1)
+    step: str
+    started: datetime
+    ended: datetime | None
+    motion: bool
+    result: dict[str, object] | None
+    problem: Problem | None
+
+
+class StopRequest(Message):
+    """STOP; all drives where none is named."""
+
+    drive: str | None = None
+
+
+class StopResult(Message):
+    """What STOP reached."""
+
+    stopped: list[str]
+    failed: dict[str, str] = Field(description="drives that could not be told, and why")
+
+
+class ReadAllRequest(Message):
+    """Read parameters; all readable ones where ``keys`` is None."""
+
+    keys: list[str] | None = None
+
+
+class LoadSetRequest(Message):
+    """Write chosen rows of a parameter set to a drive."""
+
+    file: str
+    keys: list[str] = Field(max_length=5000)
+    accept_other_identity: bool = False
+
+
+class MoveRequest(Message):
+    """One move in a profile mode. Engineering units of the axis (see AxisState.units)."""
+
+    mode: Literal["PP", "PV", "PT"]
+    target: float
+    relative: bool = False
+    immediate: bool = True
+    speed: float | None = Field(default=None, gt=0)
+    acceleration: float | None = Field(default=None, gt=0)
+    deceleration: float | None = Field(default=None, gt=0)
+    travel_limit: float = Field(gt=0, description="greatest distance from the start point")
+    torque_limit: float = Field(gt=0, le=400, description="% of rated")
+    timeout_s: float = Field(default=30, gt=0, le=600)
+    consent: bool = Field(
+        default=False,
+        description="PV/PT over a link without a watchdog in the drive: the user agreed to the text",
+    )
+
+
+class SequenceRequest(Message):
+    """Back and forth between two positions."""
+
+    first: float
+    second: float
+    speed: float = Field(gt=0)
+    acceleration: float = Field(gt=0)
+    dwell_s: float = Field(default=0.5, ge=0, le=60)
+    count: int = Field(default=5, ge=1, le=100000)
+    travel_limit: float = Field(gt=0)
+    torque_limit: float = Field(gt=0, le=400)
+
+
+class HomeRequest(Message):
+    """Homing."""
+
+    method: int
+    speed_switch: float | None = Field(default=None, gt=0)
+    speed_zero: float | None = Field(default=None, gt=0)
+    acceleration: float | None = Field(default=None, gt=0)
+    offset: float | None = None
+    travel_limit: float = Field(gt=0)
+    torque_limit: float = Field(gt=0, le=400)
+    timeout_s: float = Field(default=60, gt=0, le=600)
+
+
+class SetFileInfo(Message):
+    """A stored parameter set."""
+
+    file: str
+    profile: str
+    drive_name: str
+    serial: int | None
+    firmware: str
+    author: str
+    saved: datetime | None
+    notes: str
+    count: int
+    problem: str = Field(default="", description="why the file cannot be used")
+
+
+class SaveSetRequest(Message):
+    """Store the present values of a drive."""
+
+    file: str = Field(pattern=r"^[\w][\w .\-]{0,100}$")
+    author: str = Field(default="", max_length=100)
+    notes: str = Field(default="", max_length=4000)
+    include_motor_individual: bool = False
+    overwrite: bool = False
+
+
+class DiffRow(Message):
+    """One parameter whose value differs, or cannot be compared."""
+
+    key: str
+    name: str
+    group: str
+    unit: str
+    file_raw: Raw | None
+    file_value: Raw | None
+    drive_raw: Raw | None
+    drive_value: Raw | None
+    default_raw: Raw | None
+    default_value: Raw | None
+    status: Literal["differs", "same", "not_in_drive", "not_in_file", "invalid", "read_only"]
+    problem: str = ""
+    motor_individual: bool = False
+    selected: bool = Field(description="proposed for writing")
+
+
+class Diff(Message):
+    """A parameter set against a drive."""
+
+    file: str
+    drive: str
+    same_profile: bool
+    same_serial: bool | None
+    warnings: list[str]
+    rows: list[DiffRow]
+
+
+class LogEntry(Message):
+    """The tool's own log."""
+
+    time: datetime
+    level: Literal["info", "warning", "error"]
+    drive: str | None
+    person: str
+    text: str
+
+
+class ProfileInfo(Message):
+    """A profile that servodeck brings."""
+
+    profile: str
+    title: str
+    maker: str
+    partial: bool
+    links: list[str]
+    parameters: int
