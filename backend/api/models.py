@@ -301,7 +301,7 @@ class ParameterWrite(Message):
 
 
 class ParameterWrites(Message):
-    """Several new values, raw, written one after the other; the first failure does not stop the rest."""
+    """Several new values, written in turn; a failure does not stop the rest."""
 
     values: dict[str, ParameterWrite] = Field(max_length=2000)
 
@@ -400,7 +400,7 @@ class MoveRequest(Message):
     timeout_s: float = Field(default=30, gt=0, le=600)
     consent: bool = Field(
         default=False,
-        description="PV/PT over a link without a watchdog in the drive: the user agreed to the text",
+        description="PV/PT without a watchdog in the drive: the user agreed to the text",
     )
 
 

@@ -1,0 +1,21 @@
+"""Array types that every analysis module shares."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+def magnitude_db(response: ComplexArray) -> FloatArray:
+    """20·log10 of the magnitude; zeros become about -6000 dB instead of a warning."""
+    return np.asarray(20.0 * np.log10(np.maximum(np.abs(response), 1e-300)), dtype=np.float64)
+
+
+def phase_deg(response: ComplexArray) -> FloatArray:
+    """Unwrapped phase in degrees, the first line in (-180, 180]."""
+    return np.asarray(np.degrees(np.unwrap(np.angle(response))), dtype=np.float64)

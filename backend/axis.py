@@ -1,0 +1,391 @@
+"""One axis: its power state, its modes, and the two context managers that carry safety.
+
+`Axis.restoring` puts parameters back and `Axis.enabled` leaves Operation enabled, on every
+way out. Their cleanup is shielded from cancellation, has a deadline of its own, and reports
+what it could not restore.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+from backend.drive import Drive
+from backend.units import AxisUnits, read_units
+from drivers import cia402
+from drivers.cia402 import Mode, State
+from drivers.errors import DriveError, LinkTimeout, NotAllowed
+from profiles.schema import Raw
+
+#: Longest time that one change of the power state may take (brake and bus included).
+STATE_TIMEOUT_S = 3.0
+#: Deadline of a cleanup.
+CLEANUP_TIMEOUT_S = 5.0
+_POLL_S = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Envelope:
+    """Limits of one motion, in the axis' units: travel from the start point in rev, rpm, %, s."""
+
+    travel_rev: float
+    speed_rpm: float
+    torque_percent: float
+    time_s: float
+
+
+class RestoreFailed(DriveError):
+    """A cleanup could not put something back; the message lists what."""
+
+    kind = "restore-failed"
+
+
+class Axis:
+    """Power state and motion permission of one drive."""
+
+    def __init__(self, drive: Drive) -> None:
+        self.drive = drive
+        self._units: AxisUnits | None = None
+        pause = drive.profile.quirk("enable_pause")
+        self._enable_pause_s = ((pause.milliseconds if pause else None) or 0.0) / 1000.0
+        #: The last control word written, for edges.
+        self.control_word = 0
+
+    # --- words ------------------------------------------------------------------------
+
+    async def units(self) -> AxisUnits:
+        """Units with the present gearing, read once until `forget`."""
+        if self._units is None:
+            self._units = await read_units(self.drive)
+        return self._units
+
+    def forget(self) -> None:
+        """The drive restarted or its gearing changed."""
+        self._units = None
+        self.control_word = 0
+
+    async def status_word(self) -> int:
+        """6041h, read now."""
+        return await self.drive.raw(self.drive.require("status_word"))
+
+    async def state(self) -> State:
+        """CiA 402 power state, read now."""
+        return self.drive.decode_state(await self.status_word())
+
+    async def control(self, word: int) -> None:
+        """Write 6040h."""
+        await self.drive.command(self.drive.require("control_word"), word)
+        self.control_word = word
+
+    async def position_raw(self) -> int:
+        """Actual position in increments."""
+        return await self.drive.raw(self.drive.require("position_actual"))
+
+    async def velocity_raw(self) -> int:
+        """Actual velocity in the drive's unit."""
+        return await self.drive.raw(self.drive.require("velocity_actual"))
+
+    # --- power state ------------------------------------------------------------------
+
+    async def go_to(self, goal: State, timeout_s: float = STATE_TIMEOUT_S) -> State:
+        """Walk the state machine to ``goal``, one transition after the other.
+
+        Raises:
+            NotAllowed: the drive stays where it is; the message gives the cause that is known.
+        """
+        deadline = time.monotonic() + timeout_s
+        state = await self.state()
+        while (word := cia402.next_control_word(state, goal, self.control_word)) is not None or (
+            state is not goal
+        ):
+            if word is not None:
+                await self.control(word)
+                if self._enable_pause_s:
+                    await asyncio.sleep(self._enable_pause_s)
+            before = state
+            state = await self.state()
+            # A quick stop may fall through to Switch on disabled (605Ah 0 to 4).
+            if goal is State.QUICK_STOP_ACTIVE and state is State.SWITCH_ON_DISABLED:
+                return state
+            while state is before and time.monotonic() < deadline:
+                await asyncio.sleep(_POLL_S)
+                state = await self.state()
+            if state is before:
+                raise await self._refused(state, goal)
+        return state
+
+    async def _refused(self, state: State, goal: State) -> NotAllowed:
+        causes = await self.blocked_by()
+        why = "; ".join(causes) or "the drive gives no reason"
+        return NotAllowed(
+            f"{self.drive.name} stays in “{state.value}” and does not go to “{goal.value}”: {why}",
+            drive=self.drive.name,
+            remedy="remove the cause named and try again" if causes else "see the Alarms page",
+        )
+
+    async def blocked_by(self) -> list[str]:
+        """Known causes that keep the axis from being enabled, in words."""
+        drive = self.drive
+        causes: list[str] = []
+        word = await self.status_word()
+        state = drive.decode_state(word)
+        if state in (State.FAULT, State.FAULT_REACTION):
+            faults = await self.active_faults()
+            names = ", ".join(f"{code} {name}" for code, name in faults) or "unknown"
+            causes.append(f"fault present: {names}")
+        own = drive.profile.quirk("own_status_word") is not None
+        enabled_states = (State.READY, State.SWITCHED_ON)
+        if not own and state in enabled_states and not word & cia402.STATUS_VOLTAGE_ENABLED:
+            causes.append("no main power: the DC bus is not charged, or STO is open")
+        if not own and not word & cia402.STATUS_REMOTE and state in enabled_states:
+            causes.append("the drive is not under bus control (remote bit is 0)")
+        waiting = [k for k, why in drive.pending.items() if why == "write_settings"]
+        if waiting:
+            causes.append(f"write-settings pending for {len(waiting)} parameters")
+        return causes
+
+    async def active_faults(self) -> list[tuple[str, str]]:
+        """Code and name of what the drive reports now; unknown codes are shown as they are."""
+        drive = self.drive
+        found: list[tuple[str, str]] = []
+        keys = {match.key for fault in drive.profile.faults for match in fault.match}
+        readings = await drive.read_many(sorted(keys))
+        code_key = drive.key("error_code")
+        code = await drive.raw(code_key) if code_key else 0
+        masked = code & 0xFF if drive.profile.quirk("error_code_low_byte") else code
+        for fault in drive.profile.faults:
+            by_bit = any(
+                isinstance(raw := readings[m.key].raw, int) and raw >> m.bit & 1
+                for m in fault.match
+            )
+            by_code = bool(code) and fault.code_raw is not None and fault.code_raw in (code, masked)
+            if by_bit or by_code:
+                found.append((fault.code, fault.name))
+        if code and not found:
+            found.append((f"0x{code:04X}", "not in the profile"))
+        return found
+
+    async def reset_fault(self) -> State:
+        """Rising edge of the fault-reset bit, then Switch on disabled.
+
+        Raises:
+            NotAllowed: the fault is still present.
+        """
+        await self.control(cia402.DISABLE_VOLTAGE)
+        return await self.go_to(State.SWITCH_ON_DISABLED)
+
+    # --- motion -----------------------------------------------------------------------
+
+    async def set_mode(self, mode: Mode) -> None:
+        """Write 6060h and wait until 6061h shows it.
+
+        Raises:
+            NotAllowed: the family or the drive does not have this mode.
+        """
+        drive = self.drive
+        if int(mode) not in drive.profile.supported_modes:
+            raise NotAllowed(
+                f"{drive.name}: {drive.profile.title} has no {cia402.MODE_NAMES[mode]} mode",
+                drive=drive.name,
+                remedy="choose one of its modes",
+            )
+        await drive.command(drive.require("mode"), int(mode))
+        display = drive.key("mode_display")
+        if display is None:
+            return
+        deadline = time.monotonic() + 1.0
+        while await drive.raw(display) != int(mode):
+            if time.monotonic() > deadline:
+                raise NotAllowed(
+                    f"{drive.name} does not change to {cia402.MODE_NAMES[mode]}",
+                    drive=drive.name,
+                    remedy="stop the axis and try again",
+                )
+            await asyncio.sleep(_POLL_S)
+
+    async def quick_stop(self) -> None:
+        """Stop now, by one write; harmless when nothing moves."""
+        await self.control(cia402.QUICK_STOP)
+
+    async def halt_and_wait(self, timeout_s: float) -> None:
+        """Halt (bit 8) and wait for standstill; quick stop if the axis does not slow down.
+
+        Raises:
+            LinkTimeout: not at standstill in time even so; the message says what to do.
+        """
+        await self.control(cia402.ENABLE_OPERATION | cia402.HALT)
+        if await self.standstill(timeout_s):
+            return
+        await self.quick_stop()
+        if not await self.standstill(timeout_s):
+            raise LinkTimeout(
+                f"{self.drive.name} still moves {timeout_s:g} s after quick stop",
+                drive=self.drive.name,
+                remedy="use the machine's emergency stop",
+            )
+
+    async def standstill(self, timeout_s: float) -> bool:
+        """Whether the axis came to rest (position unchanged over 30 ms) within the time."""
+        units = await self.units()
+        tolerance = max(2, units.position_raw(0.0005))
+        deadline = time.monotonic() + timeout_s
+        last = await self.position_raw()
+        while time.monotonic() < deadline:
+            await asyncio.sleep(0.03)
+            now = await self.position_raw()
+            if abs(now - last) <= tolerance:
+                return True
+            last = now
+        return False
+
+    # --- what must be undone ----------------------------------------------------------
+
+    @asynccontextmanager
+    async def restoring(self, *keys: str) -> AsyncIterator[dict[str, Raw]]:
+        """Put these parameters back to what they are now, on every exit.
+
+        Raises:
+            RestoreFailed: on leaving, naming what could not be put back.
+        """
+        before: dict[str, Raw] = {}
+        for key in keys:
+            reading = await self.drive.read(key)
+            if reading.raw is not None:
+                before[key] = reading.raw
+        try:
+            yield before
+        finally:
+            await shielded(lambda: self._restore(before), CLEANUP_TIMEOUT_S, self.drive.name)
+
+    async def _restore(self, before: dict[str, Raw]) -> None:
+        failed: list[str] = []
+        for key, raw in before.items():
+            try:
+                if (await self.drive.read(key)).raw != raw:
+                    await self.drive.write(key, raw)
+            except DriveError as error:
+                failed.append(f"{key} (was {raw}): {error.message}")
+        if failed:
+            raise RestoreFailed(
+                f"{self.drive.name}: not restored: {'; '.join(failed)}",
+                drive=self.drive.name,
+                remedy="write these values by hand before the next motion",
+            )
+
+    @asynccontextmanager
+    async def enabled(self, mode: Mode, envelope: Envelope) -> AsyncIterator[None]:
+        """Operation enabled in ``mode`` with the drive's torque limited by ``envelope``.
+
+        On leaving, the axis is brought to rest, and back to the power state and mode it was
+        in. The mode is set before enabling, at standstill, as some families demand.
+
+        Raises:
+            NotAllowed: the axis cannot be enabled, with the cause.
+        """
+        drive = self.drive
+        before = await self.state()
+        if before is State.OPERATION_ENABLED and not await self.standstill(0.5):
+            raise NotAllowed(
+                f"{drive.name} is moving already",
+                drive=drive.name,
+                remedy="stop it first",
+            )
+        limits = [
+            key
+            for role in ("torque_limit_positive", "torque_limit_negative", "max_torque")
+            if (key := drive.key(role)) is not None
+        ]
+        mode_before = drive.key("mode")
+        async with self.restoring(*limits, *([mode_before] if mode_before else [])):
+            await self._limit_torque(limits, envelope.torque_percent)
+            await self.set_mode(mode)
+            # A stale set-point must not start to move the axis when it is enabled.
+            await self._aim_here(mode)
+            try:
+                await self.go_to(State.OPERATION_ENABLED)
+                yield
+            finally:
+                await shielded(lambda: self._leave(before, mode), CLEANUP_TIMEOUT_S, drive.name)
+
+    async def _limit_torque(self, limits: list[str], percent: float) -> None:
+        units = await self.units()
+        for key in limits:
+            parameter = self.drive.parameter(key)
+            raw: Raw = units.torque_raw(percent)
+            low, high = parameter.raw_limits
+            if high is not None and raw > high:
+                raw = int(high)
+            if low is not None and raw < low:
+                raw = int(low)
+            current = (await self.drive.read(key)).raw
+            if isinstance(current, int) and current > raw:
+                await self.drive.write(key, raw)
+
+    async def _aim_here(self, mode: Mode) -> None:
+        """Set-point of the mode to "stay"."""
+        drive = self.drive
+        role, value = {
+            Mode.PP: ("position_target", await self.position_raw()),
+            Mode.CSP: ("position_target", await self.position_raw()),
+            Mode.PV: ("velocity_target", 0),
+            Mode.CSV: ("velocity_target", 0),
+            Mode.PT: ("torque_target", 0),
+            Mode.CST: ("torque_target", 0),
+        }.get(mode, ("", 0))
+        if role and (key := drive.key(role)) is not None:
+            await drive.command(key, value)
+
+    async def _leave(self, before: State, mode: Mode) -> None:
+        state = await self.state()
+        if state is State.OPERATION_ENABLED:
+            await self.halt_and_wait(CLEANUP_TIMEOUT_S / 2)
+            state = await self.state()
+        if before is State.OPERATION_ENABLED and state is State.OPERATION_ENABLED:
+            # Halt is released only onto a set-point that is where the axis stands.
+            await self._aim_here(mode)
+            if mode is Mode.PP:
+                stay = cia402.ENABLE_OPERATION | cia402.HALT | cia402.CHANGE_IMMEDIATELY
+                await self.control(stay | cia402.NEW_SET_POINT)
+                await self.control(stay)
+            await self.control(cia402.ENABLE_OPERATION)
+            return
+        if state in (State.FAULT, State.FAULT_REACTION):
+            return
+        await self.go_to(
+            before if before in (State.READY, State.SWITCHED_ON) else State.SWITCH_ON_DISABLED
+        )
+
+
+async def shielded(cleanup: Callable[[], Awaitable[None]], timeout_s: float, drive: str) -> None:
+    """Run a cleanup to its end even when the surrounding task is cancelled again.
+
+    Raises:
+        LinkTimeout: the cleanup itself took longer than ``timeout_s``.
+    """
+
+    async def bounded() -> None:
+        try:
+            async with asyncio.timeout(timeout_s):
+                await cleanup()
+        except TimeoutError as error:
+            raise LinkTimeout(
+                f"{drive}: restoring took longer than {timeout_s:g} s and was given up",
+                drive=drive,
+                remedy="check the axis: mode, torque limit and power state may not be restored",
+            ) from error
+
+    task = asyncio.create_task(bounded())
+    cancelled: asyncio.CancelledError | None = None
+    while not task.done():
+        try:
+            await asyncio.shield(task)
+        except asyncio.CancelledError as error:
+            cancelled = error
+        except DriveError:
+            break
+    if cancelled is not None and task.exception() is None:
+        raise cancelled
+    task.result()

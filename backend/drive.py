@@ -1,0 +1,464 @@
+"""A drive: a profile, the ports it is reached through, and typed reads and writes.
+
+Engineering values are ``raw * scale + offset`` of the parameter. A write is checked on the host
+before a byte leaves (access, type, range, enum, state), then written, then read back: what
+counts is the value that came back.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+from drivers import cia402
+from drivers.codec import decode, encode
+from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange
+from drivers.link import Address, Found, Link, LinkQuality
+from profiles.schema import LinkSpec, Parameter, Profile, Raw
+
+#: Addresses per executor call. Small, so that a STOP never waits behind a long batch.
+BATCH = 16
+
+#: Roles that command motion; they are never "changed but not saved".
+_COMMAND_ROLES = frozenset({
+    "control_word", "mode", "position_target", "position_offset", "velocity_target",
+    "velocity_offset", "torque_target", "torque_offset",
+})  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a drive said of one parameter. ``value`` is in the parameter's unit."""
+
+    key: str
+    raw: Raw | None
+    value: Raw | None
+    time: float | None
+    """Seconds since the epoch, None when never read."""
+    error: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Port:
+    """One way to reach a drive."""
+
+    link: Link
+    station: int
+    spec: LinkSpec | None
+
+    def carries(self, parameter: Parameter) -> bool:
+        """Whether this port can transport the parameter."""
+        if self.link.kind == "modbus":
+            return parameter.modbus_register is not None
+        return parameter.index is not None
+
+
+def address_of(parameter: Parameter) -> Address:
+    """Bus address of a parameter."""
+    return Address(
+        index=parameter.index,
+        subindex=parameter.subindex or 0,
+        type=parameter.type,
+        register=parameter.modbus_register,
+    )
+
+
+@dataclass(slots=True)
+class _Changes:
+    """What was changed since the drive's memory was last written, and what waits to act."""
+
+    stored: dict[str, Raw] = field(default_factory=dict)
+    pending: dict[str, str] = field(default_factory=dict)
+
+
+class Drive:
+    """One drive of the bench.
+
+    ``readings`` holds the last answer for every parameter that was read. Listeners are called
+    with lists of new readings, on the event loop.
+    """
+
+    def __init__(self, drive_id: str, name: str, profile: Profile, ports: Sequence[Port]) -> None:
+        self.id = drive_id
+        self.name = name
+        self.notes = ""
+        self.profile = profile
+        self.ports = tuple(ports)
+        self.found: Found | None = None
+        self.identity_warning = ""
+        self.readings: dict[str, Reading] = {}
+        self._changes = _Changes()
+        self._listeners: list[Callable[[list[Reading]], None]] = []
+        self._transient = {
+            signal.key for signal in profile.signals if signal.role in _COMMAND_ROLES
+        } | {step.key for proc in profile.procedures for step in proc.steps if step.do == "write"}
+        self._own_status = profile.quirk("own_status_word") is not None
+
+    # --- what it is ------------------------------------------------------------------
+
+    def listen(self, listener: Callable[[list[Reading]], None]) -> Callable[[], None]:
+        """Call ``listener`` with every batch of new readings."""
+        self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener)
+
+    def parameter(self, key: str) -> Parameter:
+        """The parameter of this key or maker's number.
+
+        Raises:
+            NotAllowed: the profile has none.
+        """
+        parameter = self.profile.parameter(key)
+        if parameter is None:
+            raise NotAllowed(
+                f"{self.name}: {self.profile.title} has no parameter {key}",
+                drive=self.name,
+                parameter=key,
+                remedy="search the parameter list; keys look like 6040:00",
+            )
+        return parameter
+
+    def port_for(self, parameter: Parameter) -> Port:
+        """The first port that can carry the parameter.
+
+        Raises:
+            NotAllowed: none can; the message says which link would.
+        """
+        for port in self.ports:
+            if port.carries(parameter):
+                return port
+        raise NotAllowed(
+            f"{self.name}: {parameter.key} {parameter.name} cannot be reached: "
+            + self.unreachable_why(parameter),
+            drive=self.name,
+            parameter=parameter.key,
+            remedy="connect the drive over that port too",
+        )
+
+    def unreachable_why(self, parameter: Parameter) -> str:
+        """Empty when some port carries the parameter, else a sentence."""
+        if any(port.carries(parameter) for port in self.ports):
+            return ""
+        kinds = " and ".join(sorted({port.link.kind for port in self.ports})) or "no link"
+        needed = "Modbus" if parameter.index is None else "CANopen"
+        return f"it exists only over {needed}, and the drive is connected over {kinds}"
+
+    def quality(self) -> LinkQuality:
+        """Counters of the first port."""
+        port = self.ports[0]
+        return port.link.quality(port.station)
+
+    def key(self, role: str) -> str | None:
+        """Key of the parameter with this role, where a connected port carries it."""
+        parameter = self.profile.by_role.get(role)
+        if parameter is None or not any(port.carries(parameter) for port in self.ports):
+            return None
+        return parameter.key
+
+    def require(self, role: str) -> str:
+        """Like `key`, for a role that cannot be done without.
+
+        Raises:
+            NotAllowed: the family has no such parameter here.
+        """
+        key = self.key(role)
+        if key is None:
+            raise NotAllowed(
+                f"{self.name}: {self.profile.title} has no {role.replace('_', ' ')} here",
+                drive=self.name,
+                remedy="use another mode or link",
+            )
+        return key
+
+    # --- change marks ----------------------------------------------------------------
+
+    @property
+    def unsaved(self) -> frozenset[str]:
+        """Keys whose value in the drive is not yet in its memory."""
+        return frozenset(
+            key
+            for key, raw in self._changes.stored.items()
+            if (now := self.readings.get(key)) is not None and now.raw != raw
+        )
+
+    @property
+    def pending(self) -> dict[str, str]:
+        """Keys that wait for something before they act, and for what."""
+        return dict(self._changes.pending)
+
+    def mark_saved(self) -> None:
+        """The drive stored its parameters."""
+        self._changes.stored.clear()
+        self._announce_all()
+
+    def mark_applied(self, *what: str) -> None:
+        """What waited for one of ``what`` (write_settings, reenable, power_cycle) acts now."""
+        waiting = self._changes.pending
+        for key in [key for key, reason in waiting.items() if reason in what]:
+            del waiting[key]
+        self._announce_all()
+
+    def forget(self) -> None:
+        """The drive restarted: nothing that was read before may be believed."""
+        self._changes = _Changes()
+        self.readings.clear()
+
+    def _announce_all(self) -> None:
+        self._announce(list(self.readings.values()))
+
+    def _announce(self, readings: list[Reading]) -> None:
+        for listener in list(self._listeners):
+            listener(readings)
+
+    # --- reading ---------------------------------------------------------------------
+
+    async def read(self, key: str) -> Reading:
+        """Read one parameter from the drive.
+
+        Raises:
+            DriveError: with drive and parameter named.
+        """
+        parameter = self.parameter(key)
+        if parameter.access == "wo":
+            raise NotAllowed(
+                f"{self.name}: {parameter.key} {parameter.name} can only be written",
+                drive=self.name,
+                parameter=parameter.key,
+            )
+        port = self.port_for(parameter)
+        try:
+            data = await port.link.read(port.station, address_of(parameter))
+            reading = self._reading(parameter, data)
+        except DriveError as error:
+            raise self._named(error, parameter) from error
+        self._store([reading])
+        return reading
+
+    async def raw(self, key: str) -> int:
+        """Integer raw value of one parameter, read now."""
+        value = (await self.read(key)).raw
+        if isinstance(value, str) or value is None:
+            raise OutOfRange(f"{self.name}: {key} is text", drive=self.name, parameter=key)
+        return int(value)
+
+    async def read_many(
+        self,
+        keys: Iterable[str],
+        progress: Callable[[float, str], None] | None = None,
+    ) -> dict[str, Reading]:
+        """Read several parameters; one that fails comes back with ``error`` set.
+
+        Raises:
+            LinkLost: the bus is gone; readings made before stay.
+        """
+        parameters = [self.parameter(key) for key in keys]
+        result: dict[str, Reading] = {}
+        groups: dict[int, list[Parameter]] = {}
+        for parameter in parameters:
+            position = next(
+                (i for i, port in enumerate(self.ports) if port.carries(parameter)), None
+            )
+            if position is None or parameter.access == "wo":
+                why = self.unreachable_why(parameter) or "it can only be written"
+                result[parameter.key] = Reading(parameter.key, None, None, None, why)
+            else:
+                groups.setdefault(position, []).append(parameter)
+        done = len(result)
+        for position, group in groups.items():
+            port = self.ports[position]
+            for start in range(0, len(group), BATCH):
+                chunk = group[start : start + BATCH]
+                readings = await self._read_chunk(port, chunk)
+                result.update({reading.key: reading for reading in readings})
+                done += len(chunk)
+                if progress:
+                    progress(done / len(parameters), f"{done} of {len(parameters)} parameters")
+        return result
+
+    async def _read_chunk(self, port: Port, chunk: Sequence[Parameter]) -> list[Reading]:
+        answers = await port.link.read_many(port.station, [address_of(p) for p in chunk])
+        readings: list[Reading] = []
+        for parameter, answer in zip(chunk, answers, strict=True):
+            if isinstance(answer, DriveError):
+                readings.append(self._failed(parameter, answer))
+                continue
+            try:
+                readings.append(self._reading(parameter, answer))
+            except DriveError as error:
+                readings.append(self._failed(parameter, error))
+        self._store(readings)
+        return readings
+
+    def _failed(self, parameter: Parameter, error: DriveError) -> Reading:
+        return Reading(parameter.key, None, None, time.time(), error.message)
+
+    def _reading(self, parameter: Parameter, data: bytes) -> Reading:
+        raw = decode(parameter.type, data)
+        return Reading(parameter.key, raw, parameter.to_value(raw), time.time())
+
+    def _store(self, readings: list[Reading]) -> None:
+        for reading in readings:
+            self.readings[reading.key] = reading
+        self._announce(readings)
+
+    # --- writing ---------------------------------------------------------------------
+
+    def check(self, parameter: Parameter, raw: Raw) -> Raw:
+        """A raw value as it will be written.
+
+        Raises:
+            NotAllowed: read-only.
+            OutOfRange: wrong type, outside the limits, or not one of the enumerated values.
+        """
+        label = f"{self.name}: {parameter.key} {parameter.name}"
+        if parameter.access == "ro":
+            raise NotAllowed(
+                f"{label} is read-only", drive=self.name, parameter=parameter.key, value=raw
+            )
+        if isinstance(raw, str) != (parameter.type in ("STRING", "OCTETS")):
+            raise OutOfRange(
+                f"{label}: {raw!r} is not a {parameter.type}",
+                drive=self.name,
+                parameter=parameter.key,
+                value=raw,
+                remedy=f"give a value of type {parameter.type}",
+            )
+        if isinstance(raw, str):
+            return raw
+        try:
+            encode(parameter.type, raw)
+        except OutOfRange as error:
+            raise self._named(error, parameter) from error
+        low, high = parameter.raw_limits
+        if (low is not None and raw < low) or (high is not None and raw > high):
+            limits = f"{_shown(parameter, low)} to {_shown(parameter, high)}"
+            raise OutOfRange(
+                f"{label}: {_shown(parameter, raw)} is outside {limits}",
+                drive=self.name,
+                parameter=parameter.key,
+                value=raw,
+                limit=limits,
+                remedy=f"choose a value from {limits}",
+            )
+        if parameter.enum and not parameter.bits and int(raw) not in parameter.enum:
+            choices = ", ".join(f"{code} ({text})" for code, text in parameter.enum.items())
+            raise OutOfRange(
+                f"{label}: {raw} is none of its values: {choices}",
+                drive=self.name,
+                parameter=parameter.key,
+                value=raw,
+                limit=choices,
+                remedy="choose one of the listed values",
+            )
+        return raw
+
+    async def write(self, key: str, value: Raw, *, raw: bool = True) -> Reading:
+        """Write one parameter and return what was read back.
+
+        ``value`` is a raw value, or one in the parameter's unit with ``raw=False``.
+
+        Raises:
+            NotAllowed, OutOfRange: nothing was sent.
+            Rejected: the drive refused.
+            LinkTimeout: the outcome is unknown, and reading back failed as well.
+        """
+        parameter = self.parameter(key)
+        if not raw and isinstance(value, (int, float)):
+            value = parameter.to_raw(value)
+        value = self.check(parameter, value)
+        port = self.port_for(parameter)
+        if parameter.settable == "stopped":
+            await self._require_stopped(parameter)
+        await self._before_change(parameter)
+        try:
+            await self._send(port, parameter, value)
+        except DriveError as error:
+            raise self._named(error, parameter, value) from error
+        if parameter.access == "wo":
+            reading = Reading(parameter.key, value, parameter.to_value(value), time.time())
+            self._store([reading])
+            return reading
+        if parameter.effective not in ("now", "stopped") and parameter.key not in self._transient:
+            self._changes.pending[parameter.key] = parameter.effective
+        return await self.read(parameter.key)
+
+    async def command(self, key: str, raw: int) -> None:
+        """Write a motion object without reading back (set-points, control word).
+
+        Raises:
+            DriveError: as `write`.
+        """
+        parameter = self.parameter(key)
+        port = self.port_for(parameter)
+        try:
+            await port.link.write(port.station, address_of(parameter), encode(parameter.type, raw))
+        except DriveError as error:
+            raise self._named(error, parameter, raw) from error
+
+    async def _send(self, port: Port, parameter: Parameter, value: Raw) -> None:
+        """Write; a time-out is unknown, so it is read back and never blindly repeated."""
+        address = address_of(parameter)
+        data = encode(parameter.type, value)
+        try:
+            await port.link.write(port.station, address, data)
+        except LinkTimeout:
+            if parameter.access == "wo":
+                raise
+            if await port.link.read(port.station, address) != data:
+                raise
+
+    async def _before_change(self, parameter: Parameter) -> None:
+        """Remember what the drive's memory holds, for the "not saved" mark."""
+        if parameter.key in self._transient or parameter.access != "rw":
+            return
+        if parameter.key in self._changes.stored:
+            return
+        known = self.readings.get(parameter.key)
+        if known is None or known.raw is None:
+            known = await self.read(parameter.key)
+        if known.raw is not None:
+            self._changes.stored[parameter.key] = known.raw
+
+    async def _require_stopped(self, parameter: Parameter) -> None:
+        status = self.key("status_word")
+        if status is None:
+            return
+        state = self.decode_state(await self.raw(status))
+        if state is cia402.State.OPERATION_ENABLED:
+            raise NotAllowed(
+                f"{self.name}: {parameter.key} {parameter.name} can be set only while the motor "
+                "is not enabled",
+                drive=self.name,
+                parameter=parameter.key,
+                remedy="disable the axis first",
+            )
+
+    def decode_state(self, status_word: int) -> cia402.State:
+        """CiA 402 state, with the family's own reading of the status word."""
+        return cia402.decode_state(status_word, echoes_control=self._own_status)
+
+    def _named(
+        self, error: DriveError, parameter: Parameter, value: Raw | None = None
+    ) -> DriveError:
+        """The same error, naming drive and parameter in its text."""
+        error.at(self.name, parameter.key)
+        if value is not None and error.value is None:
+            error.value = value
+        prefix = f"{self.name}: {parameter.key} {parameter.name}: "
+        if not error.message.startswith(self.name):
+            error.message = prefix + error.message
+            error.args = (error.message,)
+        return error
+
+
+def _shown(parameter: Parameter, raw: Raw | None) -> str:
+    if raw is None:
+        return "no limit"
+    value = parameter.to_value(raw)
+    unit = f" {parameter.unit}" if parameter.unit else ""
+    return f"{value}{unit}" if value == raw else f"{value}{unit} (raw {raw})"
+
+
+def with_error(reading: Reading, error: str) -> Reading:
+    """The old reading marked as not renewed."""
+    return replace(reading, error=error)

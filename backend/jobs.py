@@ -1,0 +1,162 @@
+"""Long work: started, watched and cancelled; at most one motion job per axis."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from drivers.errors import Busy, DriveError
+
+JobState = Literal["running", "done", "failed", "cancelled"]
+JobResult = dict[str, object]
+
+
+class Progress:
+    """Handed to the work, which says how far it is. Both are shown as given."""
+
+    def __init__(self, changed: Callable[[], None]) -> None:
+        self.fraction = 0.0
+        self.step = ""
+        self._changed = changed
+
+    def __call__(self, fraction: float, step: str) -> None:
+        """``fraction`` 0…1 done, ``step`` a sentence of what is being done."""
+        self.fraction = min(1.0, max(0.0, fraction))
+        self.step = step
+        self._changed()
+
+
+@dataclass(slots=True, eq=False)
+class Job:
+    """One piece of work. Times are seconds since the epoch."""
+
+    id: str
+    kind: str
+    title: str
+    drive: str | None
+    motion: bool
+    progress: Progress
+    state: JobState = "running"
+    started: float = field(default_factory=time.time)
+    ended: float | None = None
+    result: JobResult | None = None
+    error: Exception | None = None
+    person: str = ""
+    task: asyncio.Task[None] | None = None
+
+    async def wait(self) -> None:
+        """Until the job has ended, however it ended."""
+        if self.task is not None:
+            await asyncio.wait([self.task])
+
+
+Work = Callable[[Progress], Awaitable[JobResult | None]]
+
+
+class JobRunner:
+    """Starts jobs and keeps the last hundred that ended."""
+
+    KEEP = 100
+
+    def __init__(self, changed: Callable[[Job], None] = lambda _job: None) -> None:
+        self._jobs: dict[str, Job] = {}
+        self._numbers = itertools.count(1)
+        self._changed = changed
+        self._last_told: dict[str, float] = {}
+
+    def all(self) -> list[Job]:
+        """Jobs, oldest first."""
+        return list(self._jobs.values())
+
+    def get(self, job_id: str) -> Job | None:
+        """The job of this id, or None."""
+        return self._jobs.get(job_id)
+
+    def moving(self, drive: str) -> Job | None:
+        """The running motion job of a drive, or None."""
+        return next(
+            (j for j in self._jobs.values() if j.motion and j.drive == drive and _runs(j)), None
+        )
+
+    def start(
+        self,
+        kind: str,
+        title: str,
+        work: Work,
+        *,
+        drive: str | None = None,
+        motion: bool = False,
+        person: str = "",
+    ) -> Job:
+        """Start work.
+
+        Raises:
+            Busy: a motion job already holds this axis.
+        """
+        if motion and drive is not None and (other := self.moving(drive)) is not None:
+            raise Busy(
+                f"the axis is already moved by {other.title!r}",
+                drive=drive,
+                remedy="wait for it to end, or stop it",
+            )
+        job = Job(
+            id=f"{kind}-{next(self._numbers)}",
+            kind=kind,
+            title=title,
+            drive=drive,
+            motion=motion,
+            progress=Progress(lambda: self._tell(job)),
+            person=person,
+        )
+        self._jobs[job.id] = job
+        job.task = asyncio.create_task(self._run(job, work), name=job.id)
+        self._changed(job)
+        self._drop_old()
+        return job
+
+    async def cancel(self, job: Job) -> None:
+        """Cancel and wait for the job's cleanup."""
+        if job.task is not None and _runs(job):
+            job.task.cancel()
+            await job.wait()
+
+    async def close(self) -> None:
+        """Cancel everything and wait for the cleanups."""
+        await asyncio.gather(*(self.cancel(job) for job in self.all()))
+
+    async def _run(self, job: Job, work: Work) -> None:
+        try:
+            job.result = await work(job.progress)
+            job.state = "done"
+            job.progress.fraction = 1.0
+        except asyncio.CancelledError:
+            job.state = "cancelled"
+        except DriveError as error:
+            job.state, job.error = "failed", error
+        except Exception as error:
+            # Shown to the user as an internal error; a job must never vanish without a word.
+            job.state, job.error = "failed", error
+        finally:
+            job.ended = time.time()
+            self._changed(job)
+
+    def _tell(self, job: Job) -> None:
+        """Progress at 10 Hz at most; the end is always told by `_run`."""
+        now = time.monotonic()
+        if now - self._last_told.get(job.id, 0.0) >= 0.1:
+            self._last_told[job.id] = now
+            self._changed(job)
+
+    def _drop_old(self) -> None:
+        ended = [job for job in self._jobs.values() if not _runs(job)]
+        for job in ended[: max(0, len(ended) - self.KEEP)]:
+            del self._jobs[job.id]
+            self._last_told.pop(job.id, None)
+
+
+def _runs(job: Job) -> bool:
+    return job.state == "running"

@@ -1,0 +1,112 @@
+"""Motion quantities of one axis: raw drive units to revolutions, rpm, rpm/s and per cent.
+
+Sources: CiA 402-2 clause 7 (position factor: encoder resolution, gear ratio, feed constant) and
+each profile's ``units``, which carries the manual's line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from backend.drive import Drive
+from profiles.schema import UnitSpec
+
+#: Raw units per rpm for families that count speed in turns; inc/s depends on the gearing.
+_RAW_PER_RPM = {"rpm": 1.0, "0.1 rpm": 10.0}
+#: Raw units per 1 % of rated torque.
+_RAW_PER_PERCENT = {"‰ rated": 10.0, "0.1 %": 10.0, "% rated": 1.0, "0.01 %": 100.0}
+
+
+@dataclass(frozen=True, slots=True)
+class AxisUnits:
+    """Scales of one axis. ``counts_per_rev`` is None where the resolution is unknown."""
+
+    spec: UnitSpec
+    counts_per_rev: float | None
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Unit shown for each quantity."""
+        turns = self.counts_per_rev is not None
+        return {
+            "position": "rev" if turns else self.spec.position,
+            "velocity": "rpm" if self._raw_per_rpm is not None else self.spec.velocity,
+            "acceleration": "rpm/s" if self._raw_per_rpm is not None else self.spec.acceleration,
+            "torque": "%",
+            "following_error": "rev" if turns else self.spec.position,
+            "dc_voltage": "V",
+            "temperature": "°C",
+        }
+
+    @property
+    def _raw_per_rpm(self) -> float | None:
+        if self.spec.velocity == "inc/s":
+            return None if self.counts_per_rev is None else self.counts_per_rev / 60.0
+        return _RAW_PER_RPM.get(self.spec.velocity)
+
+    # Without a known scale the raw unit is shown under its own name, so 1:1 is right there.
+
+    def position(self, raw: float) -> float:
+        """Increments to revolutions."""
+        return raw / (self.counts_per_rev or 1.0)
+
+    def position_raw(self, revolutions: float) -> int:
+        """Revolutions to increments."""
+        return round(revolutions * (self.counts_per_rev or 1.0))
+
+    def velocity(self, raw: float) -> float:
+        """Raw speed to rpm."""
+        return raw / (self._raw_per_rpm or 1.0)
+
+    def velocity_raw(self, rpm: float) -> int:
+        """Rpm to raw speed."""
+        return round(rpm * (self._raw_per_rpm or 1.0))
+
+    def acceleration_raw(self, rpm_per_s: float) -> int:
+        """Rpm/s to the raw ramp: a rate, or a time in ms for families that say so."""
+        reference = self.spec.ramp_reference_rpm
+        if self.spec.acceleration.startswith("ms") and reference is not None:
+            return max(1, round(1000.0 * reference / rpm_per_s))
+        if self.spec.acceleration.startswith("inc/s"):
+            return max(1, round(rpm_per_s * (self.counts_per_rev or 60.0) / 60.0))
+        return max(1, round(rpm_per_s * _RAW_PER_RPM.get(self.spec.velocity, 1.0)))
+
+    def torque(self, raw: float) -> float:
+        """Raw torque to % of rated."""
+        return raw / _RAW_PER_PERCENT.get(self.spec.torque, 10.0)
+
+    def torque_raw(self, percent: float) -> int:
+        """% of rated to raw torque."""
+        return round(percent * _RAW_PER_PERCENT.get(self.spec.torque, 10.0))
+
+
+async def read_units(drive: Drive) -> AxisUnits:
+    """Units of an axis with its present gearing.
+
+    User increments per motor revolution are ``feed/feed_revs * shaft_revs/motor_revs`` where the
+    family has a feed constant, else the profile's resolution divided by the gear ratio.
+
+    Raises:
+        DriveError: the gear parameters cannot be read.
+    """
+    spec = drive.profile.units
+    keys = [
+        key
+        for key in (spec.gear_numerator, spec.gear_denominator, spec.feed, spec.feed_revolutions)
+        if key is not None and not drive.unreachable_why(drive.parameter(key))
+    ]
+    raw: dict[str, float] = {}
+    for key in keys:
+        value = (await drive.read(key)).raw
+        if isinstance(value, (int, float)) and value > 0:
+            raw[key] = float(value)
+
+    def of(key: str | None) -> float:
+        return raw.get(key or "", 1.0)
+
+    ratio = of(spec.gear_numerator) / of(spec.gear_denominator)
+    if spec.feed is not None and spec.feed in raw:
+        per_rev: float | None = of(spec.feed) / of(spec.feed_revolutions)
+    else:
+        per_rev = spec.counts_per_rev
+    return AxisUnits(spec, None if per_rev is None else per_rev / ratio)
