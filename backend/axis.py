@@ -314,12 +314,10 @@ class Axis:
         units = await self.units()
         for key in limits:
             parameter = self.drive.parameter(key)
-            raw: Raw = units.torque_raw(percent)
+            raw = units.torque_raw(percent)
             low, high = parameter.raw_limits
-            if high is not None and raw > high:
-                raw = int(high)
-            if low is not None and raw < low:
-                raw = int(low)
+            raw = int(min(raw, raw if high is None else high))
+            raw = int(max(raw, raw if low is None else low))
             current = (await self.drive.read(key)).raw
             if isinstance(current, int) and current > raw:
                 await self.drive.write(key, raw)

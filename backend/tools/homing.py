@@ -1,0 +1,122 @@
+"""Homing as a job: method, speeds, start, and the verdict of the status word."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from dataclasses import dataclass
+
+from backend.axis import Axis, Envelope
+from backend.jobs import JobResult, Progress
+from drivers import cia402
+from drivers.cia402 import Mode, State
+from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
+
+_POLL_S = 0.02
+_START_HOMING = 0x10
+
+
+@dataclass(frozen=True, slots=True)
+class HomingSettings:
+    """Method of 6098h; speeds rpm, acceleration rpm/s, offset rev. None leaves the drive's own."""
+
+    method: int
+    envelope: Envelope
+    speed_switch_rpm: float | None = None
+    speed_zero_rpm: float | None = None
+    acceleration_rpm_s: float | None = None
+    offset_rev: float | None = None
+
+
+async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobResult:
+    """Home the axis; mode and torque limit are as before afterwards, homing objects stay written.
+
+    Raises:
+        OutOfRange: a method that the drive does not have.
+        NotAllowed: homing error (bit 13), a fault, or travel beyond the envelope.
+        LinkTimeout: not attained in time.
+    """
+    drive, units = axis.drive, await axis.units()
+    known = {method.method: method for method in drive.profile.homing_methods}
+    if settings.method not in known:
+        raise OutOfRange(
+            f"{drive.name} has no homing method {settings.method}",
+            drive=drive.name,
+            value=settings.method,
+            limit=", ".join(str(m) for m in sorted(known)),
+            remedy="choose one of the listed methods",
+        )
+    writes: dict[str, int] = {drive.require("homing_method"): settings.method}
+    for role, value in (
+        ("homing_speed_switch", settings.speed_switch_rpm),
+        ("homing_speed_zero", settings.speed_zero_rpm),
+    ):
+        if value is not None:
+            writes[drive.require(role)] = units.velocity_raw(value)
+    if settings.acceleration_rpm_s is not None:
+        key = drive.require("homing_acceleration")
+        writes[key] = units.acceleration_raw(settings.acceleration_rpm_s)
+    if settings.offset_rev is not None:
+        writes[drive.require("home_offset")] = units.position_raw(settings.offset_rev)
+    for key, raw in writes.items():
+        drive.check(drive.parameter(key), raw)
+    progress(0.0, "preparing")
+    for key, raw in writes.items():
+        await drive.write(key, raw)
+    async with axis.enabled(Mode.HM, settings.envelope):
+        await axis.control(cia402.ENABLE_OPERATION | _START_HOMING)
+        await _attained(axis, settings, progress)
+        await axis.control(cia402.ENABLE_OPERATION)
+        position = units.position(await axis.position_raw())
+    return {"method": settings.method, "position_rev": position}
+
+
+async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) -> None:
+    drive, units = axis.drive, await axis.units()
+    own = drive.profile.quirk("own_status_word") is not None
+    homed_bit = 1 << 8 if own else cia402.STATUS_HOMING_ATTAINED
+    began = time.monotonic()
+    last, travelled = await axis.position_raw(), 0
+    busy_seen = False
+    while True:
+        status = await axis.status_word()
+        if drive.decode_state(status) is not State.OPERATION_ENABLED:
+            causes = "; ".join(await axis.blocked_by()) or "it left Operation enabled"
+            raise NotAllowed(
+                f"{drive.name} broke off homing: {causes}",
+                drive=drive.name,
+                remedy="see the Alarms page",
+            )
+        if not own and status & cia402.STATUS_HOMING_ERROR:
+            raise NotAllowed(
+                f"{drive.name} reports a homing error (status bit 13) with method "
+                f"{settings.method}",
+                drive=drive.name,
+                remedy="check the switches' wiring and functions, the method and its speeds",
+            )
+        elapsed = time.monotonic() - began
+        attained = bool(status & homed_bit) and (own or status & cia402.STATUS_TARGET_REACHED)
+        busy_seen = busy_seen or not attained
+        # A drive that was homed before may show the old verdict until it has started anew.
+        if attained and (busy_seen or elapsed > 0.3):
+            return
+        position = await axis.position_raw()
+        step, last = abs(position - last), position
+        # Taking over the new origin makes the position jump; that is no travel.
+        if step <= units.position_raw(settings.envelope.speed_rpm / 60.0 * 0.5) + 2:
+            travelled += step
+        if units.position(travelled) > 2.5 * settings.envelope.travel_rev:
+            raise NotAllowed(
+                f"{drive.name} travelled {units.position(travelled):.4g} rev without finding home",
+                drive=drive.name,
+                limit=f"{settings.envelope.travel_rev:g} rev each way",
+                remedy="check the switch that the method looks for, or widen the travel limit",
+            )
+        if elapsed > settings.envelope.time_s:
+            raise LinkTimeout(
+                f"{drive.name} did not find home within {settings.envelope.time_s:g} s",
+                drive=drive.name,
+                remedy="check the switch that the method looks for, or allow more time",
+            )
+        progress(min(0.95, elapsed / settings.envelope.time_s), "searching home")
+        await asyncio.sleep(_POLL_S)

@@ -1,0 +1,164 @@
+"""Hold-to-run jog as a moving profile-position target.
+
+The links that need it have no watchdog in the drive (architecture: "No open-ended command
+without a watchdog in the drive"). So the target is only ever ``v·T + v²/2a`` ahead of the axis:
+with no renewal, whoever died, the drive's own profile generator brakes and stops there.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from dataclasses import dataclass, field
+
+from backend.axis import Axis, Envelope
+from backend.jobs import JobResult, Progress
+from drivers import cia402
+from drivers.cia402 import Mode, State
+from drivers.errors import DriveError, NotAllowed, OutOfRange
+
+#: Longest time between renewals from the page before the axis is stopped.
+RENEWAL_TIMEOUT_S = 0.2
+#: Period of target renewals to the drive (20 Hz or faster).
+PERIOD_S = 0.04
+#: The axis may leave the travel limit by this much before the jog ends with an error.
+TRAVEL_MARGIN_REV = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class JogSettings:
+    """Speed in rpm, acceleration in rpm/s, travel in rev from the start point, torque in %."""
+
+    direction: int
+    speed_rpm: float
+    acceleration_rpm_s: float
+    travel_rev: float
+    torque_percent: float
+
+    @property
+    def lead_rev(self) -> float:
+        """Distance between axis and target: ``v·T + v²/2a`` in revolutions."""
+        speed = self.speed_rpm / 60.0
+        return speed * RENEWAL_TIMEOUT_S + speed**2 / (2.0 * self.acceleration_rpm_s / 60.0)
+
+
+@dataclass(slots=True)
+class Hold:
+    """The button of the person who jogs. Times are `time.monotonic` seconds."""
+
+    last: float = field(default_factory=time.monotonic)
+    released: str = ""
+
+    def renew(self) -> None:
+        """The button is still held. A late renewal does not revive an expired hold."""
+        if not self.expired():
+            self.last = time.monotonic()
+
+    def release(self, reason: str) -> None:
+        """The button was let go, or what amounts to it."""
+        self.released = self.released or reason
+
+    def expired(self) -> bool:
+        """Whether the last renewal is too long ago."""
+        return time.monotonic() - self.last > RENEWAL_TIMEOUT_S
+
+    def ended(self) -> str:
+        """Why to stop, or empty while the button is held."""
+        if self.released:
+            return self.released
+        return "no sign of life from the page for 200 ms" if self.expired() else ""
+
+
+async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress) -> JobResult:
+    """Move while ``hold`` is held; returns why it ended and the distance moved in rev.
+
+    Raises:
+        OutOfRange: a setting that the drive cannot do, before anything moves.
+        NotAllowed: the axis cannot be enabled, or left the envelope.
+        DriveError: the link failed; the drive stops by itself as described above.
+    """
+    drive, units = axis.drive, await axis.units()
+    if settings.direction not in (-1, 1):
+        raise OutOfRange(f"direction {settings.direction} is neither 1 nor -1")
+    envelope = Envelope(settings.travel_rev, settings.speed_rpm, settings.torque_percent, 3600.0)
+    ramps = {
+        drive.require("profile_velocity"): units.velocity_raw(settings.speed_rpm),
+        drive.require("profile_acceleration"): units.acceleration_raw(settings.acceleration_rpm_s),
+        drive.require("profile_deceleration"): units.acceleration_raw(settings.acceleration_rpm_s),
+    }
+    for key, raw in ramps.items():
+        drive.check(drive.parameter(key), raw)
+    progress(0.0, "enabling")
+    async with axis.restoring(*ramps):
+        for key, raw in ramps.items():
+            await drive.write(key, raw)
+        async with axis.enabled(Mode.PP, envelope):
+            start = await axis.position_raw()
+            # Enabling takes longer than the renewal time-out; the page has renewed meanwhile.
+            progress(0.0, "moving")
+            reason = await _follow(axis, settings, hold, start)
+            stop_time = 1.0 + 2.0 * settings.speed_rpm / settings.acceleration_rpm_s
+            await axis.halt_and_wait(stop_time)
+            moved = units.position(await axis.position_raw() - start)
+    return {"reason": reason, "moved_rev": moved}
+
+
+async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> str:
+    drive, units = axis.drive, await axis.units()
+    target_key = drive.require("position_target")
+    lead = units.position_raw(settings.lead_rev)
+    travel = units.position_raw(settings.travel_rev)
+    toggle = cia402.ENABLE_OPERATION | cia402.CHANGE_IMMEDIATELY
+    due = time.monotonic()
+    last_target: int | None = None
+    while not (reason := hold.ended()):
+        position, state = await _observe(axis)
+        if state is not State.OPERATION_ENABLED:
+            raise NotAllowed(
+                f"{drive.name} left “{State.OPERATION_ENABLED.value}” while jogging: "
+                + ("; ".join(await axis.blocked_by()) or state.value),
+                drive=drive.name,
+                remedy="see the Alarms page",
+            )
+        _inside(axis, position - start, travel, units.position_raw(TRAVEL_MARGIN_REV))
+        ahead = start + settings.direction * travel
+        target = position + settings.direction * lead
+        target = min(target, ahead) if settings.direction > 0 else max(target, ahead)
+        if hold.ended():
+            continue
+        if target != last_target:
+            await drive.command(target_key, target)
+            await axis.control(toggle | cia402.NEW_SET_POINT)
+            await axis.control(toggle)
+            last_target = target
+        due = max(due + PERIOD_S, time.monotonic())
+        await asyncio.sleep(due - time.monotonic())
+    return reason
+
+
+async def _observe(axis: Axis) -> tuple[int, State]:
+    drive = axis.drive
+    status, position = drive.require("status_word"), drive.require("position_actual")
+    readings = await drive.read_many((status, position))
+    values: list[int] = []
+    for key in (status, position):
+        raw = readings[key].raw
+        if not isinstance(raw, int):
+            raise DriveError(
+                f"{drive.name}: {key} could not be read while jogging: {readings[key].error}",
+                drive=drive.name,
+                parameter=key,
+                remedy="check the cable; the axis stops by itself",
+            )
+        values.append(raw)
+    return values[1], drive.decode_state(values[0])
+
+
+def _inside(axis: Axis, moved: int, travel: int, margin: int) -> None:
+    if abs(moved) > travel + margin:
+        raise NotAllowed(
+            f"{axis.drive.name} left the travel limit of the jog",
+            drive=axis.drive.name,
+            limit=f"{travel} increments from the start",
+            remedy="check load and gearing; an external force may move the axis",
+        )

@@ -1,0 +1,264 @@
+"""Moves in the profile modes: one move, back and forth, velocity and torque for a time."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from dataclasses import dataclass
+from typing import Literal
+
+from backend.axis import Axis, Envelope
+from backend.jobs import JobResult, Progress
+from drivers import cia402
+from drivers.cia402 import Mode, State
+from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
+
+_POLL_S = 0.02
+
+CONSENT = (
+    "This drive has no watchdog on this link: if the cable is pulled or this program dies, it "
+    "keeps the commanded speed or torque until its own travel limit or its emergency stop. "
+    "Go on only with the drive's travel limits active and a hand on the emergency stop."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class MoveSettings:
+    """One move. Target in rev (PP), rpm (PV) or % (PT); speed rpm; ramps rpm/s."""
+
+    mode: Literal["PP", "PV", "PT"]
+    target: float
+    envelope: Envelope
+    relative: bool = False
+    speed_rpm: float | None = None
+    acceleration_rpm_s: float | None = None
+    deceleration_rpm_s: float | None = None
+    consent: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceSettings:
+    """Back and forth: positions in rev, speed rpm, ramp rpm/s, dwell s."""
+
+    first: float
+    second: float
+    speed_rpm: float
+    acceleration_rpm_s: float
+    dwell_s: float
+    count: int
+    envelope: Envelope
+
+
+async def move(axis: Axis, settings: MoveSettings, progress: Progress) -> JobResult:
+    """One move in a profile mode; ends at the target, or after the envelope's time (PV, PT).
+
+    Raises:
+        OutOfRange: target or speed outside the envelope; nothing has moved.
+        NotAllowed: no consent where it is needed, or the axis left the envelope.
+        LinkTimeout: the target was not reached in time.
+    """
+    units = await axis.units()
+    if settings.mode != "PP":
+        _require_watchdog_or_consent(axis, settings.consent)
+    async with axis.restoring(*(ramps := await _ramps(axis, settings))):
+        for key, raw in ramps.items():
+            await axis.drive.write(key, raw)
+        async with axis.enabled(Mode[settings.mode], settings.envelope):
+            start = await axis.position_raw()
+            if settings.mode == "PP":
+                target = units.position_raw(settings.target)
+                target += start if settings.relative else 0
+                await _to(axis, target, start, settings.envelope, progress)
+            else:
+                await _hold(axis, settings, start, progress)
+            end = await axis.position_raw()
+    return {"start_rev": units.position(start), "end_rev": units.position(end)}
+
+
+async def sequence(axis: Axis, settings: SequenceSettings, progress: Progress) -> JobResult:
+    """Move between two positions ``count`` times with a dwell at each.
+
+    Raises:
+        OutOfRange, NotAllowed, LinkTimeout: as `move`.
+    """
+    units = await axis.units()
+    first = MoveSettings(
+        "PP",
+        settings.first,
+        settings.envelope,
+        speed_rpm=settings.speed_rpm,
+        acceleration_rpm_s=settings.acceleration_rpm_s,
+        deceleration_rpm_s=settings.acceleration_rpm_s,
+    )
+    times: list[float] = []
+    async with axis.restoring(*(ramps := await _ramps(axis, first))):
+        for key, raw in ramps.items():
+            await axis.drive.write(key, raw)
+        async with axis.enabled(Mode.PP, settings.envelope):
+            start = await axis.position_raw()
+            for number in range(settings.count):
+                for place in (settings.first, settings.second):
+                    progress(number / settings.count, f"cycle {number + 1} of {settings.count}")
+                    began = time.monotonic()
+                    target = units.position_raw(place)
+                    await _to(axis, target, start, settings.envelope, None)
+                    times.append(time.monotonic() - began)
+                    await asyncio.sleep(settings.dwell_s)
+    return {"cycles": settings.count, "mean_move_s": sum(times) / len(times)}
+
+
+def _require_watchdog_or_consent(axis: Axis, consent: bool) -> None:
+    spec = axis.drive.ports[0].spec
+    if (spec is None or not spec.watchdog.present) and not consent:
+        raise NotAllowed(
+            f"{axis.drive.name}: {CONSENT}",
+            drive=axis.drive.name,
+            remedy="agree to this text, or use a position move",
+        )
+
+
+async def _ramps(axis: Axis, settings: MoveSettings) -> dict[str, int]:
+    """Profile objects and raw values, checked before anything moves."""
+    drive, units = axis.drive, await axis.units()
+    values: dict[str, int] = {}
+    if settings.speed_rpm is not None:
+        if settings.speed_rpm > settings.envelope.speed_rpm:
+            raise OutOfRange(
+                f"{drive.name}: {settings.speed_rpm:g} rpm is above the envelope's "
+                f"{settings.envelope.speed_rpm:g} rpm",
+                drive=drive.name,
+                value=settings.speed_rpm,
+                limit=f"{settings.envelope.speed_rpm:g} rpm",
+                remedy="lower the speed or widen the envelope",
+            )
+        if settings.mode == "PP":
+            values[drive.require("profile_velocity")] = units.velocity_raw(settings.speed_rpm)
+    if settings.acceleration_rpm_s is not None:
+        key = drive.require("profile_acceleration")
+        values[key] = units.acceleration_raw(settings.acceleration_rpm_s)
+    if settings.deceleration_rpm_s is not None:
+        key = drive.require("profile_deceleration")
+        values[key] = units.acceleration_raw(settings.deceleration_rpm_s)
+    for key, raw in values.items():
+        drive.check(drive.parameter(key), raw)
+    return values
+
+
+async def _to(
+    axis: Axis, target: int, start: int, envelope: Envelope, progress: Progress | None
+) -> None:
+    """Set-point handshake (CiA 402-2 clause 10.3.3), then wait for target reached."""
+    drive, units = axis.drive, await axis.units()
+    if abs(target - start) > units.position_raw(envelope.travel_rev):
+        raise OutOfRange(
+            f"{drive.name}: a target {units.position(target - start):+.4g} rev from the start "
+            f"point is outside the travel limit of {envelope.travel_rev:g} rev",
+            drive=drive.name,
+            value=units.position(target),
+            limit=f"{envelope.travel_rev:g} rev from the start",
+            remedy="choose a nearer target or a wider travel limit",
+        )
+    word = cia402.ENABLE_OPERATION | cia402.CHANGE_IMMEDIATELY
+    await axis.control(word)
+    await drive.command(drive.require("position_target"), target)
+    await axis.control(word | cia402.NEW_SET_POINT)
+    own = drive.profile.quirk("own_status_word") is not None
+    reached_bit = 1 << 15 if own else cia402.STATUS_TARGET_REACHED
+    deadline = time.monotonic() + envelope.time_s
+    await _acknowledged(axis, min(deadline, time.monotonic() + 1.0))
+    await axis.control(word)
+    while True:
+        status = await _still_inside(axis, start, envelope)
+        position = await axis.position_raw()
+        if progress and target != start:
+            progress(min(1.0, abs((position - start) / (target - start))), "moving")
+        if status & reached_bit and abs(position - target) <= units.position_raw(0.02) + 2:
+            return
+        if time.monotonic() > deadline:
+            raise LinkTimeout(
+                f"{drive.name} did not reach its target within {envelope.time_s:g} s: "
+                f"it stands {units.position(position - target):+.4g} rev from it",
+                drive=drive.name,
+                remedy="look for a limit, a blocked axis, too little torque or too short a time",
+            )
+        await asyncio.sleep(_POLL_S)
+
+
+async def _acknowledged(axis: Axis, deadline: float) -> None:
+    """Wait for set-point acknowledge (bit 12)."""
+    while not await axis.status_word() & cia402.STATUS_SET_POINT_ACKNOWLEDGE:
+        if time.monotonic() > deadline:
+            raise LinkTimeout(
+                f"{axis.drive.name} does not take the set-point (status bit 12 stays 0)",
+                drive=axis.drive.name,
+                remedy="check mode and power state on the Overview page",
+            )
+        await asyncio.sleep(_POLL_S / 2)
+
+
+async def _hold(axis: Axis, settings: MoveSettings, start: int, progress: Progress) -> None:
+    """Velocity or torque for the envelope's time, inside its travel and speed."""
+    drive, units, envelope = axis.drive, await axis.units(), settings.envelope
+    velocity = settings.mode == "PV"
+    limit = envelope.speed_rpm if velocity else envelope.torque_percent
+    if abs(settings.target) > limit:
+        raise OutOfRange(
+            f"{drive.name}: {settings.target:g} is above the envelope's {limit:g}",
+            drive=drive.name,
+            value=settings.target,
+            limit=f"{limit:g} {'rpm' if velocity else '%'}",
+            remedy="lower the target or widen the envelope",
+        )
+    role = "velocity_target" if velocity else "torque_target"
+    to_raw = units.velocity_raw if velocity else units.torque_raw
+    await drive.command(drive.require(role), to_raw(settings.target))
+    began = time.monotonic()
+    while (elapsed := time.monotonic() - began) < envelope.time_s:
+        progress(elapsed / envelope.time_s, "running")
+        await _still_inside(axis, start, envelope)
+        await asyncio.sleep(_POLL_S)
+    await drive.command(drive.require(role), 0)
+
+
+async def _still_inside(axis: Axis, start: int, envelope: Envelope) -> int:
+    """Status word; ends the motion when the axis left the envelope or Operation enabled."""
+    drive, units = axis.drive, await axis.units()
+    keys = [drive.require(r) for r in ("status_word", "position_actual", "velocity_actual")]
+    readings = await drive.read_many(keys)
+    raws: list[int] = []
+    for key in keys:
+        raw = readings[key].raw
+        if not isinstance(raw, int):
+            raise LinkTimeout(
+                f"{drive.name}: {key} could not be read during motion: {readings[key].error}",
+                drive=drive.name,
+                parameter=key,
+                remedy="check the cable",
+            )
+        raws.append(raw)
+    status, position, velocity = raws
+    if drive.decode_state(status) is not State.OPERATION_ENABLED:
+        causes = "; ".join(await axis.blocked_by()) or "it left Operation enabled"
+        raise NotAllowed(
+            f"{drive.name} stopped during the move: {causes}",
+            drive=drive.name,
+            remedy="see the Alarms page",
+        )
+    moved, speed = abs(units.position(position - start)), abs(units.velocity(velocity))
+    if moved > envelope.travel_rev * 1.02 + 0.05:
+        raise NotAllowed(
+            f"{drive.name} left the travel limit: {moved:.4g} rev from the start",
+            drive=drive.name,
+            value=moved,
+            limit=f"{envelope.travel_rev:g} rev",
+            remedy="check load and limits",
+        )
+    if speed > envelope.speed_rpm * 1.3 + 30:
+        raise NotAllowed(
+            f"{drive.name} is faster than the envelope: {speed:.4g} rpm",
+            drive=drive.name,
+            value=speed,
+            limit=f"{envelope.speed_rpm:g} rpm",
+            remedy="check load and limits",
+        )
+    return status

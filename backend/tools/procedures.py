@@ -1,0 +1,159 @@
+"""Runs a profile's named procedures: save, restore, reset, write-settings …"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+from backend.axis import Axis
+from backend.jobs import JobResult, Progress
+from drivers.cia402 import State
+from drivers.errors import DriveError, LinkTimeout, NotAllowed, Rejected
+from profiles.schema import ConfirmStep, PollStep, Procedure, ReconnectStep, WaitStep, WriteStep
+
+_POLL_S = 0.1
+
+
+def describe(procedure: Procedure) -> list[str]:
+    """Each step in words."""
+    words: list[str] = []
+    for step in procedure.steps:
+        match step:
+            case WriteStep():
+                shown = f"0x{step.raw:X}" if isinstance(step.raw, int) else step.raw
+                words.append(f"write {shown} to {step.key}")
+            case WaitStep():
+                words.append(f"leave the drive alone for {step.seconds:g} s")
+            case PollStep():
+                words.append(f"wait until {step.key} is {step.equals} (≤ {step.timeout_s:g} s)")
+            case ConfirmStep():
+                words.append(f"you confirm: {step.text}")
+            case ReconnectStep():
+                words.append(f"wait until the drive answers again (≤ {step.timeout_s:g} s)")
+    return words
+
+
+async def run_procedure(
+    axis: Axis, procedure: Procedure, confirmed: bool, progress: Progress
+) -> JobResult:
+    """Carry out the steps in order; the first that fails ends it.
+
+    Raises:
+        NotAllowed: not confirmed, or the axis is enabled and must not be.
+        DriveError: a step failed; the message says which and that later steps were not done.
+    """
+    drive = axis.drive
+    texts = [step.text for step in procedure.steps if isinstance(step, ConfirmStep)]
+    if texts and not confirmed:
+        raise NotAllowed(
+            f"{drive.name}: {procedure.title} needs your agreement: {' '.join(texts)}",
+            drive=drive.name,
+            remedy="read the text and confirm",
+        )
+    if procedure.requires_stop and await axis.state() is State.OPERATION_ENABLED:
+        raise NotAllowed(
+            f"{drive.name}: {procedure.title} is possible only while the motor is not enabled",
+            drive=drive.name,
+            remedy="disable the axis first",
+        )
+    words = describe(procedure)
+    for number, step in enumerate(procedure.steps):
+        progress(number / len(procedure.steps), words[number])
+        try:
+            await _step(axis, step)
+        except DriveError as error:
+            left = len(procedure.steps) - number - 1
+            error.message = (
+                f"{procedure.title}, step {number + 1} ({words[number]}): {error.message}"
+                + (f"; the {left} steps after it were not done" if left else "")
+            )
+            raise
+    _remember(axis, procedure.name)
+    return {"procedure": procedure.name, "steps": words}
+
+
+async def _step(
+    axis: Axis, step: WriteStep | WaitStep | PollStep | ConfirmStep | ReconnectStep
+) -> None:
+    drive = axis.drive
+    match step:
+        case WriteStep():
+            value = drive.check(drive.parameter(step.key), step.raw)
+            if isinstance(value, str):
+                await drive.write(step.key, value)
+            else:
+                await drive.command(step.key, int(value))
+        case WaitStep():
+            await asyncio.sleep(step.seconds)
+        case PollStep():
+            await _poll(axis, step)
+        case ReconnectStep():
+            await _reconnect(axis, step.timeout_s)
+        case ConfirmStep():
+            pass
+
+
+async def _poll(axis: Axis, step: PollStep) -> None:
+    drive = axis.drive
+    deadline = time.monotonic() + step.timeout_s
+    while True:
+        raw = await drive.raw(step.key)
+        if raw & step.mask == step.equals & step.mask:
+            return
+        if raw in step.failed:
+            raise Rejected(
+                f"{drive.name}: {step.key} reads {raw}, which means that it failed",
+                code=raw,
+                drive=drive.name,
+                parameter=step.key,
+                value=raw,
+                remedy="see the drive's manual at this procedure",
+            )
+        if time.monotonic() > deadline:
+            raise LinkTimeout(
+                f"{drive.name}: {step.key} still reads {raw} after {step.timeout_s:g} s",
+                drive=drive.name,
+                parameter=step.key,
+                value=raw,
+                limit=f"{step.equals} within {step.timeout_s:g} s",
+                remedy="read the parameter again; the drive may need longer",
+            )
+        await asyncio.sleep(_POLL_S)
+
+
+async def _reconnect(axis: Axis, timeout_s: float) -> None:
+    """The drive restarts: wait until its status word can be read again."""
+    axis.drive.forget()
+    axis.forget()
+    deadline = time.monotonic() + timeout_s
+    await asyncio.sleep(_POLL_S)
+    while True:
+        try:
+            await axis.status_word()
+        except DriveError as error:
+            if time.monotonic() > deadline:
+                raise LinkTimeout(
+                    f"{axis.drive.name} does not answer {timeout_s:g} s after its restart",
+                    drive=axis.drive.name,
+                    remedy="check its power and address; its communication settings may have "
+                    "changed with the restart",
+                ) from error
+            await asyncio.sleep(_POLL_S)
+        else:
+            return
+
+
+def _remember(axis: Axis, name: str) -> None:
+    """What a well-known procedure means for the change marks."""
+    drive = axis.drive
+    match name:
+        case "save":
+            drive.mark_saved()
+        case "write_settings":
+            drive.mark_applied("write_settings")
+            axis.forget()
+        case "restore" | "reset":
+            drive.forget()
+            axis.forget()
+        case _:
+            pass
