@@ -1,0 +1,315 @@
+"""CANopen over EtherCAT: SDO transfers, complete access, the information service.
+
+Generators over `Mailbox`; no I/O. Source: ETG.1000.6 clauses 5.6.2 (SDO) and 5.6.3 (SDO
+information). Aborts are taken with any low command bits and under either service number:
+several makers' stacks differ there.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NoReturn
+
+from drivers.errors import ProtocolError
+from drivers.ethercat.mailbox import COE, Mail, Mailbox, Steps
+from drivers.sdo_abort import rejected
+
+_REQUEST = 2 << 12
+_RESPONSE = 3
+_INFO = 8
+_MAX_BYTES = 1 << 20
+
+ABORT_COMMAND = 0x05040001
+ABORT_TOGGLE = 0x05030000
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectInfo:
+    """One object as the drive's own dictionary describes it."""
+
+    index: int
+    name: str
+    data_type: int
+    object_code: int
+    max_subindex: int
+
+
+@dataclass(frozen=True, slots=True)
+class EntryDescription:
+    """One entry as the drive's own dictionary describes it.
+
+    ``access`` is the bit field of ETG.1000.6 table 49: 0–2 readable and 3–5 writable in PREOP,
+    SAFEOP and OP, 6 RxPDO, 7 TxPDO. ``unit``, ``default``, ``minimum`` and ``maximum`` are None
+    where the drive tells none.
+    """
+
+    index: int
+    subindex: int
+    data_type: int
+    bit_length: int
+    access: int
+    name: str
+    unit: int | None = None
+    default: bytes | None = None
+    minimum: bytes | None = None
+    maximum: bytes | None = None
+
+
+def upload(
+    box: Mailbox,
+    index: int,
+    subindex: int,
+    *,
+    complete: bool = False,
+    timeout_s: float | None = None,
+) -> Steps[bytes]:
+    """Read an object; with ``complete`` all of it, subindex 0 first.
+
+    Raises:
+        Rejected: the drive aborted.
+        LinkTimeout, LinkLost, ProtocolError: see `Mailbox.request`.
+    """
+    yield from settle(box)
+    command = 0x50 if complete else 0x40
+    request = struct.pack("<HBHB4x", _REQUEST, command, index, subindex)
+    answer = yield from box.request(COE, request, _answer_to(index, subindex), timeout_s)
+    _raise_abort(answer, index, subindex, writing=False)
+    command = answer[2]
+    if command & 0xE0 != 0x40:
+        yield from _give_up(
+            box, index, subindex, ABORT_COMMAND, f"unexpected answer {command:#04x}"
+        )
+    if command & 0x02:
+        return answer[6 : 10 - (command >> 2 & 3 if command & 0x01 else 0)]
+    if len(answer) < 10:
+        yield from _give_up(box, index, subindex, ABORT_COMMAND, "an answer without a length")
+    size = int.from_bytes(answer[6:10], "little")
+    if size > _MAX_BYTES:
+        yield from _give_up(box, index, subindex, 0x05040005, f"the drive announced {size} bytes")
+    data = bytearray(answer[10:])
+    if len(data) < size:
+        yield from _upload_segments(box, index, subindex, size=size, data=data, timeout_s=timeout_s)
+    return bytes(data[:size])
+
+
+def _upload_segments(
+    box: Mailbox,
+    index: int,
+    subindex: int,
+    *,
+    size: int,
+    data: bytearray,
+    timeout_s: float | None,
+) -> Steps[None]:
+    toggle = 0
+    while True:
+        request = struct.pack("<HB7x", _REQUEST, 0x60 | toggle)
+        answer = yield from box.request(COE, request, _is_segment, timeout_s)
+        _raise_abort(answer, index, subindex, writing=False)
+        command = answer[2]
+        if command & 0xE0:
+            yield from _give_up(box, index, subindex, ABORT_COMMAND, f"answer {command:#04x}")
+        if command & 0x10 != toggle:
+            yield from _give_up(box, index, subindex, ABORT_TOGGLE, "a segment came twice")
+        part = answer[3:]
+        data += part[: 7 - (command >> 1 & 7)] if len(part) <= 7 else part
+        if len(data) > size:
+            yield from _give_up(
+                box, index, subindex, 0x06070010, f"more than the {size} bytes announced came"
+            )
+        if command & 0x01:
+            break
+        toggle ^= 0x10
+    if len(data) != size:
+        raise ProtocolError(f"the drive announced {size} bytes and sent {len(data)}")
+
+
+def download(
+    box: Mailbox,
+    index: int,
+    subindex: int,
+    data: bytes,
+    *,
+    complete: bool = False,
+    timeout_s: float | None = None,
+) -> Steps[None]:
+    """Write an object: expedited up to 4 bytes, in one mail or in segments above.
+
+    Raises:
+        Rejected: the drive aborted.
+        LinkTimeout, LinkLost, ProtocolError: see `Mailbox.request`.
+    """
+    yield from settle(box)
+    room = box.payload_size - 10
+    if 1 <= len(data) <= 4 and not complete:
+        command = 0x23 | (4 - len(data)) << 2
+        request = struct.pack("<HBHB", _REQUEST, command, index, subindex) + data.ljust(4, b"\0")
+        sent = len(data)
+    else:
+        command = 0x31 if complete else 0x21
+        header = struct.pack("<HBHBI", _REQUEST, command, index, subindex, len(data))
+        sent = min(room, len(data))
+        request = header + data[:sent]
+    answer = yield from box.request(COE, request, _answer_to(index, subindex), timeout_s)
+    _raise_abort(answer, index, subindex, writing=True)
+    if answer[2] & 0xE0 != 0x60:
+        yield from _give_up(
+            box, index, subindex, ABORT_COMMAND, f"unexpected answer {answer[2]:#04x} to a write"
+        )
+    toggle = 0
+    while sent < len(data):
+        part = data[sent : sent + box.payload_size - 3]
+        sent += len(part)
+        command = toggle | (sent == len(data)) | (max(7 - len(part), 0) << 1)
+        request = struct.pack("<HB", _REQUEST, command) + part.ljust(7, b"\0")
+        answer = yield from box.request(COE, request, _is_segment, timeout_s)
+        _raise_abort(answer, index, subindex, writing=True)
+        if answer[2] & 0xE0 != 0x20 or answer[2] & 0x10 != toggle:
+            yield from _give_up(box, index, subindex, ABORT_TOGGLE, "a segment went astray")
+        toggle ^= 0x10
+
+
+def settle(box: Mailbox, *, force: bool = False) -> Steps[None]:
+    """Make sure that no late answer can be taken for the next one.
+
+    A slave answers in order. After a time-out a harmless read of another object is asked first:
+    when its answer is here, everything older has come and been dropped.
+    """
+    if not (box.unsettled or force):
+        return
+    yield from box.drain()
+    for fence in ((0x1018, 1), (0x1000, 0)):
+        request = struct.pack("<HBHB4x", _REQUEST, 0x40, *fence)
+        yield from box.request(COE, request, _answer_to(*fence))
+    box.unsettled = False
+
+
+def split_complete(data: bytes, sizes: list[int]) -> list[bytes] | None:
+    """Entries 1…n of a complete-access answer, or None where its layout is not certain.
+
+    Subindex 0 is padded to 16 bits (ETG.1000.6 clause 5.6.2.1); some slaves send it as one
+    byte. The length tells which; an answer that fits neither is not interpreted.
+    """
+    total = sum(sizes)
+    if not data or data[0] != len(sizes):
+        return None
+    if len(data) == total + 2 and data[1] == 0:
+        start = 2
+    elif len(data) == total + 1:
+        start = 1
+    else:
+        return None
+    parts = []
+    for size in sizes:
+        parts.append(data[start : start + size])
+        start += size
+    return parts
+
+
+def list_objects(box: Mailbox) -> Steps[list[int]]:
+    """All object indices of the drive's own dictionary (list type 1)."""
+    parts = yield from _info(box, 0x01, struct.pack("<H", 1), 0x02)
+    raw = b"".join(part[2:] if number == 0 else part for number, part in enumerate(parts))
+    return sorted(set(struct.unpack(f"<{len(raw) // 2}H", raw[: len(raw) // 2 * 2])))
+
+
+def describe_object(box: Mailbox, index: int) -> Steps[ObjectInfo]:
+    """Name, type and number of entries of one object."""
+    parts = yield from _info(box, 0x03, struct.pack("<H", index), 0x04)
+    data = b"".join(parts)
+    if len(data) < 6:
+        raise ProtocolError(f"the description of {index:04X} has only {len(data)} bytes")
+    told, data_type, max_subindex, code = struct.unpack("<HHBB", data[:6])
+    return ObjectInfo(told, _text(data[6:]), data_type, code & 0x0F, max_subindex)
+
+
+def describe_entry(box: Mailbox, index: int, subindex: int) -> Steps[EntryDescription]:
+    """Type, length, access and name of one entry, with unit, default and limits if told."""
+    wanted = 0x08 | 0x10 | 0x20 | 0x40
+    parts = yield from _info(box, 0x05, struct.pack("<HBB", index, subindex, wanted), 0x06)
+    data = b"".join(parts)
+    if len(data) < 10:
+        raise ProtocolError(f"the description of {index:04X}:{subindex:02X} is too short")
+    told, sub, info, data_type, bits, access = struct.unpack("<HBBHHH", data[:10])
+    rest = data[10:]
+    size = (bits + 7) // 8
+    unit: int | None = None
+    values: list[bytes | None] = [None, None, None]
+    if info & 0x08 and len(rest) >= 4:
+        unit, rest = int.from_bytes(rest[:4], "little"), rest[4:]
+    for place, bit in enumerate((0x10, 0x20, 0x40)):
+        if info & bit and len(rest) >= size:
+            values[place], rest = rest[:size], rest[size:]
+    return EntryDescription(told, sub, data_type, bits, access, _text(rest), unit, *values)
+
+
+def _info(box: Mailbox, opcode: int, data: bytes, answer_code: int) -> Steps[list[bytes]]:
+    """One information request; the answer comes in as many mails as it needs."""
+    yield from settle(box)
+
+    def matches(mail: Mail) -> bool:
+        if mail.protocol != COE or len(mail.payload) < 6:
+            return False
+        service = int.from_bytes(mail.payload[:2], "little") >> 12
+        return service == _INFO and mail.payload[2] & 0x7F in (answer_code, 0x07)
+
+    request = struct.pack("<HBBH", _INFO << 12, opcode, 0, 0) + data
+    answer = yield from box.request(COE, request, matches)
+    parts: list[bytes] = []
+    while True:
+        if answer[2] & 0x7F == 0x07:
+            index = int.from_bytes(data[:2], "little")
+            raise rejected(
+                int.from_bytes(answer[6:10], "little"), parameter=f"description of {index:04X}"
+            )
+        parts.append(answer[6:])
+        if int.from_bytes(answer[4:6], "little") == 0:
+            return parts
+        if sum(map(len, parts)) > _MAX_BYTES:
+            raise ProtocolError("the drive's description does not end")
+        answer = yield from box.receive(matches, box.timeout_s)
+
+
+def _answer_to(index: int, subindex: int) -> Callable[[Mail], bool]:
+    mux = struct.pack("<HB", index, subindex)
+
+    def matches(mail: Mail) -> bool:
+        if not _is_sdo(mail):
+            return False
+        return mail.payload[3:6] == mux or _is_anonymous_abort(mail.payload)
+
+    return matches
+
+
+def _is_segment(mail: Mail) -> bool:
+    return _is_sdo(mail)
+
+
+def _is_sdo(mail: Mail) -> bool:
+    if mail.protocol != COE or len(mail.payload) < 6:
+        return False
+    service = int.from_bytes(mail.payload[:2], "little") >> 12
+    return service == _RESPONSE or (service == 2 and mail.payload[2] & 0xE0 == 0x80)
+
+
+def _is_anonymous_abort(payload: bytes) -> bool:
+    return payload[2] & 0xE0 == 0x80 and payload[3:6] == b"\0\0\0"
+
+
+def _raise_abort(answer: bytes, index: int, subindex: int, *, writing: bool) -> None:
+    if answer[2] & 0xE0 == 0x80:
+        code = int.from_bytes(answer[6:10], "little")
+        raise rejected(code, parameter=f"{index:04X}:{subindex:02X}", writing=writing)
+
+
+def _give_up(box: Mailbox, index: int, subindex: int, code: int, why: str) -> Steps[NoReturn]:
+    """Abort towards the slave, then raise."""
+    yield from box.post(COE, struct.pack("<HBHBI", _REQUEST, 0x80, index, subindex, code))
+    box.unsettled = True
+    raise ProtocolError(f"{why} ({index:04X}:{subindex:02X})")
+
+
+def _text(data: bytes) -> str:
+    return data.split(b"\0", 1)[0].decode("utf-8", "replace").strip()

@@ -1,0 +1,267 @@
+"""The mailbox of one slave: framing and transactions as generators without any I/O.
+
+A transaction yields `Read`, `Write` and `Pause` steps and is sent back the bytes of a read,
+``b""`` for a write that arrived, or None where nobody answered. Whoever owns the wire runs the
+steps, one frame each, so that process data never wait for a mailbox.
+
+Source: ETG.1000.4 clause 5.6 (mailbox header, counter, repeat), ETG.1000.6 clause 5.6 (CoE).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple, TypeVar
+
+from drivers.errors import LinkLost, LinkTimeout, ProtocolError
+
+T = TypeVar("T")
+
+
+class Read(NamedTuple):
+    """Read ``size`` bytes from an ESC register (FPRD)."""
+
+    register: int
+    size: int
+
+
+class Write(NamedTuple):
+    """Write an ESC register (FPWR)."""
+
+    register: int
+    data: bytes
+
+
+class Pause(NamedTuple):
+    """Leave the station alone for a while."""
+
+    seconds: float
+
+
+Step = Read | Write | Pause
+Steps = Generator[Step, bytes | None, T]
+
+MAILBOX_ERROR = 0
+COE = 3
+FOE = 4
+Protocol = Literal[0, 3, 4]
+
+SM0_STATUS = 0x805
+SM1_STATUS = 0x80D
+SM1_ACTIVATE = 0x80E
+SM1_PDI = 0x80F
+_FULL = 0x08
+
+_ERRORS = {
+    1: "syntax error in the mailbox header",
+    2: "the mailbox protocol is not supported",
+    3: "the mailbox channel is wrong",
+    4: "the mailbox service is not supported",
+    5: "the mailbox header is invalid",
+    6: "the mailbox data are too short",
+    7: "the drive has no memory for the mailbox",
+    8: "the mailbox data have a wrong length",
+    9: "the mailbox service is already at work",
+}
+
+_RESEND_S = 0.02
+_DEAD_READS = 5
+
+
+class Mail(NamedTuple):
+    """One mailbox message without its header."""
+
+    protocol: int
+    payload: bytes
+
+
+def frame(protocol: int, counter: int, payload: bytes, size: int) -> bytes:
+    """A mailbox padded to its full ``size``: the last byte is what tells the slave of it.
+
+    Raises:
+        ProtocolError: the payload does not fit.
+    """
+    if len(payload) + 6 > size:
+        raise ProtocolError(f"{len(payload)} bytes do not fit the mailbox of {size} bytes")
+    header = struct.pack("<HHBB", len(payload), 0, 0, protocol | counter << 4)
+    return (header + payload).ljust(size, b"\0")
+
+
+def parse(data: bytes) -> Mail:
+    """Header and payload of a mailbox that was read.
+
+    Raises:
+        ProtocolError: the announced length does not fit the mailbox.
+    """
+    length = int.from_bytes(data[:2], "little")
+    if length > len(data) - 6:
+        raise ProtocolError(
+            f"the drive's mailbox announces {length} bytes, it has room for {len(data) - 6}"
+        )
+    return Mail(data[5] & 0x0F, data[6 : 6 + length])
+
+
+@dataclass
+class Mailbox:
+    """One slave's pair of mailboxes and what is remembered of it.
+
+    Counters run from 2 to 7: SOEM, which asks for the mapping by itself in ``config_map``,
+    begins with 1 after ``config_init``, and a slave drops a mail that repeats the last counter.
+    """
+
+    out_address: int
+    out_size: int
+    in_address: int
+    in_size: int
+    clock: Callable[[], float]
+    on_emergency: Callable[[bytes], None]
+    timeout_s: float = 1.0
+    counter: int = field(default=1, init=False)
+    repeat: int = field(default=0, init=False)
+    unsettled: bool = field(default=False, init=False)
+    """A request timed out: its answer may still come and must not answer the next one."""
+    repeats: int = field(default=0, init=False)
+
+    @property
+    def payload_size(self) -> int:
+        """Longest payload that may be sent."""
+        return self.out_size - 6
+
+    def request(
+        self,
+        protocol: int,
+        payload: bytes,
+        matches: Callable[[Mail], bool],
+        timeout_s: float | None = None,
+    ) -> Steps[bytes]:
+        """Send a mail and wait for the one that ``matches``; others are dropped.
+
+        Raises:
+            LinkLost: the station answers no frame at all.
+            LinkTimeout: the mailbox stays mute.
+            ProtocolError: the slave answers with a mailbox error.
+        """
+        deadline = self.clock() + (self.timeout_s if timeout_s is None else timeout_s)
+        self._next_counter()
+        mail = frame(protocol, self.counter, payload, self.out_size)
+        delivered = yield from self._send(mail, deadline)
+        return (yield from self._wait(mail, delivered, matches, deadline))
+
+    def post(self, protocol: int, payload: bytes) -> Steps[None]:
+        """Send a mail that nobody answers."""
+        self._next_counter()
+        mail = frame(protocol, self.counter, payload, self.out_size)
+        yield from self._send(mail, self.clock() + self.timeout_s)
+
+    def receive(self, matches: Callable[[Mail], bool], timeout_s: float) -> Steps[bytes]:
+        """Wait for one more mail, as within a file transfer."""
+        return (yield from self._wait(b"", True, matches, self.clock() + timeout_s))
+
+    def drain(self) -> Steps[None]:
+        """Read what lies in the mailbox: emergencies are reported, everything else dropped."""
+        for _ in range(32):
+            status = yield Read(SM1_STATUS, 1)
+            if status is None or not status[0] & _FULL:
+                return
+            mail = yield from self._fetch()
+            if mail is not None:
+                self._is_emergency(mail)
+
+    def _next_counter(self) -> None:
+        self.counter = self.counter + 1 if self.counter < 7 else 2
+
+    def _send(self, mail: bytes, deadline: float) -> Steps[bool]:
+        """True when the slave certainly has the mail; False when a lost frame leaves it open."""
+        dead = 0
+        while True:
+            if (yield Write(self.out_address, mail)) is not None:
+                return True
+            status = yield Read(SM0_STATUS, 1)
+            dead = dead + 1 if status is None else 0
+            if dead >= _DEAD_READS:
+                raise _lost()
+            if status is not None and not status[0] & _FULL:
+                return False
+            if self.clock() > deadline:
+                self.unsettled = True
+                raise LinkTimeout(
+                    "the drive does not empty its mailbox",
+                    remedy="switch the drive off and on; its communication processor hangs",
+                )
+            # Full: an earlier mail is still there. Its answer may be what blocks the slave.
+            yield from self.drain()
+            yield Pause(0.0005)
+
+    def _wait(
+        self, mail: bytes, delivered: bool, matches: Callable[[Mail], bool], deadline: float
+    ) -> Steps[bytes]:
+        resend_at = self.clock() + _RESEND_S
+        dead = 0
+        pause_s = 0.0
+        while True:
+            status = yield Read(SM1_STATUS, 1)
+            dead = dead + 1 if status is None else 0
+            if dead >= _DEAD_READS:
+                self.unsettled = True
+                raise _lost()
+            if status is not None and status[0] & _FULL:
+                answer = yield from self._fetch()
+                if answer is None or self._is_emergency(answer):
+                    continue
+                if answer.protocol == MAILBOX_ERROR:
+                    self._raise_error(answer.payload)
+                if matches(answer):
+                    return answer.payload
+                continue
+            now = self.clock()
+            if now > deadline:
+                self.unsettled = True
+                raise LinkTimeout(
+                    "the drive did not answer in time",
+                    remedy="read again; if it stays mute, switch the drive off and on",
+                )
+            if not delivered and now > resend_at:
+                # The same counter: a slave that did get the mail drops the copy.
+                delivered = (yield Write(self.out_address, mail)) is not None
+                resend_at = now + _RESEND_S
+            if pause_s:
+                yield Pause(pause_s)
+            pause_s = min(pause_s + 0.00002, 0.0005)
+
+    def _fetch(self) -> Steps[Mail | None]:
+        """Read the full mailbox, asking for a repeat when the frame with it was lost."""
+        for _ in range(4):
+            data = yield Read(self.in_address, self.in_size)
+            if data is not None:
+                return parse(data)
+            self.repeat ^= 0x02
+            self.repeats += 1
+            yield Write(SM1_ACTIVATE, bytes([0x01 | self.repeat]))
+            for _ in range(20):
+                acknowledged = yield Read(SM1_PDI, 1)
+                if acknowledged is not None and acknowledged[0] & 0x02 == self.repeat:
+                    break
+                yield Pause(0.0005)
+        return None
+
+    def _is_emergency(self, mail: Mail) -> bool:
+        """True for a CoE emergency (ETG.1000.6 clause 5.6.4), which is reported."""
+        if mail.protocol != COE or len(mail.payload) < 10:
+            return False
+        if int.from_bytes(mail.payload[:2], "little") >> 12 != 1:
+            return False
+        self.on_emergency(mail.payload[2:10])
+        return True
+
+    def _raise_error(self, payload: bytes) -> None:
+        code = int.from_bytes(payload[2:4], "little")
+        text = _ERRORS.get(code, f"mailbox error {code:#06x}")
+        raise ProtocolError(f"the drive refused the mail: {text}")
+
+
+def _lost() -> LinkLost:
+    return LinkLost(
+        "the station no longer answers",
+        remedy="check the drive's supply and the cable before it; it is taken up again by itself",
+    )

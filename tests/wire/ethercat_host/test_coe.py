@@ -1,0 +1,203 @@
+"""SDO bytes against ETG.1000.6 clause 5.6.2, and what unusual slaves send."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+
+from drivers.errors import LinkLost, LinkTimeout, ProtocolError, Rejected
+from drivers.ethercat import coe as sdo
+from tests.wire.ethercat_host.scripted import ScriptedSlave, coe
+
+
+def expedited(index: int, sub: int, data: bytes) -> bytes:
+    return coe(
+        3, struct.pack("<BHB", 0x43 | (4 - len(data)) << 2, index, sub) + data.ljust(4, b"\0")
+    )
+
+
+def test_expedited_upload_sends_and_takes_the_bytes_of_the_standard() -> None:
+    slave = ScriptedSlave(lambda _: [expedited(0x6041, 0, b"\x37\x02")])
+    assert slave.run(sdo.upload(slave.box(), 0x6041, 0)) == b"\x37\x02"
+    assert slave.requests == [bytes.fromhex("0020 40 4160 00 00000000")]
+
+
+def test_normal_upload_in_one_mail() -> None:
+    text = b"MMS7 servo drive"
+    slave = ScriptedSlave(
+        lambda _: [coe(3, struct.pack("<BHBI", 0x41, 0x1008, 0, len(text)) + text)]
+    )
+    assert slave.run(sdo.upload(slave.box(), 0x1008, 0)) == text
+
+
+def test_segmented_upload_alternates_the_toggle_bit() -> None:
+    whole = bytes(range(200))
+    parts = [whole[:100], whole[100:195], whole[195:]]
+
+    def react(request: bytes) -> list[bytes]:
+        if request[2] == 0x40:
+            return [coe(3, struct.pack("<BHBI", 0x41, 0x2000, 1, len(whole)) + parts[0])]
+        if request[2] == 0x60:
+            return [coe(3, b"\x00" + parts[1])]
+        assert request[2] == 0x70
+        # Five bytes: padded to seven, bits 1–3 say that two are unused, bit 0 ends it.
+        return [coe(3, bytes([0x10 | 2 << 1 | 1]) + parts[2] + b"\0\0")]
+
+    slave = ScriptedSlave(react)
+    assert slave.run(sdo.upload(slave.box(), 0x2000, 1)) == whole
+
+
+def test_a_slave_that_dies_between_segments_is_reported_and_does_not_hang() -> None:
+    slave: ScriptedSlave
+
+    def react(request: bytes) -> list[bytes]:
+        if request[2] == 0x40:
+            return [coe(3, struct.pack("<BHBI", 0x41, 0x2000, 1, 500) + bytes(100))]
+        slave.alive = False
+        return []
+
+    slave = ScriptedSlave(react)
+    with pytest.raises(LinkLost, match="no longer answers"):
+        slave.run(sdo.upload(slave.box(), 0x2000, 1))
+    assert slave.now < 0.1
+
+
+def test_more_segments_than_announced_end_the_transfer() -> None:
+    def react(request: bytes) -> list[bytes]:
+        if request[2] == 0x40:
+            return [coe(3, struct.pack("<BHBI", 0x41, 0x2000, 1, 10) + bytes(5))]
+        return [coe(3, bytes([request[2] & 0x10]) + bytes(90))] if request[2] != 0x80 else []
+
+    slave = ScriptedSlave(react)
+    with pytest.raises(ProtocolError, match="more than the 10 bytes"):
+        slave.run(sdo.upload(slave.box(), 0x2000, 1))
+    assert slave.requests[-1][2] == 0x80, "the slave is told"
+
+
+@pytest.mark.parametrize("service", [2, 3])
+@pytest.mark.parametrize("command", [0x80, 0x84, 0x90])
+def test_aborts_are_understood_whatever_service_and_low_bits(service: int, command: int) -> None:
+    body = struct.pack("<BHBI", command, 0x6060, 0, 0x06090030)
+    slave = ScriptedSlave(lambda _: [coe(service, body)])
+    with pytest.raises(Rejected, match="does not accept this value") as caught:
+        slave.run(sdo.download(slave.box(), 0x6060, 0, b"\x63"))
+    assert caught.value.code == 0x06090030
+    assert caught.value.parameter == "6060:00"
+
+
+def test_expedited_download_bytes() -> None:
+    slave = ScriptedSlave(lambda _: [coe(3, bytes.fromhex("60 6060 00 00000000"))])
+    slave.run(sdo.download(slave.box(), 0x6060, 0, b"\x08"))
+    assert slave.requests == [bytes.fromhex("0020 2f 6060 00 08000000")]
+
+
+def test_long_download_is_cut_to_the_mailbox() -> None:
+    data = bytes(range(256)) * 2
+
+    def react(request: bytes) -> list[bytes]:
+        if request[2] & 0xE0 == 0x20:
+            return [coe(3, struct.pack("<BHB4x", 0x60, 0x2000, 0))]
+        return [coe(3, bytes([0x20 | request[2] & 0x10]) + bytes(7))]
+
+    slave = ScriptedSlave(react)
+    slave.run(sdo.download(slave.box(), 0x2000, 0, data))
+    first, *segments = slave.requests
+    assert first[2] == 0x21
+    assert int.from_bytes(first[6:10], "little") == 512
+    assert len(first) == 128 - 6
+    assert first[10:] + b"".join(s[3:] for s in segments) == data
+    assert [s[2] & 0x10 for s in segments] == [0, 0x10, 0, 0x10][: len(segments)]
+    assert [s[2] & 1 for s in segments] == [0] * (len(segments) - 1) + [1]
+
+
+def test_a_late_answer_never_answers_the_next_question() -> None:
+    """Field lesson: after a time-out the old value came back for the next read of the object."""
+    slow = {"on": True}
+
+    def react(request: bytes) -> list[bytes]:
+        index = struct.unpack_from("<H", request, 3)[0]
+        if index == 0x6064 and slow["on"]:
+            slow["on"] = False
+            slave.queue(expedited(0x6064, 0, b"\xde\xad\xde\xad"), delay_s=0.3)
+            return []
+        return [expedited(index, request[5], b"\x01\0\0\0")]
+
+    slave = ScriptedSlave(react)
+    box = slave.box(timeout_s=0.1)
+    with pytest.raises(LinkTimeout):
+        slave.run(sdo.upload(box, 0x6064, 0))
+    slave.now += 0.25
+    assert slave.run(sdo.upload(box, 0x6064, 0)) == b"\x01\0\0\0"
+
+
+def test_a_mute_mailbox_times_out_in_its_time() -> None:
+    slave = ScriptedSlave(lambda _: [])
+    with pytest.raises(LinkTimeout, match="did not answer in time"):
+        slave.run(sdo.upload(slave.box(timeout_s=0.2), 0x6041, 0))
+    assert 0.2 <= slave.now < 0.22
+
+
+def test_an_emergency_within_a_transfer_is_reported_once() -> None:
+    emergency = bytes.fromhex("1084 20 0102030405")
+
+    slave = ScriptedSlave(lambda _: [coe(1, emergency), expedited(0x6041, 0, b"\x08\0")])
+    assert slave.run(sdo.upload(slave.box(), 0x6041, 0)) == b"\x08\0"
+    assert slave.emergencies == [emergency]
+
+
+@pytest.mark.parametrize("lost", [0, 2])
+def test_a_lost_frame_costs_no_answer(lost: int) -> None:
+    """Frame 0 writes the mailbox, frame 2 reads the answer: each once lost on the way back."""
+    slave = ScriptedSlave(lambda _: [expedited(0x6041, 0, b"\x37\x02")], lose={lost})
+    assert slave.run(sdo.upload(slave.box(), 0x6041, 0)) == b"\x37\x02"
+    assert len(slave.requests) == 1, "the slave executed it once"
+
+
+def test_counters_run_from_2_to_7_and_never_repeat() -> None:
+    slave = ScriptedSlave(lambda _: [expedited(0x6041, 0, b"\0\0")])
+    box = slave.box()
+    for _ in range(8):
+        slave.run(sdo.upload(box, 0x6041, 0))
+    assert slave.counters == [2, 3, 4, 5, 6, 7, 2, 3]
+
+
+def test_mailbox_errors_come_in_words() -> None:
+    slave = ScriptedSlave(lambda _: [])
+    slave.queue(struct.pack("<HH", 1, 2), protocol=0)
+    with pytest.raises(ProtocolError, match="protocol is not supported"):
+        slave.run(sdo.upload(slave.box(), 0x6041, 0))
+
+
+def test_complete_access_with_and_without_the_pad_byte() -> None:
+    entries = [b"\x11", b"\x22\x33", b"\x44\x55\x66\x77"]
+    body = b"".join(entries)
+    assert sdo.split_complete(b"\x03\x00" + body, [1, 2, 4]) == entries
+    assert sdo.split_complete(b"\x03" + body, [1, 2, 4]) == entries
+    assert sdo.split_complete(b"\x03\x00" + body + b"\0", [1, 2, 4]) is None, "unknown layout"
+    assert sdo.split_complete(b"\x04\x00" + body, [1, 2, 4]) is None, "an entry we do not know"
+
+
+def test_information_service() -> None:
+    def react(request: bytes) -> list[bytes]:
+        if request[2] == 1:
+            first = coe(8, bytes.fromhex("82 00 0100 0100 0010 0810"))
+            return [first, coe(8, bytes.fromhex("02 00 0000 4160 4060"))]
+        if request[2] == 3:
+            return [coe(8, bytes.fromhex("04 00 0000 4160 0600 00 07") + b"Statusword")]
+        return [coe(8, bytes.fromhex("06 00 0000 4160 00 00 0600 1000 8700") + b"Statusword")]
+
+    slave = ScriptedSlave(react)
+    box = slave.box()
+    assert slave.run(sdo.list_objects(box)) == [0x1000, 0x1008, 0x6040, 0x6041]
+    found = slave.run(sdo.describe_object(box, 0x6041))
+    assert (found.name, found.data_type, found.object_code) == ("Statusword", 6, 7)
+    entry = slave.run(sdo.describe_entry(box, 0x6041, 0))
+    assert (entry.bit_length, entry.access, entry.name) == (16, 0x87, "Statusword")
+    assert slave.requests[0] == bytes.fromhex("0080 01 00 0000 0100")
+
+
+def test_information_service_abort() -> None:
+    slave = ScriptedSlave(lambda _: [coe(8, bytes.fromhex("07 00 0000 00000206"))])
+    with pytest.raises(Rejected, match="no such object"):
+        slave.run(sdo.describe_object(slave.box(), 0x7777))
