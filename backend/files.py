@@ -1,0 +1,68 @@
+"""Files that are whole or absent: written beside, flushed, then renamed into place."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from pathlib import Path
+
+from drivers.errors import NotAllowed
+
+_NAME = re.compile(r"^\w[\w .\-]{0,100}$")
+
+
+class StorageFailed(NotAllowed):
+    """A file could not be written; what was there before is unharmed."""
+
+    kind = "storage-failed"
+
+
+def checked_name(name: str, suffix: str) -> str:
+    """A plain file name with ``suffix``; no folders, no leading dot.
+
+    Raises:
+        NotAllowed: anything else.
+    """
+    stem = name.removesuffix(suffix)
+    if not _NAME.match(stem) or ".." in stem:
+        raise NotAllowed(
+            f"{name!r} is not a file name",
+            value=name,
+            limit="letters, digits, spaces, . - _, at most 100",
+            remedy="choose a plain name without folders",
+        )
+    return stem + suffix
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Replace ``path`` by ``data``, or leave it as it was.
+
+    Raises:
+        StorageFailed: disk full, no permission; the old file stays.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle = tempfile.NamedTemporaryFile(  # noqa: SIM115 - renamed, not deleted, at the end
+            dir=path.parent, prefix=f".{path.name}.", delete=False
+        )
+    except OSError as error:
+        raise _failed(path, error) from error
+    temporary = Path(handle.name)
+    try:
+        with handle:
+            handle.write(data)
+            handle.flush()
+            os.fsync(handle.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise _failed(path, error) from error
+
+
+def _failed(path: Path, error: OSError) -> StorageFailed:
+    return StorageFailed(
+        f"{path.name} could not be written: {error.strerror or error}",
+        value=str(path),
+        remedy="free some space or choose another folder; the old file is unharmed",
+    )

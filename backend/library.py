@@ -1,0 +1,79 @@
+"""The folder of parameter sets: list, read, store, delete."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from backend import parameter_set
+from backend.files import checked_name, write_atomically
+from backend.parameter_set import SUFFIX, BadSet, ParameterSet
+from drivers.errors import NotAllowed
+
+
+class SetLibrary:
+    """Parameter-set files of one folder. Names are plain file names ending in ``.sdset``."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def _path(self, name: str) -> Path:
+        return self.folder / checked_name(name, SUFFIX)
+
+    def names(self) -> list[str]:
+        """File names, newest first."""
+        found = sorted(self.folder.glob(f"*{SUFFIX}"), key=lambda p: -p.stat().st_mtime)
+        return [path.name for path in found if not path.name.startswith(".")]
+
+    def read(self, name: str) -> bytes:
+        """Contents of a file.
+
+        Raises:
+            NotAllowed: there is none of this name.
+        """
+        path = self._path(name)
+        try:
+            return path.read_bytes()
+        except FileNotFoundError as error:
+            raise NotAllowed(
+                f"there is no parameter set {path.name}",
+                value=path.name,
+                remedy="choose one from the Files page",
+            ) from error
+
+    def load(self, name: str) -> ParameterSet:
+        """Read and parse.
+
+        Raises:
+            NotAllowed: no such file. BadSet: not usable.
+        """
+        return parameter_set.parse(self.read(name), self._path(name).name)
+
+    def store(self, name: str, data: bytes, *, overwrite: bool = False) -> str:
+        """Check and write a file; returns its name.
+
+        Raises:
+            BadSet: the contents are no parameter set; nothing is written.
+            NotAllowed: the name exists and ``overwrite`` is False. StorageFailed: disk.
+        """
+        path = self._path(name)
+        parameter_set.parse(data, path.name)
+        if path.exists() and not overwrite:
+            raise NotAllowed(
+                f"{path.name} exists already",
+                value=path.name,
+                remedy="choose another name, or allow overwriting",
+            )
+        write_atomically(path, data)
+        return path.name
+
+    def delete(self, name: str) -> None:
+        """Delete a file.
+
+        Raises:
+            NotAllowed: there is none of this name.
+        """
+        self.read(name)
+        self._path(name).unlink()
+
+
+__all__ = ["BadSet", "SetLibrary"]

@@ -1,0 +1,260 @@
+"""Parameter sets as files: an open, readable, versioned text format (TOML).
+
+The format is described in docs/parameter-sets.md. A file ends with an ``[end]`` table, so that
+a truncated one is noticed even when the cut falls between two rows. A bad row spoils only
+itself; a file that is damaged as a whole is refused.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any, Literal
+
+from backend.drive import Drive, Reading
+from drivers.errors import DriveError, NotAllowed
+from profiles.schema import Parameter, Profile, Raw
+
+FORMAT = "servodeck parameter set"
+VERSION = 1
+SUFFIX = ".sdset"
+MAX_BYTES = 4_000_000
+
+Status = Literal["differs", "same", "not_in_drive", "not_in_file", "invalid", "read_only"]
+
+
+class BadSet(NotAllowed):
+    """A file that cannot be used as a parameter set, and why."""
+
+    kind = "bad-parameter-set"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One parameter of a file. ``raw`` is None where the row is bad, with ``problem`` set."""
+
+    key: str
+    raw: Raw | None
+    name: str = ""
+    unit: str = ""
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSet:
+    """Contents of a file."""
+
+    profile: str
+    drive_name: str
+    serial: int | None
+    firmware: str
+    author: str
+    saved: datetime | None
+    notes: str
+    rows: tuple[Row, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One row of a comparison; raw values, None where absent."""
+
+    parameter: Parameter | None
+    key: str
+    theirs: Raw | None
+    ours: Raw | None
+    status: Status
+    problem: str = ""
+    selected: bool = False
+
+
+def storable(profile: Profile, *, motor_individual: bool) -> list[Parameter]:
+    """Parameters that belong into a set: readable and writable settings.
+
+    Left out: commands and set-points, the communication area 1000h–1FFFh (its mapping objects
+    depend on the master), and what belongs to one motor unless asked for.
+    """
+    commands = {
+        step.key for proc in profile.procedures for step in proc.steps if step.do == "write"
+    }
+    roles = {
+        "control_word", "mode", "position_target", "position_offset", "velocity_target",
+        "velocity_offset", "torque_target", "torque_offset",
+    }  # fmt: skip
+    commands |= {signal.key for signal in profile.signals if signal.role in roles}
+    return [
+        p
+        for p in profile.parameters
+        if p.access == "rw"
+        and p.key not in commands
+        and not (p.index is not None and p.index < 0x2000)
+        and (motor_individual or not p.motor_individual)
+    ]
+
+
+def dump(
+    drive: Drive, readings: Iterable[Reading], *, author: str, notes: str, saved: datetime
+) -> bytes:
+    """The file of these readings; those that failed are left out and named in a comment."""
+    profile, found = drive.profile, drive.found
+    lines = [
+        f"# {FORMAT}; see docs/parameter-sets.md. Values are written from `raw`;",
+        "# `value`, `unit` and `name` are for people.",
+        f"format = {_text(FORMAT)}",
+        f"version = {VERSION}",
+        "",
+        "[identity]",
+        f"profile = {_text(profile.drive)}",
+        f"title = {_text(profile.title)}",
+        f"drive = {_text(drive.name)}",
+        f"firmware = {_text(found.firmware if found else '')}",
+    ]
+    if found is not None:
+        for field in ("vendor_id", "product_code", "revision", "serial"):
+            value = getattr(found, field)
+            if value is not None:
+                lines.append(f"{field} = {value}")
+    lines += [
+        "",
+        "[about]",
+        f"saved = {saved.astimezone(UTC).isoformat(timespec='seconds').replace('+00:00', 'Z')}",
+        f"author = {_text(author)}",
+        f"notes = {_text(notes)}",
+    ]
+    count = 0
+    group = None
+    for reading in readings:
+        parameter = drive.parameter(reading.key)
+        if reading.raw is None:
+            lines.append(f"# {reading.key} {parameter.name}: not read: {_comment(reading.error)}")
+            continue
+        if parameter.group != group:
+            group = parameter.group
+            lines += ["", f"# --- {_comment(group)}"]
+        lines += ["[[parameter]]", f"key = {_text(parameter.key)}", f"raw = {_raw(reading.raw)}"]
+        if parameter.unit:
+            lines += [f"value = {_raw(reading.value)}", f"unit = {_text(parameter.unit)}"]
+        lines.append(f"name = {_text(parameter.name)}")
+        count += 1
+    lines += ["", "[end]", f"parameters = {count}", ""]
+    return "\n".join(lines).encode()
+
+
+def parse(data: bytes, name: str = "the file") -> ParameterSet:
+    """Read a file.
+
+    Raises:
+        BadSet: not such a file, of a newer version, damaged or truncated.
+    """
+    if len(data) > MAX_BYTES:
+        raise BadSet(f"{name} is larger than {MAX_BYTES} bytes", remedy="choose another file")
+    try:
+        content = tomllib.loads(data.decode("utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise BadSet(
+            f"{name} is damaged or no parameter set: {error}",
+            remedy="use an undamaged copy",
+        ) from error
+    if content.get("format") != FORMAT:
+        raise BadSet(f"{name} is no parameter set of servodeck", remedy="choose a .sdset file")
+    version = content.get("version")
+    if version != VERSION:
+        raise BadSet(
+            f"{name} has format version {version!r}; this program reads version {VERSION}",
+            remedy="open it with the program version that wrote it",
+        )
+    if "end" not in content:
+        raise BadSet(f"{name} is truncated: its [end] is missing", remedy="use an undamaged copy")
+    identity, about = _table(content, "identity", name), _table(content, "about", name)
+    rows = content.get("parameter", [])
+    if not isinstance(rows, list):
+        raise BadSet(f"{name}: [[parameter]] rows are missing", remedy="use an undamaged copy")
+    serial = identity.get("serial")
+    saved = about.get("saved")
+    return ParameterSet(
+        profile=str(identity.get("profile", "")),
+        drive_name=str(identity.get("drive", "")),
+        serial=serial if isinstance(serial, int) else None,
+        firmware=str(identity.get("firmware", "")),
+        author=str(about.get("author", "")),
+        saved=saved if isinstance(saved, datetime) else None,
+        notes=str(about.get("notes", "")),
+        rows=tuple(_row(row, number) for number, row in enumerate(rows, 1)),
+    )
+
+
+def _table(content: dict[str, Any], field: str, name: str) -> dict[str, Any]:
+    table = content.get(field)
+    if not isinstance(table, dict):
+        raise BadSet(f"{name}: its [{field}] is missing", remedy="use an undamaged copy")
+    return table
+
+
+def _row(row: object, number: int) -> Row:
+    if not isinstance(row, dict) or not isinstance(row.get("key"), str):
+        return Row(f"row {number}", None, problem=f"row {number} has no key")
+    raw = row.get("raw")
+    name, unit = str(row.get("name", "")), str(row.get("unit", ""))
+    if isinstance(raw, bool) or not isinstance(raw, (int, float, str)):
+        return Row(row["key"], None, name, unit, f"row {number}: raw {raw!r} is not a value")
+    return Row(row["key"], raw, name, unit)
+
+
+def compare(drive: Drive, rows: Iterable[Row], ours: dict[str, Reading]) -> list[Difference]:
+    """Rows of a file (or of another drive, or defaults) against readings of this drive."""
+    result: list[Difference] = []
+    seen: set[str] = set()
+    for row in rows:
+        parameter = drive.profile.by_key.get(row.key)
+        if row.key in seen:
+            result.append(Difference(parameter, row.key, row.raw, None, "invalid", "given twice"))
+            continue
+        seen.add(row.key)
+        result.append(_difference(drive, parameter, row, ours.get(row.key)))
+    for key, reading in ours.items():
+        if key not in seen and reading.raw is not None:
+            parameter = drive.profile.by_key[key]
+            result.append(Difference(parameter, key, None, reading.raw, "not_in_file"))
+    return result
+
+
+def _difference(
+    drive: Drive, parameter: Parameter | None, row: Row, ours: Reading | None
+) -> Difference:
+    now = ours.raw if ours else None
+    if parameter is None:
+        text = f"{drive.profile.title} has no parameter {row.key}"
+        return Difference(None, row.key, row.raw, None, "not_in_drive", row.problem or text)
+    if row.raw is None:
+        return Difference(parameter, row.key, None, now, "invalid", row.problem)
+    if (why := drive.unreachable_why(parameter)) or (ours is not None and ours.error):
+        problem = why or (ours.error if ours else "")
+        return Difference(parameter, row.key, row.raw, None, "not_in_drive", problem)
+    if parameter.access == "ro":
+        return Difference(parameter, row.key, row.raw, now, "read_only")
+    try:
+        drive.check(parameter, row.raw)
+    except DriveError as error:
+        return Difference(parameter, row.key, row.raw, now, "invalid", error.message)
+    if row.raw == now:
+        return Difference(parameter, row.key, row.raw, now, "same")
+    return Difference(
+        parameter, row.key, row.raw, now, "differs", selected=not parameter.motor_individual
+    )
+
+
+def _text(value: str) -> str:
+    # A JSON string without surrogates is a TOML basic string; DEL is the one exception.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
+
+
+def _comment(value: str) -> str:
+    return " ".join(value.split())
+
+
+def _raw(value: Raw | None) -> str:
+    if isinstance(value, str):
+        return _text(value)
+    return repr(value) if value is not None else _text("")
