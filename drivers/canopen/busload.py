@@ -1,0 +1,50 @@
+"""How full a SYNC cycle makes the bus. Pure.
+
+The load is worst case (most stuff bits), so that what is accepted here also works with the
+worst data. Above `LIMIT` nothing is left for SDO, heartbeats and repeated frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drivers.canopen.frames import worst_case_bits
+from drivers.errors import NotAllowed
+
+LIMIT = 0.80
+
+
+@dataclass(frozen=True, slots=True)
+class BusLoad:
+    """``fraction`` of the bit rate used by one cycle's frames."""
+
+    fraction: float
+    bits_per_cycle: int
+    shortest_cycle_s: float
+    """The shortest cycle with which these frames stay within the limit."""
+
+
+def bus_load(pdo_bytes: Sequence[int], cycle_s: float, bitrate: int) -> BusLoad:
+    """Load of one SYNC (without counter) and PDOs of these lengths in bytes, every ``cycle_s``."""
+    bits = worst_case_bits(0) + sum(worst_case_bits(length) for length in pdo_bytes)
+    return BusLoad(bits / (cycle_s * bitrate), bits, bits / (LIMIT * bitrate))
+
+
+def require_room(pdo_bytes: Sequence[int], cycle_s: float, bitrate: int) -> BusLoad:
+    """The load, if the bus can carry it.
+
+    Raises:
+        NotAllowed: above 80 %; the message names the shortest cycle that would do.
+    """
+    load = bus_load(pdo_bytes, cycle_s, bitrate)
+    if load.fraction > LIMIT:
+        raise NotAllowed(
+            f"{len(pdo_bytes)} PDOs every {cycle_s * 1e3:g} ms would load the bus at "
+            f"{bitrate / 1e3:g} kbit/s with {load.fraction:.0%}",
+            value=round(load.fraction, 3),
+            limit=f"{LIMIT:.0%}",
+            remedy=f"use a cycle of {load.shortest_cycle_s * 1e3:.2f} ms or longer, fewer signals, "
+            "or a higher bit rate",
+        )
+    return load

@@ -1,0 +1,240 @@
+"""One node's SDO channel: one transfer at a time, and never a late answer for a new one.
+
+An SDO answer carries the object it belongs to but no number of the request. After a time-out
+the answer may therefore still come and would fit the next read of the same object. So the
+channel remembers that something is unanswered, and before the next transfer asks for an object
+that is *not* among the unanswered ones. A server works in order: once that answer is there,
+everything older has come and is thrown away.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from queue import Empty, SimpleQueue
+from typing import NoReturn, TypeVar
+
+from drivers.canopen import sdo
+from drivers.errors import DriveError, LinkTimeout, Rejected
+
+T = TypeVar("T")
+
+Send = Callable[[bytes], None]
+"""Put one request frame on the bus; raises LinkLost."""
+
+_SILENT_REMEDY = (
+    "check that the drive is powered, its number and the bit rate, the wiring and the "
+    "termination (120 Ω at both ends)"
+)
+
+_PROBE = b"\x40\x00\x10\x00" + bytes(4)
+"""Read 1000h, which every CANopen device has (CiA 301 clause 7.5.2.1)."""
+
+_BLOCK_ABOVE = 127 * 7
+"""Bytes of one full block: below, segments take hardly longer."""
+
+_BARRIERS = ((0x1000, 0), (0x1001, 0), (0x1018, 1), (0x1018, 2), (0x1018, 3), (0x1018, 4))
+
+
+class _BlockUnanswered(LinkTimeout):
+    """A node without block transfer that ignores the request instead of refusing it."""
+
+
+class SdoChannel:
+    """Runs transfers with one node. `run` may be called from any thread; it waits its turn.
+
+    Counters are plain integers, written by one thread at a time and read by anybody.
+    """
+
+    def __init__(self, node: int, send: Send, clock: Callable[[], float] = time.monotonic) -> None:
+        self.node = node
+        self.transactions = 0
+        self.timeouts = 0
+        self.late_answers = 0
+        self.strays = 0
+        """Answers that nobody asked for and no time-out explains: a second node or master."""
+        self.round_trip_s: float | None = None
+        self.no_block_transfer = False
+        self._send = send
+        self._clock = clock
+        self._answers: SimpleQueue[bytes | DriveError] = SimpleQueue()
+        self._turn = threading.Lock()
+        self._unanswered: set[bytes] = set()
+        self._tag = 0
+
+    def deliver(self, frame: bytes) -> None:
+        """An answer frame of this node came (called by the receiving thread)."""
+        self._answers.put(frame)
+
+    def fail(self, error: DriveError) -> None:
+        """The bus is gone: end a waiting transfer at once (called by the receiving thread)."""
+        self._answers.put(error)
+
+    def run(self, transfer: sdo.Transfer[T], timeout_s: float) -> T:
+        """Run one transfer to its end.
+
+        Raises:
+            LinkTimeout: no answer within ``timeout_s`` of a request; the server was sent an abort.
+            LinkLost: the bus went down meanwhile.
+            Rejected, ProtocolError: see `drivers.canopen.sdo`.
+        """
+        with self._turn:
+            if self._unanswered:
+                self._wait_out_late_answers(timeout_s)
+            self._discard_strays()
+            self.transactions += 1
+            return self._converse(transfer, timeout_s)
+
+    def _converse(self, transfer: sdo.Transfer[T], timeout_s: float) -> T:
+        # A transfer keeps the object of its first exchange: segments do not repeat it.
+        mux = b"\0\0\0"
+        try:
+            exchange = next(transfer)
+            while True:
+                mux = exchange.mux or mux
+                started = self._clock()
+                for frame in exchange.send:
+                    self._send(frame)
+                if not exchange.answered:
+                    exchange = transfer.send(b"")
+                    continue
+                answer = self._await(exchange, started + timeout_s)
+                if answer is None:
+                    self._time_out(exchange, mux, timeout_s)
+                self.round_trip_s = self._clock() - started
+                exchange = transfer.send(answer)
+        except StopIteration as ended:
+            result: T = ended.value
+            return result
+        finally:
+            transfer.close()
+
+    def _await(self, exchange: sdo.Exchange, deadline: float) -> bytes | None:
+        while True:
+            try:
+                answer = self._answers.get(timeout=max(deadline - self._clock(), 0.0))
+            except Empty:
+                return None
+            if isinstance(answer, DriveError):
+                raise answer
+            if sdo.answers(answer, exchange):
+                return answer
+            self.strays += 1
+
+    def _time_out(self, exchange: sdo.Exchange, mux: bytes, timeout_s: float) -> NoReturn:
+        self.timeouts += 1
+        opens_block = bool(exchange.send) and exchange.send[0][0] in sdo.BLOCK_REQUESTS
+        self._unanswered.add(mux)
+        self._send(sdo.abort_frame(mux, sdo.ABORT_TIMED_OUT))
+        index, subindex = int.from_bytes(mux[:2], "little"), mux[2]
+        raise (_BlockUnanswered if opens_block else LinkTimeout)(
+            f"node {self.node} did not answer about {index:04X}:{subindex:02X} "
+            f"within {timeout_s:g} s",
+            parameter=f"{index:04X}:{subindex:02X}",
+            limit=f"{timeout_s:g} s",
+            remedy=_SILENT_REMEDY,
+        )
+
+    def _wait_out_late_answers(self, timeout_s: float) -> None:
+        """Ask for another object until *its* answer is there; see the module's docstring."""
+        index, subindex = self._next_barrier()
+        mux = sdo.multiplexer(index, subindex)
+        exchange = sdo.Exchange((b"\x40" + mux + bytes(4),), mux)
+        self._send(exchange.send[0])
+        deadline = self._clock() + timeout_s
+        while True:
+            try:
+                answer = self._answers.get(timeout=max(deadline - self._clock(), 0.0))
+            except Empty:
+                self._unanswered.add(mux)
+                self._still_silent(mux, timeout_s)
+            if isinstance(answer, DriveError):
+                raise answer
+            # An abort without an object could belong to what timed out: only the full one counts.
+            if len(answer) == 8 and answer[1:4] == mux and answer[0] & 0xE0 in (0x40, 0x80):
+                break
+            self.late_answers += 1
+        self._unanswered.clear()
+        if answer[0] & 0xE0 == 0x40 and not answer[0] & 0x02:
+            # A segmented answer would stay open.
+            self._send(sdo.abort_frame(mux, 0x08000000))
+
+    def _still_silent(self, mux: bytes, timeout_s: float) -> NoReturn:
+        self.timeouts += 1
+        self._send(sdo.abort_frame(mux, sdo.ABORT_TIMED_OUT))
+        raise LinkTimeout(
+            f"node {self.node} has not answered since an earlier time-out; nothing was asked",
+            limit=f"{timeout_s:g} s",
+            remedy=_SILENT_REMEDY,
+        )
+
+    def _next_barrier(self) -> tuple[int, int]:
+        for index, subindex in self._candidates():
+            if sdo.multiplexer(index, subindex) not in self._unanswered:
+                return index, subindex
+        raise AssertionError("256 time-outs in a row use distinct subindices")
+
+    def _candidates(self) -> Iterator[tuple[int, int]]:
+        yield from _BARRIERS
+        # The refusal of a subindex that does not exist names it too, so it serves as a mark.
+        for _ in range(255):
+            self._tag = self._tag % 255 + 1
+            yield 0x1000, self._tag
+
+    def _discard_strays(self) -> None:
+        while True:
+            try:
+                answer = self._answers.get_nowait()
+            except Empty:
+                return
+            if not isinstance(answer, DriveError):
+                self.strays += 1
+
+    def read(self, index: int, subindex: int, timeout_s: float) -> bytes:
+        """Read an object; long ones by block transfer where the node offers it."""
+        if not self.no_block_transfer:
+            try:
+                return self.run(sdo.upload(index, subindex, _BLOCK_ABOVE), timeout_s)
+            except _BlockUnanswered:
+                self.no_block_transfer = True
+        return self.run(sdo.upload(index, subindex), timeout_s)
+
+    def write(self, index: int, subindex: int, data: bytes, timeout_s: float) -> None:
+        """Write an object; long ones by block transfer where the node offers it."""
+        if len(data) > _BLOCK_ABOVE and not self.no_block_transfer:
+            # Both refusals come before any data went, so segments afterwards do not write twice.
+            try:
+                return self.run(sdo.block_download(index, subindex, data), timeout_s)
+            except _BlockUnanswered:
+                self.no_block_transfer = True
+            except Rejected as refusal:
+                if refusal.code != sdo.ABORT_COMMAND:
+                    raise
+                self.no_block_transfer = True
+        return self.run(sdo.download(index, subindex, data), timeout_s)
+
+    def begin_probe(self) -> None:
+        """Take the node's turn and ask for its device type; `end_probe` must follow."""
+        self._turn.acquire()
+        self._discard_strays()
+        try:
+            self._send(_PROBE)
+        except DriveError:
+            self._turn.release()
+            raise
+
+    def end_probe(self) -> list[bytes]:
+        """All answers to the probe; more than one means more than one node. Gives the turn back."""
+        answers: list[bytes] = []
+        try:
+            while True:
+                answer = self._answers.get_nowait()
+                if not isinstance(answer, DriveError) and answer[1:4] == _PROBE[1:4]:
+                    answers.append(answer)
+        except Empty:
+            if not answers:
+                self._unanswered.add(_PROBE[1:4])
+            return answers
+        finally:
+            self._turn.release()

@@ -1,0 +1,46 @@
+"""CAN frames of CANopen: identifiers and wire time. Pure.
+
+Sources: CiA 301 v4.2.0 clause 7.3.3 (pre-defined connection set), ISO 11898-1 for the bit count.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+NMT = 0x000
+SYNC = 0x080
+EMERGENCY = 0x080
+SDO_ANSWER = 0x580
+SDO_REQUEST = 0x600
+HEARTBEAT = 0x700
+TPDO = (0x180, 0x280, 0x380, 0x480)
+RPDO = (0x200, 0x300, 0x400, 0x500)
+
+NMT_START, NMT_STOP, NMT_PREOPERATIONAL, NMT_RESET_NODE, NMT_RESET_COMMUNICATION = (
+    0x01, 0x02, 0x80, 0x81, 0x82,
+)  # fmt: skip
+
+NMT_STATES = {0: "boot-up", 4: "stopped", 5: "operational", 127: "pre-operational"}
+
+
+class Frame(NamedTuple):
+    """One CAN data or remote frame with an 11-bit identifier."""
+
+    cob_id: int
+    data: bytes = b""
+    remote: bool = False
+
+
+def worst_case_bits(data_bytes: int) -> int:
+    """Bits that a base frame occupies with the most stuff bits possible.
+
+    34 + 8n bits are subject to stuffing (one more after every four at worst); 10 more (CRC
+    delimiter, acknowledge, end of frame) and the 3 bits of interframe space are not.
+    """
+    stuffable = 34 + 8 * data_bytes
+    return stuffable + (stuffable - 1) // 4 + 13
+
+
+def wire_time_s(data_bytes: int, bitrate: int) -> float:
+    """Longest time a frame occupies a bus of ``bitrate`` bit/s, in seconds."""
+    return worst_case_bits(data_bytes) / bitrate

@@ -1,0 +1,359 @@
+"""CANopen as a `drivers.link.Link` on any adapter that python-can knows.
+
+Own SDO transfers instead of ``canopen.SdoClient``: that one has no lock and takes a late answer
+for the same object as the new one. See `drivers.canopen.channel` for how this is excluded here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from typing import TypeVar
+
+import can
+
+from drivers.canopen.adapter import open_bus
+from drivers.canopen.channel import SdoChannel
+from drivers.canopen.cyclic import CanopenCyclic
+from drivers.canopen.frames import HEARTBEAT, NMT, SDO_ANSWER, SDO_REQUEST, Frame
+from drivers.canopen.nodes import NodeWatch
+from drivers.canopen.port import CanPort
+from drivers.canopen.scanning import identify, probe
+from drivers.canopen.url import CanUrl, parse_canopen_url
+from drivers.codec import size_of
+from drivers.errors import DriveError, LinkLost, NotAllowed
+from drivers.link import (
+    Address,
+    Cyclic,
+    Found,
+    LinkEvent,
+    LinkQuality,
+    Progress,
+    Unsubscribe,
+)
+from profiles.schema import LinkKind
+
+T = TypeVar("T")
+
+_WRITE_TIMEOUT_S = 1.0
+_STORE_TIMEOUT_S = 10.0
+_STORE_INDICES = (0x1010, 0x1011)
+_WORKERS = 8
+
+
+class CanopenLink:
+    """One CAN bus with CANopen nodes; stations are node numbers 1 to 127.
+
+    One transfer at a time per node; different nodes do not wait for each other.
+    """
+
+    kind: LinkKind = "canopen"
+
+    def __init__(
+        self,
+        url: str | CanUrl,
+        opener: Callable[[CanUrl], can.BusABC] = open_bus,
+    ) -> None:
+        self._settings = parse_canopen_url(url) if isinstance(url, str) else url
+        self.url = self._settings.url
+        self._watch = NodeWatch()
+        self._watch_lock = threading.Lock()
+        self._channels = {
+            node: SdoChannel(node, self._request_sender(node)) for node in range(1, 128)
+        }
+        self._turns = {node: asyncio.Lock() for node in range(1, 128)}
+        self._port = CanPort(self._settings, self._frame, self._event, self._idle, opener)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._workers: ThreadPoolExecutor | None = None
+        self._listeners: list[Callable[[LinkEvent], None]] = []
+        self._strays_told = dict.fromkeys(range(1, 128), 0)
+        self._cyclic = CanopenCyclic(
+            self._port, self._settings, self._sdo_read, self._sdo_write, self._in_worker
+        )
+        self._cyclic.tell_events_to(self._announce)
+        self.cyclic: Cyclic | None = self._cyclic
+
+    async def open(self) -> None:
+        """Open the adapter. Raises LinkLost with the reason and a remedy."""
+        if self._workers is not None:
+            return
+        self._loop = asyncio.get_running_loop()
+        workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="canopen")
+        try:
+            await self._loop.run_in_executor(workers, self._port.open)
+        except DriveError:
+            workers.shutdown(wait=False)
+            raise
+        self._workers = workers
+
+    async def close(self) -> None:
+        """Stop cyclic data, close the adapter and the threads. Calling again does nothing."""
+        workers, self._workers = self._workers, None
+        if workers is None:
+            return
+        self._workers = workers
+        try:
+            await self._cyclic.shut_down()
+        finally:
+            self._workers = None
+            await asyncio.get_running_loop().run_in_executor(None, self._port.close)
+            workers.shutdown(wait=True)
+
+    async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
+        """Ask every node number for its device type, then who answers for its identity.
+
+        Numbers that two nodes answer for, and nodes that send heartbeats but answer nothing, are
+        in the result with a note.
+        """
+        numbers = sorted(set(stations if stations is not None else range(1, 128)))
+        found: list[Found] = []
+        for start in range(0, len(numbers), 16):
+            group = numbers[start : start + 16]
+            progress(0.8 * start / len(numbers), f"asking nodes {group[0]} to {group[-1]}")
+            answers = await self._in_worker(partial(probe, [self._channel(n) for n in group]))
+            for node, got in answers.items():
+                progress(0.8 * start / len(numbers), f"node {node} answered")
+                found.append(await self._identify(node, got))
+        heard = {f.station for f in found}
+        with self._watch_lock:
+            silent = [r for r in self._watch.nodes.values() if r.last_heartbeat_s is not None]
+        found += [
+            Found(
+                station=record.node,
+                state=record.state_text,
+                notes=("sends heartbeats but does not answer SDO requests",),
+            )
+            for record in silent
+            if record.node in numbers and record.node not in heard
+        ]
+        progress(1.0, f"{len(found)} nodes found")
+        return sorted(found, key=lambda f: f.station)
+
+    async def _identify(self, node: int, answers: list[bytes]) -> Found:
+        found = await self._run(
+            node, lambda: identify(self._channel(node), answers, self._settings.timeout_s)
+        )
+        with self._watch_lock:
+            record = self._watch.record(node)
+            if len(answers) > 1:
+                record.conflict = "two nodes have this number"
+            state = record.state_text
+        return replace(found, state=state)
+
+    async def read(self, station: int, address: Address) -> bytes:
+        """Read one object. See `Link.read` for what comes back."""
+        return await self._run(station, lambda: self._read_now(station, address))
+
+    async def read_many(
+        self, station: int, addresses: Sequence[Address]
+    ) -> list[bytes | DriveError]:
+        """Read several one after the other; a time-out or loss ends the batch for the rest too."""
+        cancelled = threading.Event()
+
+        def batch() -> list[bytes | DriveError]:
+            results: list[bytes | DriveError] = []
+            for address in addresses:
+                if cancelled.is_set():
+                    break
+                try:
+                    results.append(self._read_now(station, address))
+                except LinkLost as lost:
+                    results += [lost] * (len(addresses) - len(results))
+                    break
+                except DriveError as error:
+                    results.append(error)
+            return results
+
+        return await self._run(station, batch, cancelled)
+
+    async def write(self, station: int, address: Address, data: bytes) -> None:
+        """Write one object. A LinkTimeout leaves the outcome unknown; it is never repeated here."""
+        index, subindex = _object(address)
+        if self._cyclic.drives(station, index, subindex):
+            # An SDO write would be overwritten by the next PDO.
+            await self._in_worker(lambda: self._cyclic.put(station, index, subindex, data))
+        else:
+            await self._run(station, lambda: self._sdo_write(station, index, subindex, data))
+
+    async def nmt(self, command: int, station: int = 0) -> None:
+        """Send an NMT command (`drivers.canopen.frames`) to one node, or to all with 0."""
+        await self._in_worker(lambda: self._port.send(Frame(NMT, bytes([command, station]))))
+
+    def quality(self, station: int | None = None) -> LinkQuality:
+        """Counters; for one station its SDO figures and NMT state, else those of the bus."""
+        port = self._port
+        details: dict[str, float | int | str] = {
+            "frames_received": port.received,
+            "frames_sent": port.sent,
+            "error_frames": port.error_frames,
+            "bus_offs": port.bus_offs,
+            "reopened": port.reopened,
+        }
+        details |= self._cyclic.statistics()
+        if station is None:
+            channels = list(self._channels.values())
+            state = port.why_not
+        else:
+            channels = [self._channel(station)]
+            with self._watch_lock:
+                record = self._watch.record(station)
+                details |= {"boots": record.boots, "emergencies": record.emergencies}
+                state = record.conflict or record.state_text
+        trips = [c.round_trip_s for c in channels if c.round_trip_s is not None]
+        details["late_answers"] = sum(c.late_answers for c in channels)
+        details["stray_answers"] = sum(c.strays for c in channels)
+        return LinkQuality(
+            connected=port.connected,
+            transactions=sum(c.transactions for c in channels),
+            timeouts=sum(c.timeouts for c in channels),
+            lost_frames=port.lost_frames,
+            round_trip_ms=1e3 * max(trips) if trips else None,
+            state=state,
+            details=details,
+        )
+
+    def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
+        """Be told of boot-ups, emergencies, lost nodes, bus-off …, on the event loop's thread."""
+        self._listeners.append(listener)
+
+        def leave() -> None:
+            if listener in self._listeners:
+                self._listeners.remove(listener)
+
+        return leave
+
+    # Beneath: what runs on worker threads.
+
+    def _channel(self, station: int) -> SdoChannel:
+        channel = self._channels.get(station)
+        if channel is None:
+            raise NotAllowed(
+                f"{station} is not a CANopen node number", value=station, limit="1…127"
+            )
+        return channel
+
+    def _request_sender(self, node: int) -> Callable[[bytes], None]:
+        return lambda data: self._port.send(Frame(SDO_REQUEST + node, data))
+
+    def _read_now(self, station: int, address: Address) -> bytes:
+        index, subindex = _object(address)
+        data = self._sdo_read(station, index, subindex)
+        return _fit(data, size_of(address.type))
+
+    def _sdo_read(self, station: int, index: int, subindex: int) -> bytes:
+        self._in_use(station)
+        return self._channel(station).read(index, subindex, self._settings.timeout_s)
+
+    def _sdo_write(self, station: int, index: int, subindex: int, data: bytes) -> None:
+        self._in_use(station)
+        timeout_s = max(self._settings.timeout_s, _WRITE_TIMEOUT_S)
+        if index in _STORE_INDICES:
+            timeout_s = max(timeout_s, _STORE_TIMEOUT_S)
+        self._channel(station).write(index, subindex, data, timeout_s)
+
+    def _in_use(self, station: int) -> None:
+        with self._watch_lock:
+            self._watch.record(station).in_use = True
+
+    async def _in_worker(self, work: Callable[[], T]) -> T:
+        if self._workers is None:
+            raise LinkLost(f"{self.url} is not open", drive=self.url, remedy="open the bus first")
+        future = asyncio.get_running_loop().run_in_executor(self._workers, work)
+        try:
+            return await asyncio.shield(future)
+        except asyncio.CancelledError:
+            # The thread cannot be interrupted; whoever comes next must not overtake it.
+            await asyncio.wait([future])
+            raise
+
+    async def _run(
+        self, station: int, work: Callable[[], T], cancelled: threading.Event | None = None
+    ) -> T:
+        self._channel(station)
+        async with self._turns[station]:
+            try:
+                return await self._in_worker(work)
+            except DriveError as error:
+                error.at(drive=f"node {station} on {self.url}")
+                raise
+            finally:
+                if cancelled is not None:
+                    cancelled.set()
+
+    # Beneath: what runs on the receiving thread.
+
+    def _frame(self, frame: Frame, now_s: float) -> None:
+        if self._cyclic.take(frame, now_s):
+            return
+        function, node = frame.cob_id & 0x780, frame.cob_id & 0x7F
+        if function == SDO_ANSWER and node:
+            self._channels[node].deliver(frame.data)
+            return
+        with self._watch_lock:
+            events = self._watch.observe(frame, now_s)
+        for event in events:
+            self._event(event)
+
+    def _idle(self, now_s: float) -> None:
+        with self._watch_lock:
+            events = self._watch.overdue(now_s)
+            ask: list[int] = []
+            if self._settings.guard_s > 0:
+                ask, lost = self._watch.guard_due(self._settings.guard_s, now_s)
+                events += lost
+            for node, channel in self._channels.items():
+                if channel.strays > self._strays_told[node]:
+                    self._strays_told[node] += 1
+                    event = self._watch.stray_answer(node, now_s)
+                    events += [event] if event else []
+        for event in events:
+            self._event(event)
+        for node in ask:
+            try:
+                self._port.send(Frame(HEARTBEAT + node, remote=True))
+            except LinkLost:
+                return  # the receiving thread is about to notice and tell of it
+
+    def _event(self, event: LinkEvent) -> None:
+        if event.station is None and event.kind in ("lost", "fault"):
+            for channel in self._channels.values():
+                channel.fail(LinkLost(event.text, drive=self.url))
+        self._cyclic.event(event)
+        self._announce(event)
+
+    def _announce(self, event: LinkEvent) -> None:
+        loop = self._loop
+        if loop is not None and not loop.is_closed():
+            loop.call_soon_threadsafe(self._tell, event)
+
+    def _tell(self, event: LinkEvent) -> None:
+        for listener in list(self._listeners):
+            listener(event)
+
+
+def _object(address: Address) -> tuple[int, int]:
+    if address.index is None:
+        raise NotAllowed(
+            f"{address} exists only over Modbus",
+            parameter=str(address),
+            remedy="connect the drive's RS232 port as well",
+        )
+    return address.index, address.subindex
+
+
+def _fit(data: bytes, size: int | None) -> bytes:
+    """``data`` cut to ``size`` if what is cut off is only padding.
+
+    Some drives send four bytes for every object, filled with zeros or with the sign.
+    """
+    if size is None or len(data) <= size:
+        return data
+    rest = data[size:]
+    sign = b"\xff" if data[size - 1] & 0x80 else b"\0"
+    if rest.strip(b"\0") == b"" or rest.strip(sign) == b"":
+        return data[:size]
+    return data

@@ -1,0 +1,236 @@
+"""What nodes say by themselves: boot-up, heartbeat, node guarding, emergencies. Pure.
+
+Sources: CiA 301 v4.2.0 clauses 7.2.7 (emergency, table 26), 7.2.8.2.2 (node guarding, heartbeat)
+and 7.2.8.3.3 (boot-up).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from drivers.canopen.frames import EMERGENCY, HEARTBEAT, NMT_STATES, SDO_REQUEST, Frame
+from drivers.link import LinkEvent
+
+_EMERGENCY_TEXT = {
+    0x00: "error reset or no error", 0x10: "generic error", 0x20: "current",
+    0x21: "current at the input", 0x22: "current inside the drive", 0x23: "current at the output",
+    0x30: "voltage", 0x31: "mains voltage", 0x32: "voltage inside the drive",
+    0x33: "voltage at the output", 0x40: "temperature", 0x41: "ambient temperature",
+    0x42: "temperature of the drive", 0x50: "hardware", 0x60: "software",
+    0x61: "internal software", 0x62: "user software", 0x63: "data set",
+    0x70: "additional modules", 0x80: "monitoring", 0x81: "communication",
+    0x82: "protocol error", 0x90: "external error", 0xF0: "additional functions",
+    0xFF: "specific to the maker",
+}  # fmt: skip
+
+_EMERGENCY_EXACT = {
+    0x8110: "CAN overrun: frames were lost",
+    0x8120: "CAN in error passive mode",
+    0x8130: "life guard or heartbeat error: the drive no longer hears its master",
+    0x8140: "recovered from bus-off",
+    0x8150: "two nodes send with the same identifier",
+    0x8210: "a PDO was too short and was not processed",
+    0x8220: "a PDO was too long",
+    0x8240: "SYNC of an unexpected length",
+    0x8250: "an expected PDO did not come in time",
+}
+
+#: A heartbeat this many of its own periods late is lost; 0.1 s more for a busy host.
+_LATE_PERIODS = 2.5
+_LATE_EXTRA_S = 0.1
+_DUPLICATE_WINDOW_S = 10.0
+
+
+def emergency_text(code: int) -> str:
+    """Words for an emergency error code: exact where CiA 301 has one, else its class."""
+    exact = _EMERGENCY_EXACT.get(code)
+    if exact:
+        return exact
+    return _EMERGENCY_TEXT.get(code >> 8, _EMERGENCY_TEXT.get(code >> 12 << 4, "unlisted code"))
+
+
+@dataclass(slots=True)
+class NodeRecord:
+    """What is known of one node."""
+
+    node: int
+    state: int | None = None
+    last_heartbeat_s: float | None = None
+    period_s: float | None = None
+    alive: bool = True
+    boots: int = 0
+    emergencies: int = 0
+    last_emergency: int | None = None
+    guard_toggle: int | None = None
+    guard_asked_s: float | None = None
+    foreign_master_s: float | None = None
+    strays_s: list[float] = field(default_factory=list)
+    in_use: bool = False
+    conflict: str = ""
+
+    @property
+    def state_text(self) -> str:
+        """NMT state in words, or empty."""
+        return "" if self.state is None else NMT_STATES.get(self.state, f"state {self.state}")
+
+
+class NodeWatch:
+    """Follows every node on one bus. Not thread-safe: one thread feeds it."""
+
+    def __init__(self) -> None:
+        self.nodes: dict[int, NodeRecord] = {}
+
+    def record(self, node: int) -> NodeRecord:
+        """The record of ``node``, made on first use."""
+        return self.nodes.setdefault(node, NodeRecord(node))
+
+    def observe(self, frame: Frame, now_s: float) -> list[LinkEvent]:
+        """Take in one received frame (not our own) and return what is worth telling."""
+        function, node = frame.cob_id & 0x780, frame.cob_id & 0x7F
+        if frame.remote or node == 0:
+            return []
+        if function == HEARTBEAT and len(frame.data) == 1:
+            return self._heartbeat(self.record(node), frame.data[0], now_s)
+        if function == EMERGENCY and len(frame.data) == 8:
+            return self._emergency(self.record(node), frame.data)
+        if function == SDO_REQUEST:
+            self.record(node).foreign_master_s = now_s
+        return []
+
+    def _heartbeat(self, record: NodeRecord, byte: int, now_s: float) -> list[LinkEvent]:
+        state, toggle = byte & 0x7F, byte >> 7
+        events = []
+        if not record.alive:
+            record.alive = True
+            events.append(LinkEvent("back", record.node, f"node {record.node} answers again"))
+        if state == 0 and not toggle:
+            events.append(self._boot(record))
+        elif record.guard_asked_s is not None:
+            events += self._guard_answer(record, toggle)
+        elif record.last_heartbeat_s is not None:
+            record.period_s = now_s - record.last_heartbeat_s
+        record.last_heartbeat_s = now_s
+        if state != record.state:
+            known = record.state not in (None, 0)
+            record.state = state
+            if known and state != 0:
+                events.append(
+                    LinkEvent("state", record.node, f"node {record.node} is {record.state_text}")
+                )
+        return events
+
+    def _boot(self, record: NodeRecord) -> LinkEvent:
+        record.boots += 1
+        record.period_s = record.guard_toggle = record.guard_asked_s = None
+        if record.in_use:
+            return LinkEvent(
+                "boot",
+                record.node,
+                f"node {record.node} restarted: values that were not saved are gone, read it anew",
+            )
+        return LinkEvent("boot", record.node, f"node {record.node} started")
+
+    def _guard_answer(self, record: NodeRecord, toggle: int) -> list[LinkEvent]:
+        record.guard_asked_s = None
+        repeated = record.guard_toggle == toggle
+        record.guard_toggle = toggle
+        if not repeated:
+            return []
+        return [
+            LinkEvent(
+                "fault",
+                record.node,
+                f"node {record.node} repeated its guarding answer: an answer was lost, or two "
+                "nodes have this number",
+            )
+        ]
+
+    def _emergency(self, record: NodeRecord, data: bytes) -> list[LinkEvent]:
+        code = int.from_bytes(data[:2], "little")
+        record.emergencies += 1
+        record.last_emergency = code
+        text = emergency_text(code)
+        if code == 0x8150:
+            record.conflict = text
+        extra = f", maker's bytes {data[3:8].hex(' ')}" if any(data[3:8]) else ""
+        return [
+            LinkEvent(
+                "emergency",
+                record.node,
+                f"node {record.node}: {text} (emergency {code:04X}h, "
+                f"error register {data[2]:02X}h{extra})",
+                code,
+            )
+        ]
+
+    def overdue(self, now_s: float) -> list[LinkEvent]:
+        """Nodes whose heartbeat stopped; each is told of once."""
+        events = []
+        for record in self.nodes.values():
+            if not record.alive or record.last_heartbeat_s is None or record.period_s is None:
+                continue
+            limit_s = record.period_s * _LATE_PERIODS + _LATE_EXTRA_S
+            silent_s = now_s - record.last_heartbeat_s
+            if silent_s > limit_s:
+                record.alive = False
+                record.period_s = None
+                events.append(
+                    LinkEvent(
+                        "lost",
+                        record.node,
+                        f"node {record.node} stopped its heartbeat {silent_s:.1f} s ago",
+                    )
+                )
+        return events
+
+    def guard_due(self, guard_s: float, now_s: float) -> tuple[list[int], list[LinkEvent]]:
+        """Nodes to be asked for their state now, and those that did not answer the last time.
+
+        Only nodes that are in use and send no heartbeat are asked.
+        """
+        ask: list[int] = []
+        events: list[LinkEvent] = []
+        for record in self.nodes.values():
+            if not record.in_use or record.period_s is not None:
+                continue
+            asked = record.guard_asked_s
+            if asked is not None and now_s - asked < guard_s:
+                continue
+            last = record.last_heartbeat_s
+            if asked is None and last is not None and now_s - last < guard_s:
+                continue
+            if asked is not None and record.alive and record.guard_toggle is not None:
+                record.alive = False
+                events.append(
+                    LinkEvent("lost", record.node, f"node {record.node} does not answer guarding")
+                )
+            record.guard_asked_s = now_s
+            ask.append(record.node)
+        return ask, events
+
+    def stray_answer(self, node: int, now_s: float) -> LinkEvent | None:
+        """An SDO answer of ``node`` came that nobody here asked for.
+
+        Two within ten seconds, with no other master asking, mean two nodes with one number.
+        """
+        record = self.record(node)
+        record.strays_s = [t for t in record.strays_s if now_s - t < _DUPLICATE_WINDOW_S]
+        record.strays_s.append(now_s)
+        if len(record.strays_s) < 2 or record.conflict:
+            return None
+        foreign = record.foreign_master_s
+        if foreign is not None and now_s - foreign < _DUPLICATE_WINDOW_S:
+            record.conflict = "another master is talking to this node"
+            return LinkEvent(
+                "fault",
+                node,
+                f"another master is talking to node {node}: answers can be mixed up. "
+                "Stop the other master before writing anything",
+            )
+        record.conflict = "two nodes have this number"
+        return LinkEvent(
+            "fault",
+            node,
+            f"two nodes answer as number {node}: both would obey a write. "
+            "Switch one off and give it another number",
+        )

@@ -1,0 +1,132 @@
+"""Which signal travels in which PDO, and the writes that tell the drive so. Pure.
+
+Source: CiA 301 v4.2.0 clauses 7.5.2.35 to 7.5.2.38 (PDO parameters) and 7.2.2 (PDO services).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from drivers.canopen.frames import RPDO, TPDO
+from drivers.codec import size_of
+from drivers.link import CyclicSignal
+
+MAX_ENTRIES = 4
+"""Entries per PDO that every drive takes: DS_C has only subindices 1 to 4 (003:432-475)."""
+
+INVALID = 0x80000000
+_SYNCHRONOUS = 1
+
+
+@dataclass(frozen=True, slots=True)
+class PdoPlan:
+    """One PDO of one node: number 0 to 3, identifier, and the signals in order."""
+
+    station: int
+    direction: Literal["rx", "tx"]
+    number: int
+    signals: tuple[CyclicSignal, ...]
+
+    @property
+    def cob_id(self) -> int:
+        """Identifier of the pre-defined connection set."""
+        return (RPDO if self.direction == "rx" else TPDO)[self.number] + self.station
+
+    @property
+    def communication(self) -> int:
+        """Index of its communication parameters."""
+        return (0x1400 if self.direction == "rx" else 0x1800) + self.number
+
+    @property
+    def mapping(self) -> int:
+        """Index of its mapping."""
+        return (0x1600 if self.direction == "rx" else 0x1A00) + self.number
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return sum(size_of(s.address.type) or 0 for s in self.signals)
+
+
+@dataclass(frozen=True, slots=True)
+class SdoWrite:
+    """One write of the set-up."""
+
+    index: int
+    subindex: int
+    data: bytes
+
+
+def plan(
+    inputs: Sequence[CyclicSignal], outputs: Sequence[CyclicSignal]
+) -> tuple[tuple[PdoPlan, ...], tuple[CyclicSignal, ...]]:
+    """Distribute signals over four PDOs of 8 bytes per node and direction, in the order given.
+
+    Returns the PDOs and the signals that found no room (or are not mappable at all).
+    """
+    pdos: list[PdoPlan] = []
+    left: list[CyclicSignal] = []
+    directions: tuple[tuple[Literal["rx", "tx"], Sequence[CyclicSignal]], ...] = (
+        ("tx", inputs),
+        ("rx", outputs),
+    )
+    for direction, signals in directions:
+        for station in sorted({s.station for s in signals}):
+            own = [s for s in signals if s.station == station]
+            groups, rest = _pack(own)
+            left += rest
+            pdos += [PdoPlan(station, direction, n, tuple(g)) for n, g in enumerate(groups)]
+    return tuple(pdos), tuple(left)
+
+
+def _pack(
+    signals: Sequence[CyclicSignal],
+) -> tuple[list[list[CyclicSignal]], list[CyclicSignal]]:
+    groups: list[list[CyclicSignal]] = []
+    left: list[CyclicSignal] = []
+    for signal in signals:
+        size = size_of(signal.address.type)
+        if size is None or signal.address.index is None:
+            left.append(signal)
+            continue
+        for group in groups:
+            used = sum(size_of(s.address.type) or 0 for s in group)
+            if used + size <= 8 and len(group) < MAX_ENTRIES:
+                group.append(signal)
+                break
+        else:
+            if len(groups) < 4:
+                groups.append([signal])
+            else:
+                left.append(signal)
+    return groups, left
+
+
+def set_up(pdo: PdoPlan, flags: int = 0) -> list[SdoWrite]:
+    """Writes that map ``pdo`` and make it synchronous, in the order CiA 301 asks for.
+
+    ``flags`` are the bits 29 and 30 that the identifier had before.
+    """
+    entries = [mapping_entry(s) for s in pdo.signals]
+    identifier = pdo.cob_id | flags
+    return [
+        SdoWrite(pdo.communication, 1, struct.pack("<I", identifier | INVALID)),
+        SdoWrite(pdo.communication, 2, bytes([_SYNCHRONOUS])),
+        SdoWrite(pdo.mapping, 0, b"\0"),
+        *(
+            SdoWrite(pdo.mapping, n, struct.pack("<I", entry))
+            for n, entry in enumerate(entries, start=1)
+        ),
+        SdoWrite(pdo.mapping, 0, bytes([len(entries)])),
+        SdoWrite(pdo.communication, 1, struct.pack("<I", identifier)),
+    ]
+
+
+def mapping_entry(signal: CyclicSignal) -> int:
+    """Index, subindex and length in bits as a mapping object holds them."""
+    address = signal.address
+    bits = 8 * (size_of(address.type) or 0)
+    return (address.index or 0) << 16 | address.subindex << 8 | bits

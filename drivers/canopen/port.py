@@ -1,0 +1,186 @@
+"""One open CAN adapter: a receiving thread, sending, and coming back after a loss."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+import can
+
+from drivers.canopen.adapter import ADAPTER_ERRORS, open_bus, translate
+from drivers.canopen.frames import Frame
+from drivers.canopen.slcan import ERROR_BUS_OFF
+from drivers.canopen.url import CanUrl
+from drivers.errors import DriveError, LinkLost
+from drivers.link import LinkEvent
+
+_IDLE_S = 0.05
+_FIRST_RETRY_S = 0.2
+_LAST_RETRY_S = 5.0
+_SEND_TIMEOUT_S = 0.05
+
+_BUS_OFF_REMEDY = (
+    "check the bit rate of every node, the wiring between CAN_H and CAN_L and the termination; "
+    "the adapter is started again by itself"
+)
+
+
+class CanPort:
+    """The adapter and its receiving thread.
+
+    ``on_frame`` (frame, monotonic seconds), ``on_event`` and ``on_idle`` (seconds; at least every
+    50 ms) are called on the receiving thread and must not block.
+    """
+
+    def __init__(
+        self,
+        url: CanUrl,
+        on_frame: Callable[[Frame, float], None],
+        on_event: Callable[[LinkEvent], None],
+        on_idle: Callable[[float], None],
+        opener: Callable[[CanUrl], can.BusABC] = open_bus,
+    ) -> None:
+        self.url = url
+        self.error_frames = 0
+        self.received = 0
+        self.sent = 0
+        self.lost_frames = 0
+        self.bus_offs = 0
+        self.reopened = 0
+        self._on_frame = on_frame
+        self._on_event = on_event
+        self._on_idle = on_idle
+        self._opener = opener
+        self._bus: can.BusABC | None = None
+        self._why: DriveError | None = None
+        self._closing = threading.Event()
+        self._send_lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+
+    @property
+    def connected(self) -> bool:
+        """The adapter is open and not bus-off."""
+        return self._bus is not None
+
+    @property
+    def why_not(self) -> str:
+        """Why it is not connected, or empty."""
+        return "" if self._why is None else self._why.message
+
+    def open(self) -> None:
+        """Open the adapter and start receiving. Blocks. Raises LinkLost."""
+        if self._thread is not None:
+            return
+        self._closing.clear()
+        self._bus = self._opener(self.url)
+        self._why = None
+        self._thread = threading.Thread(target=self._receive, name="can-receive", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop receiving and close the adapter. Calling again does nothing."""
+        self._closing.set()
+        thread, self._thread = self._thread, None
+        if thread is not None:
+            thread.join()
+        self._drop_bus()
+
+    def send(self, frame: Frame) -> None:
+        """Put a frame on the bus.
+
+        Raises:
+            LinkLost: adapter gone, bus-off, or nobody acknowledges.
+        """
+        message = can.Message(
+            arbitration_id=frame.cob_id,
+            is_extended_id=False,
+            is_remote_frame=frame.remote,
+            data=frame.data,
+            check=False,
+        )
+        with self._send_lock:
+            bus = self._bus
+            if bus is None:
+                raise self._lost_error()
+            try:
+                bus.send(message, timeout=_SEND_TIMEOUT_S)
+            except ADAPTER_ERRORS as error:
+                self.lost_frames += 1
+                raise translate(self.url, error) from error
+        self.sent += 1
+
+    def _lost_error(self) -> LinkLost:
+        why = self._why
+        if why is None:
+            return LinkLost(f"CAN adapter {self.url.channel} is closed", drive=self.url.url)
+        return LinkLost(why.message, drive=self.url.url, remedy=why.remedy)
+
+    def _receive(self) -> None:
+        idle_due_s = 0.0
+        while not self._closing.is_set():
+            bus = self._bus
+            if bus is None:
+                return
+            try:
+                message = bus.recv(_IDLE_S)
+            except ADAPTER_ERRORS as error:
+                self._recover(translate(self.url, error), "lost", _FIRST_RETRY_S)
+                continue
+            now_s = time.monotonic()
+            if now_s >= idle_due_s:
+                idle_due_s = now_s + _IDLE_S
+                self._on_idle(now_s)
+            if message is None:
+                continue
+            if message.is_error_frame:
+                self._error_frame(message)
+            elif not message.is_extended_id:
+                self.received += 1
+                frame = Frame(message.arbitration_id, bytes(message.data), message.is_remote_frame)
+                self._on_frame(frame, now_s)
+
+    def _error_frame(self, message: can.Message) -> None:
+        self.error_frames += 1
+        bus = self._bus
+        if not message.arbitration_id & ERROR_BUS_OFF and (
+            bus is None or bus.state is not can.BusState.ERROR
+        ):
+            return
+        self.bus_offs += 1
+        why = LinkLost(
+            f"CAN adapter {self.url.channel}: bus-off, it has switched itself off after too many "
+            "errors",
+            drive=self.url.url,
+            remedy=_BUS_OFF_REMEDY,
+        )
+        self._recover(why, "fault", _FIRST_RETRY_S)
+
+    def _recover(self, why: LinkLost, kind: str, retry_s: float) -> None:
+        """Tell of the loss, then try until the adapter is open again or the port closes."""
+        self._why = why
+        self._drop_bus()
+        text = f"{why.message}. {why.remedy}" if why.remedy else why.message
+        self._on_event(LinkEvent("fault" if kind == "fault" else "lost", None, text))
+        while not self._closing.wait(retry_s):
+            try:
+                bus = self._opener(self.url)
+            except LinkLost as error:
+                self._why = error
+                retry_s = min(retry_s * 2, _LAST_RETRY_S)
+                continue
+            with self._send_lock:
+                self._bus = bus
+            self._why = None
+            self.reopened += 1
+            self._on_event(LinkEvent("back", None, f"CAN adapter {self.url.channel} is back"))
+            return
+
+    def _drop_bus(self) -> None:
+        with self._send_lock:
+            bus, self._bus = self._bus, None
+        if bus is not None:
+            try:
+                bus.shutdown()
+            except (*ADAPTER_ERRORS, TypeError):
+                return  # a dead adapter cannot be told to close; its descriptor is gone with it

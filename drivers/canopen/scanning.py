@@ -1,0 +1,84 @@
+"""Finding nodes and asking who they are. Runs on a worker thread."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from drivers.canopen.channel import SdoChannel
+from drivers.errors import DriveError, LinkLost
+from drivers.link import Found
+
+_WINDOW_S = 0.12
+_SERVO = 402
+
+
+def probe(channels: Sequence[SdoChannel]) -> dict[int, list[bytes]]:
+    """Ask all these nodes at once for their device type; answers by node, silent ones left out.
+
+    Raises:
+        LinkLost: the adapter is gone.
+    """
+    begun: list[SdoChannel] = []
+    answers: dict[int, list[bytes]] = {}
+    try:
+        for channel in channels:
+            channel.begin_probe()
+            begun.append(channel)
+        time.sleep(_WINDOW_S)
+    finally:
+        for channel in begun:
+            answers[channel.node] = channel.end_probe()
+    return {node: got for node, got in answers.items() if got}
+
+
+def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) -> Found:
+    """Read the identity of a node that answered; objects it does not have stay None or empty."""
+    notes: list[str] = []
+    if len(answers) > 1:
+        notes.append(
+            f"{len(answers)} nodes answer as number {channel.node}: switch all but one off and "
+            "give them other numbers before writing anything"
+        )
+    device_type = int.from_bytes(answers[0][4:8], "little")
+    if answers[0][0] & 0xE0 == 0x40 and device_type & 0xFFFF != _SERVO:
+        notes.append(f"device profile {device_type & 0xFFFF}, not a CiA 402 drive")
+
+    def number(index: int, subindex: int) -> int | None:
+        data = _read(channel, index, subindex, timeout_s)
+        return None if data is None else int.from_bytes(data, "little")
+
+    def text(index: int) -> str:
+        data = _read(channel, index, 0, timeout_s) or b""
+        return readable(data)
+
+    return Found(
+        station=channel.node,
+        vendor_id=number(0x1018, 1),
+        product_code=number(0x1018, 2),
+        revision=number(0x1018, 3),
+        serial=number(0x1018, 4),
+        name=text(0x1008),
+        hardware=text(0x1009),
+        firmware=text(0x100A),
+        notes=tuple(notes),
+    )
+
+
+def _read(channel: SdoChannel, index: int, subindex: int, timeout_s: float) -> bytes | None:
+    try:
+        return channel.read(index, subindex, timeout_s)
+    except LinkLost:
+        raise
+    except DriveError:
+        return None
+
+
+def readable(data: bytes) -> str:
+    """Text as sent, or the number where a drive keeps versions as numbers (DS_C, 003:421)."""
+    stripped = data.rstrip(b"\0 ")
+    if stripped and all(0x20 <= byte < 0x7F for byte in stripped):
+        return stripped.decode("ascii").strip()
+    if 0 < len(data) <= 4:
+        return str(int.from_bytes(data, "little"))
+    return stripped.decode("utf-8", "replace").strip()

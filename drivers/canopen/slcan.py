@@ -1,0 +1,73 @@
+"""slcan adapters: python-can's client, made to tell of refused frames and of bus-off.
+
+python-can drops the adapter's BEL (a frame it could not send) and never asks for the status
+flags, so a bus-off would only look like silence. It also reads one byte per system call.
+Source of the commands: Lawicel CAN232 manual V3, "F" status flags and "t" return values.
+"""
+
+from __future__ import annotations
+
+import can
+import serial
+from can.interfaces.slcan import slcanBus
+
+_BUS_ERROR = 0x80
+_ERROR_PASSIVE = 0x20
+
+ERROR_BUS_OFF = 0x40
+ERROR_CONTROLLER = 0x04
+"""Error classes as Linux SocketCAN numbers them (linux/can/error.h)."""
+
+
+class SlcanBus(slcanBus):
+    """As python-can's, but a BEL makes it ask for the flags, which come back as error frames."""
+
+    def _read(self, timeout: float | None) -> str | None:
+        try:
+            line = self._buffered_line()
+            if line is None:
+                self.serialPortOrig.timeout = timeout
+                self._buffer += self.serialPortOrig.read(1)
+                if waiting := self.serialPortOrig.in_waiting:
+                    self._buffer += self.serialPortOrig.read(waiting)
+                line = self._buffered_line()
+        except (OSError, serial.SerialException, TypeError) as error:
+            # TypeError: pyserial reads a descriptor that another thread has closed.
+            raise can.CanOperationError(f"the adapter is gone: {error}") from error
+        if line == "\a":
+            self._write("F")
+        return line
+
+    def _buffered_line(self) -> str | None:
+        for position, byte in enumerate(self._buffer):
+            if byte in b"\r\a":
+                line = bytes(self._buffer[: position + 1])
+                del self._buffer[: position + 1]
+                return line.decode("ascii", "replace")
+        return None
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        line = self._read(timeout)
+        if line is None:
+            return None, False
+        if line[0] == "F":
+            return _flags_as_error(line), False
+        self._queue.put_nowait(line)
+        try:
+            message, filtered = super()._recv_internal(0)
+        except (ValueError, IndexError):  # noise between two frames on the serial line
+            return None, False
+        return message, filtered
+
+
+def _flags_as_error(line: str) -> can.Message | None:
+    try:
+        flags = int(line[1:3], 16)
+    except ValueError:
+        return None
+    if not flags & (_BUS_ERROR | _ERROR_PASSIVE):
+        return None
+    kind = ERROR_BUS_OFF if flags & _BUS_ERROR else ERROR_CONTROLLER
+    return can.Message(
+        arbitration_id=kind, is_extended_id=False, is_error_frame=True, dlc=8, data=bytes(8)
+    )

@@ -1,0 +1,113 @@
+"""CANopen bus URLs: ``canopen://INTERFACE/CHANNEL?option=value``.
+
+INTERFACE and CHANNEL are python-can's names. Examples::
+
+    canopen://socketcan/can0?bitrate=1000000
+    canopen://slcan//dev/ttyACM0?bitrate=500000
+    canopen://udp_multicast/239.74.163.2
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from urllib.parse import parse_qsl, unquote, urlsplit
+
+from drivers.errors import OutOfRange
+
+INTERFACES = ("socketcan", "slcan", "pcan", "kvaser", "usb2can", "udp_multicast", "virtual")
+
+BITRATES = (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
+"""Bit rates of CiA 301 clause 6.2, and 100 kbit/s, which it no longer recommends."""
+
+_DEFAULT_CHANNEL = {"pcan": "PCAN_USBBUS1", "kvaser": "0", "udp_multicast": "239.74.163.2"}
+_OPTIONS = ("bitrate", "timeout", "own_id", "guard", "settle", "port", "tty_baudrate")
+
+
+@dataclass(frozen=True, slots=True)
+class CanUrl:
+    """A parsed CANopen URL.
+
+    ``timeout_s`` is for one SDO answer. ``own_id`` is the number under which this tool sends its
+    own heartbeat. ``guard_s`` asks silent nodes for their state that often (node guarding), 0
+    never. ``settle_s`` is how long a serial adapter is left alone after opening.
+    """
+
+    url: str
+    interface: str
+    channel: str
+    bitrate: int
+    timeout_s: float = 0.5
+    own_id: int = 127
+    guard_s: float = 0.0
+    settle_s: float = 0.0
+    port: int | None = None
+    tty_baudrate: int | None = None
+
+
+def parse_canopen_url(url: str) -> CanUrl:
+    """Take a URL apart.
+
+    Raises:
+        OutOfRange: another scheme, unknown interface, option or bit rate; the message lists
+            what there is.
+    """
+    parts = urlsplit(url)
+    if parts.scheme != "canopen":
+        raise OutOfRange(f"{url!r} is not a canopen:// address", value=url)
+    interface = parts.netloc
+    if interface not in INTERFACES:
+        raise OutOfRange(
+            f"{interface!r} is not a kind of CAN adapter known here",
+            value=url,
+            limit=", ".join(INTERFACES),
+            remedy="write canopen://INTERFACE/CHANNEL, for example canopen://socketcan/can0",
+        )
+    channel = unquote(parts.path.removeprefix("/")) or _DEFAULT_CHANNEL.get(interface, "")
+    if not channel:
+        raise OutOfRange(
+            f"{url!r} names no channel",
+            value=url,
+            remedy=f"write canopen://{interface}/CHANNEL, for example can0 or /dev/ttyACM0",
+        )
+    options = dict(parse_qsl(parts.query, keep_blank_values=True))
+    unknown = sorted(set(options) - set(_OPTIONS))
+    if unknown:
+        raise OutOfRange(
+            f"{url!r}: unknown option {', '.join(unknown)}", value=url, limit=", ".join(_OPTIONS)
+        )
+    bitrate = _number(options, "bitrate", 1_000_000.0, 1, 1_000_000)
+    if int(bitrate) not in BITRATES:
+        raise OutOfRange(
+            f"{int(bitrate)} bit/s is not a CANopen bit rate",
+            value=int(bitrate),
+            limit=", ".join(map(str, BITRATES)),
+        )
+    return CanUrl(
+        url=url,
+        interface=interface,
+        channel=channel,
+        bitrate=int(bitrate),
+        timeout_s=_number(options, "timeout", 0.5, 0.005, 60),
+        own_id=int(_number(options, "own_id", 127, 1, 127)),
+        guard_s=_number(options, "guard", 0, 0, 60),
+        settle_s=_number(options, "settle", 0, 0, 10),
+        port=int(_number(options, "port", 0, 0, 65535)) or None,
+        tty_baudrate=int(_number(options, "tty_baudrate", 0, 0, 20_000_000)) or None,
+    )
+
+
+def _number(options: dict[str, str], name: str, default: float, low: float, high: float) -> float:
+    text = options.get(name)
+    if text is None:
+        return default
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not low <= value <= high:
+        raise OutOfRange(
+            f"{name}={text} must be a number from {low:g} to {high:g}",
+            value=text,
+            limit=f"{low:g}…{high:g}",
+        )
+    return value
