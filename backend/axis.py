@@ -14,11 +14,12 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 from backend.drive import Drive
+from backend.faults import active_faults, fault_keys
 from backend.units import AxisUnits, read_units
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
-from profiles.schema import Raw
+from profiles.schema import Fault, Raw
 
 #: Longest time that one change of the power state may take (brake and bus included).
 STATE_TIMEOUT_S = 3.0
@@ -53,6 +54,8 @@ class Axis:
         self._enable_pause_s = ((pause.milliseconds if pause else None) or 0.0) / 1000.0
         #: The last control word written, for edges.
         self.control_word = 0
+        #: STOP was pressed: no word that enables may be sent until a new command is given.
+        self.stopped = False
 
     # --- words ------------------------------------------------------------------------
 
@@ -76,7 +79,18 @@ class Axis:
         return self.drive.decode_state(await self.status_word())
 
     async def control(self, word: int) -> None:
-        """Write 6040h."""
+        """Write 6040h.
+
+        Raises:
+            NotAllowed: STOP was pressed and the word would enable the axis again.
+        """
+        enables = word & cia402.ENABLE_OPERATION == cia402.ENABLE_OPERATION
+        if self.stopped and enables:
+            raise NotAllowed(
+                f"{self.drive.name}: STOP was pressed",
+                drive=self.drive.name,
+                remedy="start a new motion when it is safe",
+            )
         await self.drive.command(self.drive.require("control_word"), word)
         self.control_word = word
 
@@ -134,7 +148,7 @@ class Axis:
         state = drive.decode_state(word)
         if state in (State.FAULT, State.FAULT_REACTION):
             faults = await self.active_faults()
-            names = ", ".join(f"{code} {name}" for code, name in faults) or "unknown"
+            names = ", ".join(f"{fault.code} {fault.name}" for fault in faults) or "unknown"
             causes.append(f"fault present: {names}")
         own = drive.profile.quirk("own_status_word") is not None
         enabled_states = (State.READY, State.SWITCHED_ON)
@@ -147,26 +161,9 @@ class Axis:
             causes.append(f"write-settings pending for {len(waiting)} parameters")
         return causes
 
-    async def active_faults(self) -> list[tuple[str, str]]:
-        """Code and name of what the drive reports now; unknown codes are shown as they are."""
-        drive = self.drive
-        found: list[tuple[str, str]] = []
-        keys = {match.key for fault in drive.profile.faults for match in fault.match}
-        readings = await drive.read_many(sorted(keys))
-        code_key = drive.key("error_code")
-        code = await drive.raw(code_key) if code_key else 0
-        masked = code & 0xFF if drive.profile.quirk("error_code_low_byte") else code
-        for fault in drive.profile.faults:
-            by_bit = any(
-                isinstance(raw := readings[m.key].raw, int) and raw >> m.bit & 1
-                for m in fault.match
-            )
-            by_code = bool(code) and fault.code_raw is not None and fault.code_raw in (code, masked)
-            if by_bit or by_code:
-                found.append((fault.code, fault.name))
-        if code and not found:
-            found.append((f"0x{code:04X}", "not in the profile"))
-        return found
+    async def active_faults(self) -> list[Fault]:
+        """What the drive reports now, read now."""
+        return active_faults(self.drive, await self.drive.read_many(fault_keys(self.drive)))
 
     async def reset_fault(self) -> State:
         """Rising edge of the fault-reset bit, then Switch on disabled.
@@ -205,6 +202,11 @@ class Axis:
                     remedy="stop the axis and try again",
                 )
             await asyncio.sleep(_POLL_S)
+
+    async def stop(self) -> None:
+        """STOP by a person: quick stop, and nothing in progress may enable the axis again."""
+        self.stopped = True
+        await self.quick_stop()
 
     async def quick_stop(self) -> None:
         """Stop now, by one write; harmless when nothing moves."""
@@ -286,6 +288,7 @@ class Axis:
             NotAllowed: the axis cannot be enabled, with the cause.
         """
         drive = self.drive
+        self.stopped = False
         before = await self.state()
         if before is State.OPERATION_ENABLED and not await self.standstill(0.5):
             raise NotAllowed(
@@ -303,7 +306,7 @@ class Axis:
             await self._limit_torque(limits, envelope.torque_percent)
             await self.set_mode(mode)
             # A stale set-point must not start to move the axis when it is enabled.
-            await self._aim_here(mode)
+            await self.aim_here(mode)
             try:
                 await self.go_to(State.OPERATION_ENABLED)
                 yield
@@ -322,9 +325,13 @@ class Axis:
             if isinstance(current, int) and current > raw:
                 await self.drive.write(key, raw)
 
-    async def _aim_here(self, mode: Mode) -> None:
-        """Set-point of the mode to "stay"."""
+    async def aim_here(self, mode: Mode | None = None) -> None:
+        """Set-point to "stay": of ``mode``, or of the mode that the drive shows."""
         drive = self.drive
+        if mode is None:
+            display = drive.key("mode_display")
+            shown = await drive.raw(display) if display else 0
+            mode = Mode(shown) if shown in set(Mode) else Mode.NONE
         role, value = {
             Mode.PP: ("position_target", await self.position_raw()),
             Mode.CSP: ("position_target", await self.position_raw()),
@@ -338,12 +345,17 @@ class Axis:
 
     async def _leave(self, before: State, mode: Mode) -> None:
         state = await self.state()
+        if self.stopped:
+            await self.standstill(CLEANUP_TIMEOUT_S / 2)
+            if state not in (State.FAULT, State.FAULT_REACTION):
+                await self.go_to(State.SWITCH_ON_DISABLED)
+            return
         if state is State.OPERATION_ENABLED:
             await self.halt_and_wait(CLEANUP_TIMEOUT_S / 2)
             state = await self.state()
         if before is State.OPERATION_ENABLED and state is State.OPERATION_ENABLED:
             # Halt is released only onto a set-point that is where the axis stands.
-            await self._aim_here(mode)
+            await self.aim_here(mode)
             if mode is Mode.PP:
                 stay = cia402.ENABLE_OPERATION | cia402.HALT | cia402.CHANGE_IMMEDIATELY
                 await self.control(stay | cia402.NEW_SET_POINT)

@@ -172,6 +172,10 @@ class Drive:
 
     # --- change marks ----------------------------------------------------------------
 
+    def commands_motion(self, key: str) -> bool:
+        """Whether writing this parameter commands motion or a procedure at once."""
+        return key in self._transient
+
     @property
     def unsaved(self) -> frozenset[str]:
         """Keys whose value in the drive is not yet in its memory."""

@@ -475,6 +475,13 @@ class Profile(Frozen):
         return {p.key: p for p in self.parameters}
 
     @cached_property
+    def unit_keys(self) -> frozenset[str]:
+        """Parameters that change what a position increment is."""
+        units = self.units
+        keys = (units.gear_numerator, units.gear_denominator, units.feed, units.feed_revolutions)
+        return frozenset(key for key in keys if key is not None)
+
+    @cached_property
     def by_role(self) -> dict[str, Parameter]:
         """Parameters by signal role; only roles that this family has."""
         return {s.role: self.by_key[s.key] for s in self.signals}

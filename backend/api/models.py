@@ -504,3 +504,17 @@ class ProfileInfo(Message):
     partial: bool
     links: list[str]
     parameters: int
+
+
+class HomingMethodInfo(Message):
+    """A homing method of the drive."""
+
+    method: int
+    name: str
+    help: str
+    direction: str
+    signal: str
+    uses_index: bool
+    uses_limit: bool
+    source: str
+    notes: str

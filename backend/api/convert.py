@@ -1,0 +1,312 @@
+"""From the server's own types to the messages of the interface."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+from backend.api import models
+from backend.api.errors import problem_of
+from backend.bench import Bench, Member, match_profiles
+from backend.drive import Drive, Reading
+from backend.jobs import Job
+from backend.journal import Entry
+from backend.monitor import Snapshot
+from backend.parameter_set import Difference
+from backend.tools.procedures import describe
+from drivers import cia402
+from drivers.cia402 import Mode
+from drivers.link import Found, LinkQuality
+from profiles.schema import ConfirmStep, Fault, Parameter, Procedure
+
+
+def moment(seconds: float) -> datetime:
+    """Epoch seconds as a time with zone."""
+    return datetime.fromtimestamp(seconds, UTC)
+
+
+def quality(now: LinkQuality) -> models.Quality:
+    """Counters of a link."""
+    return models.Quality(
+        connected=now.connected,
+        state=now.state,
+        transactions=now.transactions,
+        timeouts=now.timeouts,
+        crc_errors=now.crc_errors,
+        framing_errors=now.framing_errors,
+        retries=now.retries,
+        lost_frames=now.lost_frames,
+        wkc_errors=now.wkc_errors,
+        round_trip_ms=now.round_trip_ms,
+        details=now.details,
+    )
+
+
+def lease(bench: Bench, drive: str, connection: str | None) -> models.Lease:
+    """Who controls a drive, seen from ``connection``."""
+    holder = bench.leases.holder(drive)
+    if holder is None:
+        return models.Lease(holder=None, since=None)
+    return models.Lease(
+        holder=holder.person,
+        since=moment(holder.since),
+        mine=holder.connection == connection,
+    )
+
+
+def drive_summary(
+    bench: Bench, member: Member, connection: str | None = None
+) -> models.DriveSummary:
+    """A drive of the bench."""
+    drive, found = member.drive, member.drive.found
+    return models.DriveSummary(
+        id=drive.id,
+        name=drive.name,
+        notes=drive.notes,
+        profile=drive.profile.drive,
+        title=drive.profile.title,
+        maker=drive.profile.identity.maker,
+        partial=drive.profile.partial,
+        ports=[
+            models.PortInfo(
+                url=bench.url_of(port),
+                kind=port.link.kind,
+                station=port.station,
+                watchdog=bool(port.spec and port.spec.watchdog.present),
+                watchdog_help=port.spec.watchdog.help if port.spec else "",
+            )
+            for port in drive.ports
+        ],
+        connected=member.monitor.snapshot.fresh,
+        serial=found.serial if found else None,
+        firmware=found.firmware if found else "",
+        identity_warning=drive.identity_warning,
+        unsaved=len(drive.unsaved),
+        pending=len(drive.pending),
+        lease=lease(bench, drive.id, connection),
+        quality=quality(drive.quality()),
+    )
+
+
+def fault(known: Fault) -> models.ActiveFault:
+    """A fault with what to do about it."""
+    return models.ActiveFault(
+        code=known.code,
+        name=known.name,
+        kind=known.kind,
+        causes=list(known.causes),
+        remedies=list(known.remedies),
+        reset=known.reset,
+        source=known.source,
+    )
+
+
+def axis_state(bench: Bench, member: Member, now: Snapshot) -> models.AxisState:
+    """State of an axis."""
+    job = bench.jobs.moving(member.drive.id)
+    try:
+        name = cia402.MODE_NAMES[Mode(now.mode or 0)]
+    except ValueError:
+        name = f"Mode {now.mode}"
+    value = now.values.get
+    return models.AxisState(
+        drive=member.drive.id,
+        time=moment(now.time),
+        fresh=now.fresh,
+        problem=now.problem,
+        state=now.state.value,
+        status_word=now.status_word,
+        mode=now.mode,
+        mode_name=name,
+        modes=list(member.drive.profile.supported_modes),
+        goals=[goal.value for goal in cia402.allowed_goals(now.state)] if now.fresh else [],
+        target_reached=now.target_reached,
+        internal_limit=now.internal_limit,
+        mode_bits=now.mode_bits,
+        position=value("position"),
+        velocity=value("velocity"),
+        torque=value("torque"),
+        following_error=value("following_error"),
+        dc_voltage=value("dc_voltage"),
+        temperature=value("temperature"),
+        units=now.units,
+        faults=[fault(known) for known in now.faults],
+        blocked_by=list(now.blocked_by),
+        moving_job=job.id if job else None,
+    )
+
+
+def reading(drive: Drive, key: str) -> models.ParameterValue:
+    """What the drive said last of a parameter."""
+    last = drive.readings.get(key) or Reading(key, None, None, None)
+    return models.ParameterValue(
+        key=key,
+        raw=last.raw,
+        value=last.value,
+        time=moment(last.time) if last.time else None,
+        error=last.error,
+        unsaved=key in drive.unsaved,
+        pending=drive.pending.get(key, ""),
+    )
+
+
+def readings(drive: Drive, keys: list[str]) -> list[models.ParameterValue]:
+    """Like `reading` for many, with the marks computed once."""
+    unsaved, pending = drive.unsaved, drive.pending
+    result = []
+    for key in keys:
+        last = drive.readings.get(key) or Reading(key, None, None, None)
+        result.append(
+            models.ParameterValue.model_construct(
+                key=key,
+                raw=last.raw,
+                value=last.value,
+                time=moment(last.time) if last.time else None,
+                error=last.error,
+                unsaved=key in unsaved,
+                pending=pending.get(key, ""),
+            )
+        )
+    return result
+
+
+def parameter_row(
+    drive: Drive, parameter: Parameter, last: models.ParameterValue
+) -> models.ParameterRow:
+    """Description and value of a parameter."""
+    why = drive.unreachable_why(parameter)
+    return models.ParameterRow.model_construct(
+        key=parameter.key,
+        number=parameter.number,
+        name=parameter.name,
+        group=parameter.group,
+        type=parameter.type,
+        access=parameter.access,
+        pdo=parameter.pdo,
+        unit=parameter.unit,
+        scale=parameter.scale,
+        offset=parameter.offset,
+        min_raw=parameter.raw_limits[0],
+        max_raw=parameter.raw_limits[1],
+        default_raw=parameter.default_raw,
+        enum=parameter.enum,
+        bits=parameter.bits,
+        effective=parameter.effective,
+        settable=parameter.settable,
+        motor_individual=parameter.motor_individual,
+        help=parameter.help,
+        source=parameter.source,
+        also_printed=list(parameter.also_printed),
+        notes=parameter.notes,
+        reachable=not why,
+        unreachable_why=why,
+        reading=last,
+    )
+
+
+def procedure(known: Procedure) -> models.ProcedureInfo:
+    """A procedure of the profile."""
+    return models.ProcedureInfo(
+        name=known.name,
+        title=known.title,
+        help=known.help,
+        warning=known.warning,
+        requires_stop=known.requires_stop,
+        confirm=[step.text for step in known.steps if isinstance(step, ConfirmStep)],
+        steps=describe(known),
+        source=known.source,
+        notes=known.notes,
+    )
+
+
+def job(known: Job) -> models.JobInfo:
+    """A job."""
+    return models.JobInfo(
+        id=known.id,
+        kind=known.kind,
+        drive=known.drive,
+        title=known.title,
+        state=known.state,
+        progress=known.progress.fraction,
+        step=known.progress.step,
+        started=moment(known.started),
+        ended=moment(known.ended) if known.ended else None,
+        motion=known.motion,
+        result=known.result,
+        problem=problem_of(known.error) if known.error else None,
+    )
+
+
+def found_drive(bench: Bench, url: str, kind: str, found: Found) -> models.FoundDrive:
+    """A drive seen by a scan."""
+    user = next(
+        (
+            member.drive.id
+            for member in bench.members.values()
+            for port in member.drive.ports
+            if bench.url_of(port) == url and port.station == found.station
+        ),
+        None,
+    )
+    return models.FoundDrive(
+        url=url,
+        station=found.station,
+        vendor_id=found.vendor_id,
+        product_code=found.product_code,
+        revision=found.revision,
+        serial=found.serial,
+        name=found.name,
+        alias=found.alias,
+        hardware=found.hardware,
+        firmware=found.firmware,
+        state=found.state,
+        notes=list(found.notes),
+        matches=[
+            models.ProfileMatch(
+                profile=match.profile.drive,
+                title=match.profile.title,
+                confidence=match.confidence,
+                why=match.why,
+            )
+            for match in match_profiles(kind, found)
+        ],
+        connected_as=user,
+    )
+
+
+def difference(row: Difference) -> models.DiffRow:
+    """One row of a comparison."""
+    known = row.parameter
+
+    def value(raw: int | float | str | None) -> int | float | str | None:
+        if raw is None or known is None:
+            return raw
+        return raw if isinstance(raw, str) else known.to_value(raw)
+
+    default = known.default_raw if known else None
+    return models.DiffRow(
+        key=row.key,
+        name=known.name if known else "",
+        group=known.group if known else "",
+        unit=known.unit if known else "",
+        file_raw=row.theirs,
+        file_value=value(row.theirs),
+        drive_raw=row.ours,
+        drive_value=value(row.ours),
+        default_raw=default,
+        default_value=value(default),
+        status=row.status,
+        problem=row.problem,
+        motor_individual=bool(known and known.motor_individual),
+        selected=row.selected,
+    )
+
+
+def log_entry(entry: Entry) -> models.LogEntry:
+    """A line of the log."""
+    return models.LogEntry(
+        time=moment(entry.time),
+        level=entry.level,
+        drive=entry.drive,
+        person=entry.person,
+        text=entry.text,
+    )

@@ -1,0 +1,138 @@
+"""The one place where errors become HTTP answers (RFC 9457 problem details)."""
+
+from __future__ import annotations
+
+import logging
+
+from fastapi import FastAPI, Request
+from fastapi.encoders import jsonable_encoder
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+from backend.api.models import Problem
+from drivers.errors import (
+    Busy,
+    DriveError,
+    LinkLost,
+    LinkTimeout,
+    NotAllowed,
+    OutOfRange,
+    ProtocolError,
+    Rejected,
+)
+
+log = logging.getLogger(__name__)
+
+STATUS: dict[type[DriveError], int] = {
+    OutOfRange: 422,
+    Rejected: 422,
+    NotAllowed: 409,
+    Busy: 409,
+    ProtocolError: 502,
+    LinkLost: 503,
+    LinkTimeout: 504,
+}
+
+_TITLES = {
+    "link-timeout": "No answer in time",
+    "link-lost": "The link is gone",
+    "protocol-error": "The answer makes no sense",
+    "rejected": "The drive refused",
+    "out-of-range": "Value out of range",
+    "not-allowed": "Not possible now",
+    "busy": "In use",
+    "bad-parameter-set": "Not a usable parameter set",
+    "storage-failed": "Could not be stored",
+    "restore-failed": "Not everything was restored",
+    "not-found": "Not found",
+}
+
+
+class NotFound(NotAllowed):
+    """The address names nothing that exists."""
+
+    kind = "not-found"
+
+
+def problem_of(error: Exception) -> Problem:
+    """Problem details of any error. What is not a DriveError is ours, and says so."""
+    if not isinstance(error, DriveError):
+        return Problem(
+            type="urn:servodeck:internal",
+            title="Internal error",
+            status=500,
+            detail=f"{type(error).__name__}: {error}",
+            remedy="this is a defect of servodeck; report it with the log",
+        )
+    status = 404 if isinstance(error, NotFound) else _status(error)
+    value = error.value if isinstance(error.value, (int, float, str)) else None
+    return Problem(
+        type=f"urn:servodeck:{error.kind}",
+        title=_TITLES.get(error.kind, "Drive error"),
+        status=status,
+        detail=error.message,
+        drive=error.drive,
+        parameter=error.parameter,
+        value=value,
+        limit=error.limit,
+        remedy=error.remedy,
+        code=error.code if isinstance(error, Rejected) else None,
+    )
+
+
+def _status(error: DriveError) -> int:
+    return next((code for kind, code in STATUS.items() if isinstance(error, kind)), 500)
+
+
+def answer(problem: Problem) -> JSONResponse:
+    """A problem as an HTTP answer."""
+    return JSONResponse(
+        problem.model_dump(mode="json"),
+        status_code=problem.status,
+        media_type="application/problem+json",
+    )
+
+
+def install(app: FastAPI) -> None:
+    """Attach the handlers."""
+
+    @app.exception_handler(DriveError)
+    async def drive_error(_request: Request, error: DriveError) -> JSONResponse:
+        return answer(problem_of(error))
+
+    @app.exception_handler(RequestValidationError)
+    async def bad_request(_request: Request, error: RequestValidationError) -> JSONResponse:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        return answer(
+            Problem(
+                type="urn:servodeck:bad-request",
+                title="Bad request",
+                status=422,
+                detail=f"{place}: {first['msg']}",
+                parameter=place,
+                value=_scalar(jsonable_encoder(first.get("input"), custom_encoder={bytes: repr})),
+                remedy="see /api/v1/openapi.json for what this address takes",
+            )
+        )
+
+    @app.exception_handler(HTTPException)
+    async def http_error(_request: Request, error: HTTPException) -> JSONResponse:
+        return answer(
+            Problem(
+                type="urn:servodeck:http",
+                title="Request failed",
+                status=error.status_code,
+                detail=str(error.detail),
+            )
+        )
+
+    @app.exception_handler(Exception)
+    async def internal(request: Request, error: Exception) -> JSONResponse:
+        log.exception("unhandled error at %s %s", request.method, request.url.path, exc_info=error)
+        return answer(problem_of(error))
+
+
+def _scalar(value: object) -> int | float | str | None:
+    return value if isinstance(value, (int, float, str)) else None

@@ -1,0 +1,191 @@
+"""Routes of the station: interfaces, buses, scan, drives, jobs, log, STOP."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+import backend
+from backend.api import convert
+from backend.api.context import Connection, Controlled, TheBench, TheMember
+from backend.api.errors import NotFound
+from backend.api.models import (
+    Bus,
+    ConnectRequest,
+    DriveSummary,
+    DriveUpdate,
+    Health,
+    Interfaces,
+    JobInfo,
+    LogEntry,
+    ProfileInfo,
+    ScanRequest,
+    Session,
+    StopRequest,
+    StopResult,
+)
+from backend.interfaces import list_interfaces
+from backend.jobs import Job, JobResult, Progress
+from drivers.link import Found
+from profiles import load_all
+
+router = APIRouter()
+
+
+@router.get("/health")
+async def health(bench: TheBench) -> Health:
+    """Whether the server is alive."""
+    now = convert.moment(backend.now())
+    return Health(version=backend.__version__, time=now, demo=bool(bench.aliases))
+
+
+@router.get("/session")
+async def session() -> Session:
+    """Who is asking. On loopback the one user of the machine is administrator."""
+    return Session(person="local user", role="administrator", login_required=False)
+
+
+@router.get("/interfaces")
+async def interfaces(bench: TheBench) -> Interfaces:
+    """What this machine can connect through."""
+    return list_interfaces(list(bench.aliases))
+
+
+@router.get("/profiles")
+async def profiles() -> list[ProfileInfo]:
+    """Profiles that servodeck brings."""
+    return [
+        ProfileInfo(
+            profile=p.drive,
+            title=p.title,
+            maker=p.identity.maker,
+            partial=p.partial,
+            links=[spec.kind for spec in p.links],
+            parameters=len(p.parameters),
+        )
+        for p in load_all().values()
+    ]
+
+
+@router.get("/buses")
+async def buses(bench: TheBench) -> list[Bus]:
+    """Opened buses with their counters."""
+    return [
+        Bus(url=url, kind=link.kind, quality=convert.quality(link.quality()))
+        for url, link in bench.links.items()
+    ]
+
+
+@router.delete("/buses", status_code=204)
+async def close_bus(bench: TheBench, url: Annotated[str, Query()]) -> Response:
+    """Close a bus that no drive uses."""
+    await bench.close_link(url)
+    return Response(status_code=204)
+
+
+@router.post("/scan", status_code=202)
+async def scan(bench: TheBench, request: ScanRequest) -> JobInfo:
+    """Look for drives; the job's result is ``{"found": [FoundDrive]}``."""
+
+    async def work(progress: Progress) -> JobResult:
+        seen: list[Found] = await bench.scan(request.url, request.stations, progress)
+        kind = (await bench.link(request.url)).kind
+        drives = [convert.found_drive(bench, request.url, kind, found) for found in seen]
+        return {"found": [drive.model_dump(mode="json") for drive in drives]}
+
+    return convert.job(bench.jobs.start("scan", f"Scan {request.url}", work))
+
+
+@router.get("/drives")
+async def drives(bench: TheBench, connection: Connection = None) -> list[DriveSummary]:
+    """Drives of the bench."""
+    return [convert.drive_summary(bench, m, connection) for m in bench.members.values()]
+
+
+@router.post("/drives", status_code=201)
+async def connect(bench: TheBench, request: ConnectRequest) -> DriveSummary:
+    """Make a station a drive of the bench. Its identity is asked for first."""
+    link = await bench.link(request.url)
+    seen = await link.scan(lambda _fraction, _step: None, [request.station])
+    found = next((f for f in seen if f.station == request.station), None)
+    member = await bench.connect(
+        request.url, request.station, request.profile, request.name, found=found
+    )
+    await member.monitor.refresh()
+    return convert.drive_summary(bench, member)
+
+
+@router.get("/drives/{drive_id}")
+async def drive(bench: TheBench, member: TheMember, connection: Connection = None) -> DriveSummary:
+    """One drive."""
+    return convert.drive_summary(bench, member, connection)
+
+
+@router.patch("/drives/{drive_id}")
+async def update_drive(
+    bench: TheBench, member: Controlled, change: DriveUpdate, connection: Connection = None
+) -> DriveSummary:
+    """Change name or notes."""
+    bench.rename(member.drive.id, change.name, change.notes)
+    return convert.drive_summary(bench, member, connection)
+
+
+@router.delete("/drives/{drive_id}", status_code=204)
+async def remove_drive(bench: TheBench, member: Controlled) -> Response:
+    """Take a drive off the bench."""
+    await bench.remove(member.drive.id)
+    return Response(status_code=204)
+
+
+def _job(bench: TheBench, job_id: str) -> Job:
+    job = bench.jobs.get(job_id)
+    if job is None:
+        raise NotFound(f"there is no job {job_id!r}", value=job_id)
+    return job
+
+
+@router.get("/jobs")
+async def jobs(bench: TheBench) -> list[JobInfo]:
+    """Jobs of this session, oldest first."""
+    return [convert.job(job) for job in bench.jobs.all()]
+
+
+@router.get("/jobs/{job_id}")
+async def job(bench: TheBench, job_id: str) -> JobInfo:
+    """One job."""
+    return convert.job(_job(bench, job_id))
+
+
+@router.delete("/jobs/{job_id}")
+async def cancel_job(bench: TheBench, job_id: str, connection: Connection = None) -> JobInfo:
+    """Cancel a job and wait for its cleanup."""
+    found = _job(bench, job_id)
+    if found.drive is not None and not found.motion:
+        bench.leases.require(found.drive, connection)
+    await bench.jobs.cancel(found)
+    return convert.job(found)
+
+
+@router.post("/stop")
+async def stop(bench: TheBench, request: StopRequest) -> StopResult:
+    """STOP: always allowed, for everyone."""
+    wanted = [request.drive] if request.drive is not None else list(bench.members)
+    known = [drive_id for drive_id in wanted if drive_id in bench.members]
+    problems = await bench.stop(known)
+    bench.journal.add("STOP", level="warning", drive=request.drive)
+    failed = {drive_id: text for drive_id, text in problems.items() if text}
+    failed |= {drive_id: "not on this bench" for drive_id in wanted if drive_id not in known}
+    return StopResult(stopped=[d for d in known if d not in failed], failed=failed)
+
+
+@router.get("/log")
+async def log(bench: TheBench) -> list[LogEntry]:
+    """The tool's log, newest first."""
+    return [convert.log_entry(entry) for entry in bench.journal.entries()]
+
+
+@router.get("/drives/{drive_id}/log")
+async def drive_log(bench: TheBench, member: TheMember) -> list[LogEntry]:
+    """The log of one drive, newest first."""
+    return [convert.log_entry(entry) for entry in bench.journal.entries(member.drive.id)]

@@ -1,0 +1,348 @@
+"""Routes of one drive: state, parameters, procedures, motion."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+
+from backend.api import convert
+from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.errors import NotFound, problem_of
+from backend.api.models import (
+    ActiveFault,
+    AxisState,
+    HomeRequest,
+    HomingMethodInfo,
+    JobInfo,
+    LoadSetRequest,
+    MoveRequest,
+    ParameterRow,
+    ParameterValue,
+    ParameterWrite,
+    ParameterWrites,
+    ProcedureInfo,
+    ProcedureRequest,
+    ReadAllRequest,
+    SequenceRequest,
+    TransitionRequest,
+    WriteResult,
+)
+from backend.axis import Envelope
+from backend.bench import Member
+from backend.drive import Reading
+from backend.tools import homing, move, parameters, procedures
+from drivers.cia402 import Mode, State
+from drivers.errors import Busy, DriveError, NotAllowed, OutOfRange
+
+router = APIRouter(prefix="/drives/{drive_id}")
+
+#: Speed limit of an envelope whose request names no speed: margin over the drive's own limits.
+_SPEED_UNLIMITED_RPM = 20_000.0
+
+
+@router.get("/state")
+async def state(bench: TheBench, member: TheMember) -> AxisState:
+    """State of the axis, read now."""
+    return convert.axis_state(bench, member, await member.monitor.refresh())
+
+
+@router.get("/faults")
+async def faults(member: TheMember) -> list[ActiveFault]:
+    """Faults and warnings that are present, read now."""
+    return [convert.fault(fault) for fault in await member.axis.active_faults()]
+
+
+@router.post("/transition")
+async def transition(bench: TheBench, member: Controlled, request: TransitionRequest) -> AxisState:
+    """Drive the power state machine. Enabling aims the set-point at where the axis stands."""
+    _require_idle(bench, member)
+    goal = State(request.goal)
+    axis = member.axis
+    axis.stopped = False
+    if request.mode is not None:
+        await axis.set_mode(_mode(member, request.mode))
+    if goal is State.OPERATION_ENABLED:
+        await axis.aim_here()
+    await axis.go_to(goal)
+    bench.journal.add(f"{member.drive.name}: {goal.value}", drive=member.drive.id)
+    return convert.axis_state(bench, member, await member.monitor.refresh())
+
+
+def _mode(member: Member, number: int) -> Mode:
+    try:
+        return Mode(number)
+    except ValueError as error:
+        raise OutOfRange(
+            f"{member.drive.name} has no mode {number}",
+            drive=member.drive.name,
+            value=number,
+            limit=", ".join(str(mode) for mode in member.drive.profile.supported_modes),
+            remedy="choose one of its modes",
+        ) from error
+
+
+def _require_idle(bench: TheBench, member: Member) -> None:
+    if (job := bench.jobs.moving(member.drive.id)) is not None:
+        raise Busy(
+            f"{member.drive.name} is moved by {job.title!r}",
+            drive=member.drive.name,
+            remedy="wait for it to end, or stop it",
+        )
+
+
+@router.post("/fault-reset")
+async def fault_reset(bench: TheBench, member: Controlled) -> AxisState:
+    """Reset faults whose cause is gone."""
+    await member.axis.reset_fault()
+    bench.journal.add(f"{member.drive.name}: fault reset", drive=member.drive.id)
+    return convert.axis_state(bench, member, await member.monitor.refresh())
+
+
+# --- parameters -----------------------------------------------------------------------
+
+
+@router.get("/parameters")
+async def list_parameters(member: TheMember) -> list[ParameterRow]:
+    """All parameters with their last readings; nothing is read from the drive."""
+    drive = member.drive
+    last = convert.readings(drive, [p.key for p in drive.profile.parameters])
+    return [
+        convert.parameter_row(drive, parameter, value)
+        for parameter, value in zip(drive.profile.parameters, last, strict=True)
+    ]
+
+
+@router.put("/parameters")
+async def write_parameters(
+    bench: TheBench, member: Controlled, request: ParameterWrites
+) -> list[WriteResult]:
+    """Write several, one after the other; a failure does not stop the rest."""
+    results: list[WriteResult] = []
+    for key, value in request.values.items():
+        try:
+            await _write(bench, member, key, value)
+            problem = None
+        except DriveError as error:
+            problem = problem_of(error)
+        known = member.drive.profile.parameter(key)
+        last = convert.reading(member.drive, known.key if known else key)
+        results.append(WriteResult(key=key, ok=problem is None, reading=last, problem=problem))
+    return results
+
+
+@router.get("/parameters/{key}")
+async def read_parameter(member: TheMember, key: str) -> ParameterValue:
+    """Read one parameter from the drive."""
+    _require_known(member, key)
+    reading = await member.drive.read(key)
+    return convert.reading(member.drive, reading.key)
+
+
+@router.put("/parameters/{key}")
+async def write_parameter(
+    bench: TheBench, member: Controlled, key: str, request: ParameterWrite
+) -> ParameterValue:
+    """Write one parameter and read it back."""
+    _require_known(member, key)
+    reading = await _write(bench, member, key, request)
+    return convert.reading(member.drive, reading.key)
+
+
+def _require_known(member: Member, key: str) -> None:
+    if member.drive.profile.parameter(key) is None:
+        raise NotFound(
+            f"{member.drive.name} has no parameter {key}",
+            drive=member.drive.name,
+            parameter=key,
+            remedy="keys look like 6040:00; see GET …/parameters",
+        )
+
+
+async def _write(bench: TheBench, member: Member, key: str, request: ParameterWrite) -> Reading:
+    drive = member.drive
+    if (request.raw is None) == (request.value is None):
+        raise OutOfRange(
+            f"{drive.name}: {key}: give either raw or value",
+            drive=drive.name,
+            parameter=key,
+            remedy="send exactly one of the two",
+        )
+    parameter = drive.parameter(key)
+    if bench.jobs.moving(drive.id) is not None and drive.commands_motion(parameter.key):
+        _require_idle(bench, member)
+    old = drive.readings.get(parameter.key)
+    if request.raw is not None:
+        reading = await drive.write(key, request.raw)
+    else:
+        reading = await drive.write(key, request.value if request.value is not None else 0,
+                                    raw=False)  # fmt: skip
+    bench.journal.add(
+        f"{drive.name}: {parameter.key} {parameter.name}: "
+        f"{old.value if old else 'not read'} → {reading.value} {parameter.unit}".rstrip(),
+        drive=drive.id,
+    )
+    if parameter.key in drive.profile.unit_keys:
+        member.axis.forget()
+    return reading
+
+
+# --- procedures and jobs --------------------------------------------------------------
+
+
+@router.get("/procedures")
+async def list_procedures(member: TheMember) -> list[ProcedureInfo]:
+    """Named sequences of this family."""
+    return [convert.procedure(known) for known in member.drive.profile.procedures]
+
+
+@router.post("/procedures/{name}", status_code=202)
+async def run_procedure(
+    bench: TheBench, member: Controlled, name: str, request: ProcedureRequest
+) -> JobInfo:
+    """Carry out a procedure."""
+    known = member.drive.profile.procedure(name)
+    if known is None:
+        raise NotFound(
+            f"{member.drive.name} has no procedure {name!r}",
+            drive=member.drive.name,
+            value=name,
+            remedy="see GET …/procedures",
+        )
+    _require_idle(bench, member)
+    job = bench.jobs.start(
+        "procedure",
+        f"{known.title}: {member.drive.name}",
+        lambda progress: procedures.run_procedure(member.axis, known, request.confirmed, progress),
+        drive=member.drive.id,
+        motion=True,
+    )
+    bench.journal.add(f"{member.drive.name}: {known.title}", drive=member.drive.id)
+    return convert.job(job)
+
+
+@router.post("/jobs/read_all", status_code=202)
+async def read_all(bench: TheBench, member: TheMember, request: ReadAllRequest) -> JobInfo:
+    """Read parameters; values go out over the websocket as they arrive."""
+    for key in request.keys or []:
+        _require_known(member, key)
+    job = bench.jobs.start(
+        "read_all",
+        f"Read {member.drive.name}",
+        lambda progress: parameters.read_all(member.drive, request.keys, progress),
+        drive=member.drive.id,
+    )
+    return convert.job(job)
+
+
+@router.post("/jobs/load_set", status_code=202)
+async def load_set(bench: TheBench, member: Controlled, request: LoadSetRequest) -> JobInfo:
+    """Write chosen rows of a parameter set, each read back."""
+    _require_idle(bench, member)
+    content = bench.sets.load(request.file)
+    job = bench.jobs.start(
+        "load_set",
+        f"Load {request.file} into {member.drive.name}",
+        lambda progress: parameters.load_set(
+            member.drive,
+            content,
+            request.keys,
+            progress,
+            library=bench.sets,
+            accept_other_identity=request.accept_other_identity,
+        ),
+        drive=member.drive.id,
+    )
+    bench.journal.add(f"{member.drive.name}: load {request.file}", drive=member.drive.id)
+    return convert.job(job)
+
+
+@router.post("/jobs/move", status_code=202)
+async def start_move(bench: TheBench, member: Controlled, request: MoveRequest) -> JobInfo:
+    """One move in a profile mode."""
+    speed = request.speed or (abs(request.target) if request.mode == "PV" else None)
+    settings = move.MoveSettings(
+        mode=request.mode,
+        target=request.target,
+        envelope=Envelope(
+            request.travel_limit,
+            speed or _SPEED_UNLIMITED_RPM,
+            request.torque_limit,
+            request.timeout_s,
+        ),
+        relative=request.relative,
+        speed_rpm=request.speed,
+        acceleration_rpm_s=request.acceleration,
+        deceleration_rpm_s=request.deceleration,
+        consent=request.consent,
+    )
+    job = bench.jobs.start(
+        "move",
+        f"Move {member.drive.name} ({request.mode})",
+        lambda progress: move.move(member.axis, settings, progress),
+        drive=member.drive.id,
+        motion=True,
+    )
+    return convert.job(job)
+
+
+@router.post("/jobs/sequence", status_code=202)
+async def start_sequence(bench: TheBench, member: Controlled, request: SequenceRequest) -> JobInfo:
+    """Back and forth between two positions."""
+    settings = move.SequenceSettings(
+        first=request.first,
+        second=request.second,
+        speed_rpm=request.speed,
+        acceleration_rpm_s=request.acceleration,
+        dwell_s=request.dwell_s,
+        count=request.count,
+        envelope=Envelope(request.travel_limit, request.speed, request.torque_limit, 60.0),
+    )
+    job = bench.jobs.start(
+        "sequence",
+        f"Back and forth: {member.drive.name}",
+        lambda progress: move.sequence(member.axis, settings, progress),
+        drive=member.drive.id,
+        motion=True,
+    )
+    return convert.job(job)
+
+
+@router.get("/homing-methods")
+async def homing_methods(member: TheMember) -> list[HomingMethodInfo]:
+    """Homing methods of this family."""
+    return [
+        HomingMethodInfo(**known.model_dump(exclude={"parameters"}))
+        for known in member.drive.profile.homing_methods
+    ]
+
+
+@router.post("/jobs/home", status_code=202)
+async def start_homing(bench: TheBench, member: Controlled, request: HomeRequest) -> JobInfo:
+    """Home the axis."""
+    settings = homing.HomingSettings(
+        method=request.method,
+        envelope=Envelope(
+            request.travel_limit,
+            request.speed_switch or _SPEED_UNLIMITED_RPM,
+            request.torque_limit,
+            request.timeout_s,
+        ),
+        speed_switch_rpm=request.speed_switch,
+        speed_zero_rpm=request.speed_zero,
+        acceleration_rpm_s=request.acceleration,
+        offset_rev=request.offset,
+    )
+    if request.method not in {m.method for m in member.drive.profile.homing_methods}:
+        raise NotAllowed(
+            f"{member.drive.name} has no homing method {request.method}",
+            drive=member.drive.name,
+            value=request.method,
+            remedy="see GET …/homing-methods",
+        )
+    job = bench.jobs.start(
+        "home",
+        f"Home {member.drive.name} (method {request.method})",
+        lambda progress: homing.home(member.axis, settings, progress),
+        drive=member.drive.id,
+        motion=True,
+    )
+    return convert.job(job)

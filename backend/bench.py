@@ -1,0 +1,361 @@
+"""The bench: opened buses, the drives on them, and everything that watches over them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from backend.access import Leases
+from backend.axis import Axis
+from backend.drive import Drive, Port, Reading
+from backend.files import write_atomically
+from backend.jobs import Job, JobRunner, Progress
+from backend.journal import Journal
+from backend.library import SetLibrary
+from backend.monitor import Monitor, Snapshot
+from backend.scope import ScopeHub
+from drivers.errors import Busy, DriveError, NotAllowed
+from drivers.link import Found, Link, LinkEvent
+from drivers.urls import open_link
+from profiles import load_all, load_profile
+from profiles.schema import Profile
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """A profile that fits a found drive. Confidence: certain, likely or possible."""
+
+    profile: Profile
+    confidence: Literal["certain", "likely", "possible"]
+    why: str
+
+
+def match_profiles(kind: str, found: Found) -> list[Match]:
+    """Profiles that fit what a scan saw, best first."""
+    matches: list[Match] = []
+    for profile in load_all().values():
+        if profile.link(kind) is None:
+            continue
+        identity = profile.identity
+        if identity.vendor_id is not None and found.vendor_id is not None:
+            if identity.vendor_id != found.vendor_id:
+                continue
+            if identity.product_code is not None and identity.product_code == found.product_code:
+                matches.append(Match(profile, "certain", "vendor and product code agree"))
+            else:
+                matches.append(Match(profile, "likely", "the vendor agrees"))
+            continue
+        if any(re.search(p, found.name, re.IGNORECASE) for p in identity.name_patterns):
+            matches.append(Match(profile, "likely", f"its name {found.name!r} fits"))
+        else:
+            text = f"it answers over {kind}; the manual prints no identity to compare"
+            matches.append(Match(profile, "possible", text))
+    order = ("certain", "likely", "possible")
+    return sorted(matches, key=lambda m: order.index(m.confidence))
+
+
+class Member:
+    """A drive of the bench with its axis and monitor."""
+
+    def __init__(self, drive: Drive, axis: Axis, monitor: Monitor) -> None:
+        self.drive = drive
+        self.axis = axis
+        self.monitor = monitor
+
+
+class Bench:
+    """Buses and drives of one server.
+
+    ``aliases`` maps addresses such as ``mlink://virtual0`` to the URL behind them.
+    ``state_folder`` keeps the list of drives over restarts and the parameter sets.
+    """
+
+    def __init__(self, state_folder: Path, aliases: Mapping[str, str] | None = None) -> None:
+        self.aliases = dict(aliases or {})
+        self.journal = Journal()
+        self.sets = SetLibrary(state_folder / "sets")
+        self.members: dict[str, Member] = {}
+        self.links: dict[str, Link] = {}
+        self.on_snapshot: list[Callable[[str, Snapshot], None]] = []
+        self.on_readings: list[Callable[[str, list[Reading]], None]] = []
+        self.on_job: list[Callable[[Job], None]] = []
+        self.on_drives: list[Callable[[], None]] = []
+        self.jobs = JobRunner(self._job_changed)
+        self.leases = Leases(lambda _drive: self._drives_changed())
+        self.scope = ScopeHub(lambda drive: self.member(drive).axis)
+        self._config = state_folder / "bench.json"
+        self._opening = asyncio.Lock()
+
+    # --- buses ------------------------------------------------------------------------
+
+    async def link(self, url: str) -> Link:
+        """The opened bus of this URL; opens it on first use.
+
+        Raises:
+            LinkLost: it cannot be opened. NotAllowed: no such kind of bus.
+        """
+        async with self._opening:
+            link = self.links.get(url)
+            if link is None:
+                link = open_link(self.aliases.get(url, url))
+                await link.open()
+                link.listen(lambda event: self._bus_event(url, event))
+                self.links[url] = link
+                self.journal.add(f"opened {url}")
+                self._drives_changed()
+            return link
+
+    async def close_link(self, url: str) -> None:
+        """Close a bus that no drive uses.
+
+        Raises:
+            Busy: drives use it. NotAllowed: it is not open.
+        """
+        users = [m.drive.name for m in self.members.values() if url in self._urls(m.drive)]
+        if users:
+            raise Busy(f"{url} is used by {', '.join(users)}", remedy="remove these drives first")
+        link = self.links.pop(url, None)
+        if link is None:
+            raise NotAllowed(f"{url} is not open", value=url)
+        await link.close()
+        self._drives_changed()
+
+    def _urls(self, drive: Drive) -> list[str]:
+        return [url for url, link in self.links.items() if any(p.link is link for p in drive.ports)]
+
+    def url_of(self, port: Port) -> str:
+        """The URL a port was opened by, as the user knows it."""
+        return next((u for u, link in self.links.items() if link is port.link), port.link.url)
+
+    async def scan(
+        self, url: str, stations: Sequence[int] | None, progress: Progress
+    ) -> list[Found]:
+        """Look for drives on a bus.
+
+        Raises:
+            LinkLost: the bus cannot be opened.
+        """
+        link = await self.link(url)
+        found = await link.scan(progress, stations)
+        self.journal.add(f"{url}: found {len(found)} drives")
+        return found
+
+    def _bus_event(self, url: str, event: LinkEvent) -> None:
+        drive = next(
+            (
+                m.drive
+                for m in self.members.values()
+                for p in m.drive.ports
+                if self.url_of(p) == url and event.station in (None, p.station)
+            ),
+            None,
+        )
+        self.journal.add(
+            f"{url}: {event.text}",
+            level="info" if event.kind in ("boot", "back", "state") else "warning",
+            drive=drive.id if drive else None,
+        )
+        if drive is not None and event.kind in ("boot", "back"):
+            self._returned(drive.id)
+
+    # --- drives -----------------------------------------------------------------------
+
+    def member(self, drive_id: str) -> Member:
+        """The drive of this id.
+
+        Raises:
+            NotAllowed: there is none.
+        """
+        member = self.members.get(drive_id)
+        if member is None:
+            raise NotAllowed(
+                f"there is no drive {drive_id!r} on this bench",
+                drive=drive_id,
+                remedy="connect it on the Connect page",
+            )
+        return member
+
+    async def connect(
+        self, url: str, station: int, profile: str, name: str = "", *, found: Found | None = None
+    ) -> Member:
+        """Make a station a drive of the bench.
+
+        Raises:
+            Busy: another drive uses this station. LinkLost: the bus cannot be opened.
+        """
+        link = await self.link(url)
+        for member in self.members.values():
+            if any(p.link is link and p.station == station for p in member.drive.ports):
+                raise Busy(
+                    f"{url} station {station} is already connected as {member.drive.name}",
+                    drive=member.drive.name,
+                    remedy="use that drive, or remove it first",
+                )
+        facts = load_profile(profile)
+        spec = facts.link(link.kind)
+        drive_id = self._new_id(name or f"{profile}-{station}")
+        drive = Drive(drive_id, name or drive_id, facts, [Port(link, station, spec)])
+        drive.found = found
+        return self._add(drive)
+
+    def _add(self, drive: Drive) -> Member:
+        axis = Axis(drive)
+        drive_id = drive.id
+        monitor = Monitor(
+            axis,
+            self.journal,
+            lambda snapshot: self._snapshot(drive_id, snapshot),
+            lambda: self._returned(drive_id),
+        )
+        member = Member(drive, axis, monitor)
+        self.members[drive_id] = member
+        drive.listen(lambda readings: self._readings(drive_id, readings))
+        monitor.start()
+        self._save()
+        self.journal.add(f"connected {drive.name} ({drive.profile.title})", drive=drive_id)
+        self._drives_changed()
+        return member
+
+    async def remove(self, drive_id: str) -> None:
+        """Take a drive off the bench.
+
+        Raises:
+            Busy: it is moving.
+        """
+        member = self.member(drive_id)
+        if (job := self.jobs.moving(drive_id)) is not None:
+            raise Busy(
+                f"{member.drive.name} is moved by {job.title!r}",
+                drive=member.drive.name,
+                remedy="stop it first",
+            )
+        del self.members[drive_id]
+        await member.monitor.close()
+        self._save()
+        self._drives_changed()
+
+    def rename(self, drive_id: str, name: str | None, notes: str | None) -> Member:
+        """Change name or notes; None leaves them."""
+        member = self.member(drive_id)
+        if name is not None:
+            member.drive.name = name
+        if notes is not None:
+            member.drive.notes = notes
+        self._save()
+        self._drives_changed()
+        return member
+
+    def _new_id(self, name: str) -> str:
+        stem = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "drive"
+        number, drive_id = 2, stem
+        while drive_id in self.members:
+            drive_id, number = f"{stem}-{number}", number + 1
+        return drive_id
+
+    # --- stopping ---------------------------------------------------------------------
+
+    async def stop(self, drive_ids: Sequence[str]) -> dict[str, str]:
+        """Quick stop of these drives, all at once; motion jobs are cancelled.
+
+        The write does not wait for any job's cleanup. Returns drive id to problem, empty text
+        where the drive took the stop.
+        """
+
+        async def one(member: Member) -> str:
+            problem = ""
+            if (job := self.jobs.moving(member.drive.id)) is not None and job.task is not None:
+                # Cancelled before the write, so that it sends nothing after it but its cleanup.
+                job.task.cancel()
+            try:
+                await member.axis.stop()
+            except DriveError as error:
+                problem = error.message
+            member.monitor.hurry()
+            return problem
+
+        members = [self.member(drive_id) for drive_id in drive_ids]
+        problems = await asyncio.gather(*(one(member) for member in members))
+        return {m.drive.id: text for m, text in zip(members, problems, strict=True)}
+
+    # --- events -----------------------------------------------------------------------
+
+    def _snapshot(self, drive_id: str, snapshot: Snapshot) -> None:
+        for listener in self.on_snapshot:
+            listener(drive_id, snapshot)
+
+    def _readings(self, drive_id: str, readings: list[Reading]) -> None:
+        for listener in self.on_readings:
+            listener(drive_id, readings)
+
+    def _job_changed(self, job: Job) -> None:
+        for listener in self.on_job:
+            listener(job)
+
+    def _drives_changed(self) -> None:
+        for listener in self.on_drives:
+            listener()
+
+    def _returned(self, drive_id: str) -> None:
+        """A drive answers again: it may have restarted, so everything is read anew."""
+        member = self.members.get(drive_id)
+        if member is None:
+            return
+        keys = [key for key, r in member.drive.readings.items() if r.raw is not None]
+        member.drive.forget()
+        member.axis.forget()
+
+        async def reread(progress: Progress) -> dict[str, object]:
+            await member.drive.read_many(keys, progress)
+            return {"parameters": len(keys)}
+
+        if keys:
+            self.jobs.start("reread", f"Read {member.drive.name} anew", reread, drive=drive_id)
+
+    # --- over restarts ----------------------------------------------------------------
+
+    def _save(self) -> None:
+        drives = [
+            {
+                "name": m.drive.name,
+                "notes": m.drive.notes,
+                "profile": m.drive.profile.drive,
+                "ports": [{"url": self.url_of(p), "station": p.station} for p in m.drive.ports],
+                "serial": m.drive.found.serial if m.drive.found else None,
+            }
+            for m in self.members.values()
+        ]
+        text = json.dumps({"version": 1, "drives": drives}, indent=2, ensure_ascii=False)
+        write_atomically(self._config, text.encode())
+
+    async def restore(self) -> None:
+        """Connect the drives of the last session; those that cannot be are logged and kept out."""
+        try:
+            content = json.loads(self._config.read_text("utf-8"))
+        except FileNotFoundError:
+            return
+        except (OSError, ValueError) as error:
+            self.journal.add(f"{self._config.name} cannot be read: {error}", level="error")
+            return
+        for item in content.get("drives", []):
+            try:
+                port = item["ports"][0]
+                member = await self.connect(
+                    port["url"], port["station"], item["profile"], item["name"]
+                )
+                member.drive.notes = item.get("notes", "")
+            except (DriveError, KeyError, IndexError, TypeError) as error:
+                self.journal.add(f"{item}: not connected: {error}", level="warning")
+
+    async def close(self) -> None:
+        """Stop what moves, then let go of every bus."""
+        await self.jobs.close()
+        await self.scope.close()
+        await asyncio.gather(*(m.monitor.close() for m in self.members.values()))
+        await asyncio.gather(
+            *(link.close() for link in self.links.values()), return_exceptions=True
+        )

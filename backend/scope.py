@@ -1,0 +1,175 @@
+"""Delivers samples: cyclic blocks of a synchronous bus, or polled values with their own times.
+
+One sampler per drive reads the union of what its subscribers want, so that a second viewer
+costs the bus nothing. Every subscriber has one bounded queue; when it is full whole blocks are
+dropped and counted in the next one. A slow subscriber therefore never disturbs the bus or the
+others.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from backend.axis import Axis
+from backend.drive import Reading
+from drivers.errors import DriveError
+from drivers.link import ScopeBlock
+
+#: A block is handed over at least this often.
+FLUSH_S = 0.04
+#: Blocks that wait for a slow subscriber before dropping begins.
+QUEUE_BLOCKS = 50
+#: Pause between tries while the drive does not answer.
+RETRY_S = 0.25
+
+
+@dataclass(eq=False, slots=True)
+class Subscription:
+    """One stream of one drive's channels. ``wanted`` wakes the consumer."""
+
+    drive: str
+    keys: tuple[str, ...]
+    period_s: float
+    queue: deque[ScopeBlock] = field(default_factory=deque)
+    dropped: int = 0
+    sequence: int = 0
+    ready: asyncio.Event = field(default_factory=asyncio.Event)
+    due: float = 0.0
+    rows: list[list[float]] = field(default_factory=list)
+    times: list[float] = field(default_factory=list)
+    since: float = 0.0
+
+    def put(self, samples: np.ndarray[tuple[int, int], np.dtype[np.float64]], t0_s: float,
+            dt_s: float, times_s: np.ndarray[tuple[int], np.dtype[np.float64]] | None,
+            lost: int = 0) -> None:  # fmt: skip
+        """Queue a block, or count it as dropped."""
+        self.dropped += lost
+        if len(self.queue) >= QUEUE_BLOCKS:
+            self.dropped += len(samples)
+            return
+        self.sequence += 1
+        self.queue.append(
+            ScopeBlock(
+                sequence=self.sequence,
+                t0_s=t0_s,
+                dt_s=dt_s,
+                channels=self.keys,
+                samples=samples,
+                dropped=self.dropped,
+                times_s=times_s,
+            )
+        )
+        self.dropped = 0
+        self.ready.set()
+
+    async def next(self) -> ScopeBlock:
+        """The next block, waiting for it."""
+        while not self.queue:
+            self.ready.clear()
+            await self.ready.wait()
+        return self.queue.popleft()
+
+
+class ScopeHub:
+    """Samplers of all drives. ``axis_of`` finds the axis of a drive id."""
+
+    def __init__(self, axis_of: Callable[[str], Axis]) -> None:
+        self._axis_of = axis_of
+        self._samplers: dict[str, _Sampler] = {}
+
+    def subscribe(self, drive: str, keys: Sequence[str], period_s: float) -> Subscription:
+        """Begin to sample ``keys`` of a drive, at least ``period_s`` apart (0: as fast as it goes).
+
+        Raises:
+            NotAllowed: a key that the drive does not have or that no port carries.
+        """
+        axis = self._axis_of(drive)
+        for key in keys:
+            axis.drive.port_for(axis.drive.parameter(key))
+        subscription = Subscription(drive, tuple(keys), period_s)
+        sampler = self._samplers.get(drive)
+        if sampler is None:
+            sampler = self._samplers[drive] = _Sampler(axis)
+        sampler.add(subscription)
+        return subscription
+
+    async def unsubscribe(self, subscription: Subscription) -> None:
+        """End a stream; the sampler ends with its last one."""
+        sampler = self._samplers.get(subscription.drive)
+        if sampler is not None and sampler.remove(subscription):
+            del self._samplers[subscription.drive]
+            await sampler.close()
+
+    async def close(self) -> None:
+        """End all streams."""
+        samplers, self._samplers = list(self._samplers.values()), {}
+        await asyncio.gather(*(sampler.close() for sampler in samplers))
+
+
+class _Sampler:
+    """Polls one drive for all its subscribers."""
+
+    def __init__(self, axis: Axis) -> None:
+        self._axis = axis
+        self._subscriptions: list[Subscription] = []
+        self._task = asyncio.create_task(self._run(), name=f"scope-{axis.drive.id}")
+
+    def add(self, subscription: Subscription) -> None:
+        self._subscriptions.append(subscription)
+
+    def remove(self, subscription: Subscription) -> bool:
+        """Returns whether none is left."""
+        with contextlib.suppress(ValueError):
+            self._subscriptions.remove(subscription)
+        return not self._subscriptions
+
+    async def close(self) -> None:
+        self._task.cancel()
+        await asyncio.wait([self._task])
+
+    async def _run(self) -> None:
+        drive = self._axis.drive
+        while True:
+            now = time.monotonic()
+            due = [s for s in self._subscriptions if s.due <= now]
+            if not due:
+                waits = [s.due - now for s in self._subscriptions]
+                await asyncio.sleep(min(waits, default=FLUSH_S))
+                continue
+            for subscription in due:
+                subscription.due = max(subscription.due + subscription.period_s, now)
+            keys = list(dict.fromkeys(key for s in due for key in s.keys))
+            before = time.monotonic()
+            try:
+                readings = await drive.read_many(keys)
+            except DriveError:
+                # The monitor tells the user why; here the gap shows as missing time.
+                await asyncio.sleep(RETRY_S)
+                continue
+            middle = (before + time.monotonic()) / 2
+            for subscription in due:
+                _append(subscription, readings, middle)
+
+
+def _append(subscription: Subscription, readings: dict[str, Reading], t_s: float) -> None:
+    if not subscription.rows:
+        subscription.since = t_s
+    subscription.rows.append([_number(readings[key]) for key in subscription.keys])
+    subscription.times.append(t_s)
+    if t_s - subscription.since < FLUSH_S and subscription.period_s < FLUSH_S:
+        return
+    times = np.asarray(subscription.times)
+    spacing = float(times[-1] - times[0]) / max(1, len(times) - 1)
+    subscription.put(np.asarray(subscription.rows), float(times[0]), spacing, times)
+    subscription.rows, subscription.times = [], []
+
+
+def _number(reading: Reading) -> float:
+    return float(reading.value) if isinstance(reading.value, (int, float)) else float("nan")

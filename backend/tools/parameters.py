@@ -1,0 +1,169 @@
+"""Jobs on parameters: read many, load a set with verified writes, save a set."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+
+from backend import parameter_set
+from backend.drive import Drive
+from backend.jobs import JobResult, Progress
+from backend.library import SetLibrary
+from backend.parameter_set import ParameterSet
+from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
+from profiles.schema import Raw
+
+
+def readable_keys(drive: Drive) -> list[str]:
+    """Keys of everything that can be read over the connected ports."""
+    return [
+        p.key for p in drive.profile.parameters if p.access != "wo" and not drive.unreachable_why(p)
+    ]
+
+
+async def read_all(drive: Drive, keys: Sequence[str] | None, progress: Progress) -> JobResult:
+    """Read ``keys``, or all that can be read. Values go out as they arrive.
+
+    Raises:
+        LinkLost: the bus is gone.
+    """
+    wanted = readable_keys(drive) if keys is None else list(keys)
+    readings = await drive.read_many(wanted, progress)
+    failed = {key: r.error for key, r in readings.items() if r.error}
+    return {"read": len(readings) - len(failed), "failed": failed}
+
+
+async def save_set(
+    drive: Drive,
+    library: SetLibrary,
+    name: str,
+    *,
+    author: str,
+    notes: str,
+    motor_individual: bool,
+    overwrite: bool,
+    progress: Progress | None = None,
+) -> str:
+    """Read the drive's settings and store them; returns the file name.
+
+    Raises:
+        NotAllowed: the name is taken. StorageFailed: disk. LinkLost: the bus is gone.
+    """
+    wanted = parameter_set.storable(drive.profile, motor_individual=motor_individual)
+    keys = [p.key for p in wanted if not drive.unreachable_why(p)]
+    readings = await drive.read_many(keys, progress)
+    if all(r.raw is None for r in readings.values()):
+        raise LinkTimeout(
+            f"{drive.name}: no parameter could be read, so nothing was saved",
+            drive=drive.name,
+            remedy="check the connection",
+        )
+    data = parameter_set.dump(
+        drive, readings.values(), author=author, notes=notes, saved=datetime.now(UTC)
+    )
+    return library.store(name, data, overwrite=overwrite)
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """One row of a load report; raw values."""
+
+    key: str
+    before: Raw | None
+    wanted: Raw
+    after: Raw | None
+    ok: bool
+    problem: str = ""
+
+
+async def load_set(
+    drive: Drive,
+    content: ParameterSet,
+    keys: Sequence[str],
+    progress: Progress,
+    *,
+    library: SetLibrary,
+    accept_other_identity: bool,
+) -> JobResult:
+    """Write the chosen rows one by one, each read back, after storing what was there before.
+
+    All rows are checked before the first is written.
+
+    Raises:
+        NotAllowed: another family's or drive's file without consent, or a chosen row that cannot
+            be written; nothing was written.
+    """
+    _check_identity(drive, content, accept_other_identity)
+    rows = {row.key: row for row in content.rows}
+    chosen: list[tuple[str, Raw]] = []
+    for key in keys:
+        row = rows.get(key)
+        if row is None or row.raw is None:
+            raise NotAllowed(
+                f"{drive.name}: the file has no usable value for {key}; nothing was written",
+                drive=drive.name,
+                parameter=key,
+                remedy="untick this row",
+            )
+        chosen.append((key, drive.check(drive.parameter(key), row.raw)))
+    progress(0.0, "storing the present values")
+    backup = await _back_up(drive, library, [key for key, _ in chosen])
+    report: list[Written] = []
+    for number, (key, raw) in enumerate(chosen):
+        progress(number / max(1, len(chosen)), f"writing {key}")
+        report.append(await _write_verified(drive, key, raw))
+    return {
+        "written": sum(row.ok for row in report),
+        "failed": sum(not row.ok for row in report),
+        "backup": backup,
+        "rows": [asdict(row) for row in report],
+    }
+
+
+def _check_identity(drive: Drive, content: ParameterSet, accepted: bool) -> None:
+    if content.profile != drive.profile.drive:
+        raise NotAllowed(
+            f"the file is of a {content.profile} drive, {drive.name} is a {drive.profile.drive}; "
+            "nothing was written",
+            drive=drive.name,
+            value=content.profile,
+            limit=drive.profile.drive,
+            remedy="choose a file of the same drive family",
+        )
+    serial = drive.found.serial if drive.found else None
+    other = content.serial is not None and serial is not None and content.serial != serial
+    if other and not accepted:
+        raise NotAllowed(
+            f"the file was saved from the drive with serial number {content.serial}, "
+            f"{drive.name} has {serial}; nothing was written",
+            drive=drive.name,
+            value=content.serial,
+            limit=str(serial),
+            remedy="compare the values, then accept the other drive explicitly",
+        )
+
+
+async def _back_up(drive: Drive, library: SetLibrary, keys: Sequence[str]) -> str:
+    """The undo: what the chosen parameters are now, as a set of its own."""
+    readings = await drive.read_many(keys)
+    now = datetime.now(UTC)
+    data = parameter_set.dump(
+        drive, readings.values(), author="servodeck", notes="before loading a set", saved=now
+    )
+    stamp = now.strftime("%Y-%m-%d %H.%M.%S.%f")[:-3]
+    return library.store(f"before load {drive.id} {stamp}", data)
+
+
+async def _write_verified(drive: Drive, key: str, raw: Raw) -> Written:
+    before = drive.readings[key].raw if key in drive.readings else None
+    try:
+        after = (await drive.write(key, raw)).raw
+    except LinkLost:
+        raise
+    except DriveError as error:
+        return Written(key, before, raw, None, ok=False, problem=error.message)
+    if after != raw:
+        text = f"the drive keeps {after} instead of {raw}"
+        return Written(key, before, raw, after, ok=False, problem=text)
+    return Written(key, before, raw, after, ok=True)
