@@ -25,7 +25,7 @@ from backend.api.models import (
     StopRequest,
     StopResult,
 )
-from backend.interfaces import list_interfaces
+from backend.api.interfaces import list_interfaces
 from backend.jobs import Job, JobResult, Progress
 from drivers.link import Found
 from profiles import load_all

@@ -1,0 +1,438 @@
+"""The live websocket: states, values, jobs and samples out; watch, jog and STOP in.
+
+Each connection has one sender task. States coalesce (only the newest of each drive is kept);
+samples never do: they wait in their subscription's bounded queue, which counts what it drops.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import struct
+from collections.abc import Awaitable, Callable
+
+import numpy as np
+from fastapi import WebSocket, WebSocketDisconnect
+from pydantic import BaseModel, ValidationError
+
+import backend
+from backend.api import convert
+from backend.api.errors import problem_of
+from backend.api.live_messages import (
+    DrivesChanged,
+    FromPage,
+    Hello,
+    JobChanged,
+    JogEnded,
+    JogRenew,
+    JogStart,
+    JogStop,
+    LeaseTake,
+    Logged,
+    Ping,
+    Pong,
+    Refused,
+    ScopeChannelInfo,
+    ScopeInfo,
+    ScopeStart,
+    ScopeStop,
+    StateChanged,
+    StopAll,
+    ValuesChanged,
+    WatchState,
+    WatchValues,
+    from_page,
+)
+from backend.bench import Bench
+from backend.drive import Reading
+from backend.jobs import Job
+from backend.journal import Entry
+from backend.monitor import Snapshot
+from backend.scope import Subscription
+from backend.tools.jog import Hold, JogSettings, jog
+from drivers.errors import DriveError
+from drivers.link import ScopeBlock
+
+MAGIC = 0x424B4353
+_HEADER = struct.Struct("<IIIIHHIdd")
+#: Messages that wait for a slow page; states, values and drive lists coalesce and do not count.
+QUEUE = 500
+#: A connection that has not taken a message for this long is closed.
+SEND_TIMEOUT_S = 10.0
+
+
+class LiveHub:
+    """All live connections of a server."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench = bench
+        self.connections: dict[str, Connection] = {}
+        self._numbers = itertools.count(1)
+        bench.on_snapshot.append(self._snapshot)
+        bench.on_readings.append(self._readings)
+        bench.on_job.append(self._job)
+        bench.on_drives.append(self._drives)
+        bench.journal.listen(self._logged)
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Carry one connection from accept to its end."""
+        await socket.accept()
+        connection = Connection(f"c{next(self._numbers)}", socket, self.bench)
+        self.connections[connection.id] = connection
+        try:
+            await connection.run()
+        finally:
+            del self.connections[connection.id]
+            await connection.close()
+
+    def _each(self) -> list[Connection]:
+        return list(self.connections.values())
+
+    def _snapshot(self, drive: str, snapshot: Snapshot) -> None:
+        for connection in self._each():
+            if drive in connection.watched:
+                connection.later("state", drive, lambda s=snapshot, d=drive: _state(self, d, s))
+
+    def _readings(self, drive: str, readings: list[Reading]) -> None:
+        for connection in self._each():
+            connection.fresh_values(drive, readings)
+
+    def _job(self, job: Job) -> None:
+        for connection in self._each():
+            connection.later("job", job.id, lambda j=job: JobChanged(job=convert.job(j)))
+
+    def _drives(self) -> None:
+        for connection in self._each():
+            connection.later("drives", "", connection.drive_list)
+
+    def _logged(self, entry: Entry) -> None:
+        for connection in self._each():
+            connection.send(Logged(entry=convert.log_entry(entry)))
+
+
+def _state(hub: LiveHub, drive: str, snapshot: Snapshot) -> BaseModel | None:
+    member = hub.bench.members.get(drive)
+    if member is None:
+        return None
+    return StateChanged(state=convert.axis_state(hub.bench, member, snapshot))
+
+
+class Connection:
+    """One page."""
+
+    def __init__(self, name: str, socket: WebSocket, bench: Bench) -> None:
+        self.id = name
+        self.person = "local user"
+        self.watched: set[str] = set()
+        self._socket = socket
+        self._bench = bench
+        self._queue: asyncio.Queue[BaseModel] = asyncio.Queue(QUEUE)
+        self._latest: dict[tuple[str, str], Callable[[], BaseModel | None]] = {}
+        self._values: dict[str, set[str]] = {}
+        self._wake = asyncio.Event()
+        self._holds: dict[str, Hold] = {}
+        self._scopes: dict[int, list[tuple[Subscription, tuple[int, ...]]]] = {}
+        self._scope_tasks: dict[int, list[asyncio.Task[None]]] = {}
+        self._polls: dict[str, asyncio.Task[None]] = {}
+        self._overflow = False
+
+    async def run(self) -> None:
+        """Until the page is gone."""
+        self.send(Hello(connection=self.id, version=backend.__version__))
+        self.later("drives", "", self.drive_list)
+        sender = asyncio.create_task(self._sender(), name=f"live-{self.id}")
+        receiver = asyncio.create_task(self._receiver(), name=f"hear-{self.id}")
+        done, pending = await asyncio.wait((sender, receiver), return_when=asyncio.FIRST_COMPLETED)
+        for task in pending:
+            task.cancel()
+        await asyncio.wait((sender, receiver))
+        for task in done:
+            if not task.cancelled() and (error := task.exception()) is not None:
+                raise error
+
+    async def close(self) -> None:
+        """Release everything that lived by this connection; a jog ends at once."""
+        for hold in self._holds.values():
+            hold.release("the page's connection closed")
+        for drive in self.watched:
+            if (member := self._bench.members.get(drive)) is not None:
+                member.monitor.watchers -= 1
+        self.watched = set()
+        for task in self._polls.values():
+            task.cancel()
+        for subscription in list(self._scopes):
+            await self._scope_stop(subscription)
+        self._bench.leases.drop(self.id)
+
+    # --- out --------------------------------------------------------------------------
+
+    def send(self, message: BaseModel) -> None:
+        """Queue a message that must not be lost; a page that never reads is cut off."""
+        try:
+            self._queue.put_nowait(message)
+        except asyncio.QueueFull:
+            self._overflow = True
+        self._wake.set()
+
+    def later(self, kind: str, which: str, make: Callable[[], BaseModel | None]) -> None:
+        """Send the newest state of something; older ones not yet sent are replaced."""
+        self._latest[kind, which] = make
+        self._wake.set()
+
+    def fresh_values(self, drive: str, readings: list[Reading]) -> None:
+        """New readings of a drive; only the newest of each parameter is sent."""
+        waiting = self._values.setdefault(drive, set())
+        waiting.update(reading.key for reading in readings)
+        self._wake.set()
+
+    def drive_list(self) -> BaseModel:
+        """The bench as this connection sees it."""
+        members = self._bench.members.values()
+        return DrivesChanged(
+            drives=[convert.drive_summary(self._bench, m, self.id) for m in members]
+        )
+
+    async def _sender(self) -> None:
+        while not self._overflow:
+            await self._wake.wait()
+            self._wake.clear()
+            while not self._queue.empty():
+                await self._text(self._queue.get_nowait())
+            latest, self._latest = self._latest, {}
+            for make in latest.values():
+                if (message := make()) is not None:
+                    await self._text(message)
+            values, self._values = self._values, {}
+            for drive, keys in values.items():
+                member = self._bench.members.get(drive)
+                if member is not None and keys:
+                    rows = convert.readings(member.drive, sorted(keys))
+                    await self._text(ValuesChanged.model_construct(drive=drive, values=rows))
+            # States need not come faster than a screen shows them.
+            await asyncio.sleep(0.03)
+        await self._socket.close(code=1013, reason="the page does not read")
+
+    async def _text(self, message: BaseModel) -> None:
+        async with asyncio.timeout(SEND_TIMEOUT_S):
+            await self._socket.send_text(message.model_dump_json())
+
+    # --- in ---------------------------------------------------------------------------
+
+    async def _receiver(self) -> None:
+        with contextlib.suppress(WebSocketDisconnect):
+            while True:
+                message = await self._socket.receive()
+                if message["type"] == "websocket.disconnect":
+                    return
+                text = message.get("text")
+                await self._handle(text if isinstance(text, str) else "")
+
+    async def _handle(self, text: str) -> None:
+        try:
+            request = from_page.validate_json(text)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            problem = DriveError(f"not a message of this interface: {first['msg']}")
+            self.send(Refused(request="?", problem=problem_of(problem)))
+            return
+        try:
+            await self._act(request)
+        except DriveError as error:
+            self.send(Refused(request=request.type, problem=problem_of(error)))
+
+    async def _act(self, request: FromPage) -> None:
+        match request:
+            case StopAll():
+                await self._stop(request)
+            case JogRenew():
+                if (hold := self._holds.get(request.drive)) is not None:
+                    hold.renew()
+            case JogStop():
+                if (hold := self._holds.get(request.drive)) is not None:
+                    hold.release(request.reason or "released")
+            case JogStart():
+                self._jog(request)
+            case WatchState():
+                self._watch(set(request.drives))
+            case WatchValues():
+                self._watch_values(request)
+            case LeaseTake():
+                self._lease(request)
+            case ScopeStart():
+                await self._scope_start(request)
+            case ScopeStop():
+                await self._scope_stop(request.subscription)
+            case Ping():
+                self.send(Pong(n=request.n))
+
+    async def _stop(self, request: StopAll) -> None:
+        drives = [request.drive] if request.drive else list(self._bench.members)
+        known = [drive for drive in drives if drive in self._bench.members]
+        problems = await self._bench.stop(known)
+        self._bench.journal.add("STOP", level="warning", drive=request.drive, person=self.person)
+        for drive, text in problems.items():
+            if text:
+                failure = DriveError(f"STOP did not reach it: {text}", drive=drive)
+                self.send(Refused(request="stop", problem=problem_of(failure)))
+
+    def _lease(self, request: LeaseTake) -> None:
+        self._bench.member(request.drive)
+        if request.take:
+            self._bench.leases.take(request.drive, self.id, self.person)
+            return
+        if (hold := self._holds.get(request.drive)) is not None:
+            hold.release("control was given back")
+        self._bench.leases.give(request.drive, self.id)
+
+    def _watch(self, drives: set[str]) -> None:
+        for drive in drives ^ self.watched:
+            if (member := self._bench.members.get(drive)) is not None:
+                member.monitor.watchers += 1 if drive in drives else -1
+                member.monitor.hurry()
+        self.watched = {drive for drive in drives if drive in self._bench.members}
+
+    def _watch_values(self, request: WatchValues) -> None:
+        drive = self._bench.member(request.drive).drive
+        for key in request.keys:
+            drive.parameter(key)
+        if (old := self._polls.pop(request.drive, None)) is not None:
+            old.cancel()
+        if request.keys:
+            self._polls[request.drive] = asyncio.create_task(
+                self._poll(request), name=f"watch-{self.id}-{request.drive}"
+            )
+
+    async def _poll(self, request: WatchValues) -> None:
+        while (member := self._bench.members.get(request.drive)) is not None:
+            # A lost link is told by the monitor; polling goes on until the drive is back.
+            with contextlib.suppress(DriveError):
+                await member.drive.read_many(request.keys)
+            await asyncio.sleep(request.period_s)
+
+    # --- jog --------------------------------------------------------------------------
+
+    def _jog(self, request: JogStart) -> None:
+        bench, member = self._bench, self._bench.member(request.drive)
+        held_before = bench.leases.holder(request.drive) is not None
+        bench.leases.take(request.drive, self.id, self.person)
+        hold = Hold()
+        settings = JogSettings(
+            direction=request.direction,
+            speed_rpm=request.speed,
+            acceleration_rpm_s=request.acceleration,
+            travel_rev=request.travel_limit,
+            torque_percent=request.torque_limit,
+        )
+        try:
+            job = bench.jobs.start(
+                "jog",
+                f"Jog {member.drive.name}",
+                lambda progress: jog(member.axis, settings, hold, progress),
+                drive=request.drive,
+                motion=True,
+                person=self.person,
+            )
+        except DriveError:
+            if not held_before:
+                bench.leases.give(request.drive, self.id)
+            raise
+        self._holds[request.drive] = hold
+        member.monitor.hurry()
+
+        def ended(_task: object) -> None:
+            if self._holds.get(request.drive) is hold:
+                del self._holds[request.drive]
+            if not held_before:
+                bench.leases.give(request.drive, self.id)
+            result = job.result or {}
+            reason = str(result.get("reason", job.state))
+            problem = problem_of(job.error) if job.error else None
+            self.send(JogEnded(drive=request.drive, reason=reason, problem=problem))
+
+        if job.task is not None:
+            job.task.add_done_callback(ended)
+
+    # --- scope ------------------------------------------------------------------------
+
+    async def _scope_start(self, request: ScopeStart) -> None:
+        await self._scope_stop(request.subscription)
+        columns: dict[str, list[int]] = {}
+        for number, channel in enumerate(request.channels):
+            columns.setdefault(channel.drive, []).append(number)
+        streams: list[tuple[Subscription, tuple[int, ...]]] = []
+        try:
+            for drive, numbers in columns.items():
+                keys = [request.channels[n].key for n in numbers]
+                self._bench.member(drive)
+                stream = self._bench.scope.subscribe(drive, keys, request.period_s)
+                streams.append((stream, tuple(numbers)))
+        except DriveError as error:
+            for stream, _ in streams:
+                await self._bench.scope.unsubscribe(stream)
+            self.send(
+                ScopeInfo(subscription=request.subscription, channels=[], problem=problem_of(error))
+            )
+            return
+        self._scopes[request.subscription] = streams
+        self.send(ScopeInfo(subscription=request.subscription, channels=self._described(request)))
+        count = len(request.channels)
+        self._scope_tasks[request.subscription] = [
+            asyncio.create_task(self._pump(request.subscription, stream, numbers, count))
+            for stream, numbers in streams
+        ]
+
+    def _described(self, request: ScopeStart) -> list[ScopeChannelInfo]:
+        result = []
+        for channel in request.channels:
+            drive = self._bench.member(channel.drive).drive
+            parameter = drive.parameter(channel.key)
+            result.append(
+                ScopeChannelInfo(
+                    drive=channel.drive,
+                    key=parameter.key,
+                    name=parameter.name,
+                    unit=parameter.unit,
+                    synchronous=False,
+                )
+            )
+        return result
+
+    async def _scope_stop(self, subscription: int) -> None:
+        for task in self._scope_tasks.pop(subscription, []):
+            task.cancel()
+        for stream, _ in self._scopes.pop(subscription, []):
+            await self._bench.scope.unsubscribe(stream)
+
+    async def _pump(
+        self, subscription: int, stream: Subscription, numbers: tuple[int, ...], count: int
+    ) -> None:
+        send: Callable[[bytes], Awaitable[None]] = self._socket.send_bytes
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            while True:
+                block = await stream.next()
+                await send(encode_block(subscription, block, numbers, count))
+
+
+def encode_block(
+    subscription: int, block: ScopeBlock, numbers: tuple[int, ...], count: int
+) -> bytes:
+    """A block as a binary frame (see live_messages); columns of other drives are NaN."""
+    rows = len(block.samples)
+    samples = np.full((rows, count), np.nan, dtype="<f4")
+    samples[:, list(numbers)] = block.samples
+    if block.valid is not None:
+        samples[~block.valid] = np.nan
+    times = b"" if block.times_s is None else block.times_s.astype("<f8").tobytes()
+    header = _HEADER.pack(
+        MAGIC,
+        subscription,
+        block.sequence,
+        block.dropped,
+        rows,
+        count,
+        1 if times else 0,
+        block.t0_s,
+        block.dt_s,
+    )
+    return header + times + samples.tobytes()
