@@ -1,0 +1,99 @@
+"""Run a virtual segment: ``python -m drivers.virtual.wires.ethercat --iface ec0s --bench FILE``.
+
+Standard input and output are the control channel (see `control`); closing the input ends it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import os
+import sys
+from pathlib import Path
+
+from drivers.errors import DriveError
+from drivers.virtual.wires.ethercat.bench import (
+    BenchAxis,
+    load_bench,
+    load_factory,
+    make_devices,
+)
+from drivers.virtual.wires.ethercat.clock import LockstepClock, RealClock
+from drivers.virtual.wires.ethercat.segment import Segment
+from drivers.virtual.wires.ethercat.server import SegmentServer
+from drivers.virtual.wires.ethercat.slave import Slave, SlaveIdentity
+
+_FACTORY = "drivers.virtual.firmware:make_device"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m drivers.virtual.wires.ethercat")
+    parser.add_argument("--iface", required=True, help="interface that the segment answers on")
+    parser.add_argument("--bench", type=Path, help="bench file (TOML)")
+    parser.add_argument("--on", help="bus URL of the bench file that this segment is")
+    parser.add_argument("--drive", action="append", default=[], help="a drive family, in order")
+    parser.add_argument("--factory", default=_FACTORY, help="module:function that makes devices")
+    parser.add_argument("--lockstep", action="store_true", help="time follows the frames")
+    parser.add_argument("--cycle-us", type=int, default=1000, help="lockstep cycle without DC")
+    parser.add_argument("--al-ms", type=float, default=2.0, help="time of a state change")
+    parser.add_argument("--sdo-ms", type=float, default=1.0, help="answer time of the mailbox")
+    parser.add_argument("--eeprom-us", type=float, default=50.0, help="read time of the EEPROM")
+    parser.add_argument("--seed", type=int, default=1, help="of random trouble")
+    parser.add_argument("--realtime", type=int, default=0, help="SCHED_FIFO priority, if allowed")
+    return parser
+
+
+def _go_realtime(priority: int) -> None:
+    if priority:
+        try:
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+        except PermissionError:
+            sys.stderr.write("SCHED_FIFO is not permitted here; running with normal priority\n")
+
+
+def build(arguments: argparse.Namespace) -> Segment:
+    """Segment with its devices, as the command line says."""
+    axes = load_bench(arguments.bench, arguments.on) if arguments.bench else []
+    for drive in arguments.drive:
+        station = len(axes) + 1
+        axes.append(BenchAxis(f"axis {station}", drive, station, serial=station))
+    if not axes:
+        raise ValueError("no drives: give --drive or a --bench file with EtherCAT axes")
+    clock = LockstepClock(arguments.cycle_us * 1000) if arguments.lockstep else RealClock()
+    devices = make_devices(axes, load_factory(arguments.factory))
+    slaves = [
+        Slave(device, clock, SlaveIdentity(serial=axis.serial))
+        for device, axis in zip(devices, axes, strict=True)
+    ]
+    for slave in slaves:
+        slave.al.delay_ns = int(arguments.al_ms * 1e6)
+        slave.mailbox.delay_ns = int(arguments.sdo_ms * 1e6)
+        slave.eeprom.read_ns = int(arguments.eeprom_us * 1e3)
+        slave.eeprom.write_ns = 5_000_000
+    return Segment(slaves, clock, arguments.seed)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    arguments = _parser().parse_args(argv)
+    try:
+        segment = build(arguments)
+        server = SegmentServer(arguments.iface, segment, sys.stdin.buffer, sys.stdout.buffer)
+    except (DriveError, ValueError, OSError, ImportError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    _go_realtime(arguments.realtime)
+    # What is alive now stays alive: the collector need not walk it between two frames.
+    gc.collect()
+    gc.freeze()
+    try:
+        server.run()
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        server.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,78 @@
+"""The wire's time in nanoseconds: real, or in lockstep with the process-data frames."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+
+class WireClock(Protocol):
+    """Says when a frame arrived."""
+
+    def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
+        """Time of the frame being handled now; never before the last one.
+
+        ``process_data`` tells frames with logical datagrams from all others, ``cycle_ns`` is the
+        cycle of the segment (0 while there is none), ``age_ns`` how long ago the kernel saw it.
+        """
+
+    def now(self) -> int:
+        """Present time without a frame."""
+
+    def grid(self, start_ns: int, cycle_ns: int) -> int:
+        """Where a SYNC0 grid that the master placed at ``start_ns`` really begins."""
+
+
+class RealClock:
+    """Monotonic time since the segment was switched on."""
+
+    def __init__(self) -> None:
+        self._start = time.monotonic_ns()
+        self._last = 0
+
+    def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
+        """Arrival by the kernel's time stamp, so that our own scheduling does not matter."""
+        del process_data, cycle_ns
+        self._last = max(self._last, time.monotonic_ns() - self._start - age_ns)
+        return self._last
+
+    def now(self) -> int:
+        """Present time."""
+        self._last = max(self._last, time.monotonic_ns() - self._start)
+        return self._last
+
+    def grid(self, start_ns: int, cycle_ns: int) -> int:
+        """Where the master placed it."""
+        del cycle_ns
+        return start_ns
+
+
+class LockstepClock:
+    """One cycle per process-data frame, however fast or slow they come; deterministic.
+
+    Process-data frames arrive in the middle of cycles, on the grid (n + ½)·cycle. Every other
+    frame takes ``frame_ns``, so that polling for an answer makes time pass.
+    """
+
+    def __init__(self, cycle_ns: int = 1_000_000, frame_ns: int = 5_000) -> None:
+        self.cycle_ns = cycle_ns
+        self.frame_ns = frame_ns
+        self._now = 0
+
+    def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
+        """Next half-cycle for process data, a little later for anything else."""
+        del age_ns
+        if not process_data:
+            self._now += self.frame_ns
+        else:
+            cycle = cycle_ns or self.cycle_ns
+            self._now = ((self._now + cycle // 2) // cycle) * cycle + cycle // 2
+        return self._now
+
+    def now(self) -> int:
+        """Time of the last frame."""
+        return self._now
+
+    def grid(self, start_ns: int, cycle_ns: int) -> int:
+        """The next whole multiple of the cycle: the master's own clock must not matter here."""
+        return -(-start_ns // cycle_ns) * cycle_ns

@@ -1,0 +1,229 @@
+"""Control channel of a running segment: one JSON object per line, one answer per line.
+
+``{"id": 1, "do": "cut", "cable": 2}`` is answered by ``{"id": 1, "ok": true, "result": …}`` or
+``{"id": 1, "ok": false, "error": "…"}``. Slaves are counted from 0, cable k leads to slave k.
+Times are in seconds.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import IO, Any
+
+from drivers.virtual.device import SdoAbort
+from drivers.virtual.wires.ethercat import registers as reg
+from drivers.virtual.wires.ethercat.registers import AlState
+from drivers.virtual.wires.ethercat.segment import Segment, register
+from drivers.virtual.wires.ethercat.slave import Slave
+from drivers.virtual.wires.ethercat.trouble import Fate
+
+_NS = 1_000_000_000
+_FOREVER_NS = 1 << 60
+
+
+class Control:
+    """Parses commands and applies them to the segment."""
+
+    def __init__(self, segment: Segment, interface: str, answers: IO[bytes]) -> None:
+        self._segment = segment
+        self._interface = interface
+        self._answers = answers
+        self._rest = b""
+        self.stopped = False
+        self._commands: dict[str, Callable[..., object]] = {
+            "state": self._state,
+            "lose": self._lose,
+            "late": self._late,
+            "corrupt": self._corrupt,
+            "counter": self._counter,
+            "peace": self._peace,
+            "cut": self._cut,
+            "heal": self._heal,
+            "power_off": self._power_off,
+            "power_on": self._power_on,
+            "power_cycle": self._power_cycle,
+            "timing": self._timing,
+            "eeprom_busy": self._eeprom_busy,
+            "mute": self._mute,
+            "die_in_transfer": self._die_in_transfer,
+            "refuse": self._refuse,
+            "inject": self._inject,
+            "read": self._read,
+            "write": self._write,
+            "register": self._register,
+            "stop": self._stop,
+        }
+
+    def ready(self) -> None:
+        """Tell that frames are answered from now on."""
+        self._send({"ready": True, "interface": self._interface, **self._state()})
+
+    def feed(self, data: bytes) -> None:
+        """Bytes from the channel; complete lines are executed."""
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        for line in lines:
+            if line.strip():
+                self._send(self.execute(line))
+
+    def execute(self, line: bytes) -> dict[str, object]:
+        """One command line to its answer."""
+        identifier: object = None
+        try:
+            request = json.loads(line)
+            if not isinstance(request, dict):
+                raise TypeError("a command is a JSON object")
+            identifier = request.pop("id", None)
+            name = request.pop("do", None)
+            command = self._commands.get(str(name))
+            if command is None:
+                known = ", ".join(sorted(self._commands))
+                raise ValueError(f"unknown command {name!r}; there are: {known}")
+            return {"id": identifier, "ok": True, "result": command(**request)}
+        except (ValueError, TypeError, IndexError, KeyError, SdoAbort) as error:
+            return {"id": identifier, "ok": False, "error": str(error)}
+
+    def _send(self, message: dict[str, Any]) -> None:
+        self._answers.write(json.dumps(message).encode() + b"\n")
+        self._answers.flush()
+
+    def _slave(self, slave: int) -> Slave:
+        if not 0 <= slave < len(self._segment.slaves):
+            raise IndexError(f"there is no slave {slave}; there are {len(self._segment.slaves)}")
+        return self._segment.slaves[slave]
+
+    def _chosen(self, slave: int | None) -> list[Slave]:
+        return self._segment.slaves if slave is None else [self._slave(slave)]
+
+    # -- commands -------------------------------------------------------------------------------
+
+    def _state(self) -> dict[str, object]:
+        now = self._segment.settle()
+        return {
+            "time_s": now / _NS,
+            "frames": self._segment.frames,
+            "trouble": dict(self._segment.trouble.counted),
+            "slaves": [
+                {
+                    "station": s.station,
+                    "state": s.al.state.name,
+                    "error": s.al.error,
+                    "al_code": s.al.code,
+                    "powered": s.device.powered,
+                    "missed": s.report.missed,
+                    "lost_links": list(s.memory[reg.LOST_LINK : reg.LOST_LINK + 4]),
+                    "rx_errors": list(s.memory[reg.RX_ERRORS : reg.RX_ERRORS + 8]),
+                }
+                for s in self._segment.slaves
+            ],
+        }
+
+    def _lose(
+        self,
+        count: int | None = None,
+        chance: float = 1.0,
+        direction: str = "in",
+        cyclic: bool = False,
+    ) -> None:
+        if direction not in ("in", "out"):
+            raise ValueError("direction is 'out' (to the slaves) or 'in' (back to the master)")
+        fate = Fate(lost_outbound=direction == "out", lost_inbound=direction == "in")
+        self._segment.trouble.add(fate, count, chance, cyclic)
+
+    def _late(
+        self, by_s: float, count: int | None = None, chance: float = 1.0, cyclic: bool = False
+    ) -> None:
+        self._segment.trouble.add(Fate(delay_ns=int(by_s * _NS)), count, chance, cyclic)
+
+    def _corrupt(
+        self, slave: int, port: int = 0, count: int | None = 1, chance: float = 1.0
+    ) -> None:
+        self._slave(slave)
+        self._segment.trouble.add(Fate(corrupt_at=(slave, port)), count, chance)
+
+    def _counter(self, by: int, count: int | None = None, chance: float = 1.0) -> None:
+        self._segment.trouble.add(Fate(counter_offset=by), count, chance, cyclic_only=True)
+
+    def _peace(self) -> None:
+        self._segment.trouble.clear()
+
+    def _cut(self, cable: int) -> None:
+        self._segment.settle()
+        self._segment.line.cut(cable)
+
+    def _heal(self, cable: int | None = None) -> None:
+        self._segment.settle()
+        self._segment.line.heal(cable)
+
+    def _power_off(self, slave: int) -> None:
+        self._slave(slave)
+        self._segment.line.power_off(slave, self._segment.settle(), None)
+
+    def _power_on(self, slave: int) -> None:
+        self._slave(slave)
+        self._segment.line.power_on(slave, self._segment.settle())
+
+    def _power_cycle(self, slave: int, off_s: float = 0.5) -> None:
+        self._slave(slave)
+        now = self._segment.settle()
+        self._segment.line.power_off(slave, now, now + int(off_s * _NS))
+
+    def _timing(
+        self,
+        slave: int | None = None,
+        al_s: float | None = None,
+        sdo_s: float | None = None,
+        eeprom_read_s: float | None = None,
+        eeprom_write_s: float | None = None,
+        drift_ppm: float | None = None,
+    ) -> None:
+        for chosen in self._chosen(slave):
+            if al_s is not None:
+                chosen.al.delay_ns = int(al_s * _NS)
+            if sdo_s is not None:
+                chosen.mailbox.delay_ns = int(sdo_s * _NS)
+            if eeprom_read_s is not None:
+                chosen.eeprom.read_ns = int(eeprom_read_s * _NS)
+            if eeprom_write_s is not None:
+                chosen.eeprom.write_ns = int(eeprom_write_s * _NS)
+            if drift_ppm is not None:
+                chosen.dc.drift_ppm = drift_ppm
+
+    def _eeprom_busy(self, slave: int, for_s: float | None = None) -> None:
+        now = self._segment.settle()
+        until = now + (_FOREVER_NS if for_s is None else int(for_s * _NS))
+        self._slave(slave).eeprom.busy_until_ns = until
+
+    def _mute(self, slave: int, on: bool = True) -> None:
+        self._slave(slave).mailbox.muted = on
+
+    def _die_in_transfer(self, slave: int, after_segments: int | None = 1) -> None:
+        self._slave(slave).mailbox.die_after_segments = after_segments
+
+    def _refuse(self, slave: int, state: str, code: int | None) -> None:
+        target = AlState[state.upper()]
+        refusals = self._slave(slave).al.refusals
+        if code:
+            refusals[target] = code
+        else:
+            refusals.pop(target, None)
+
+    def _inject(self, slave: int, what: str, value: float = 1.0) -> None:
+        self._segment.settle()
+        self._slave(slave).device.inject(what, value)
+
+    def _read(self, slave: int, index: int, subindex: int = 0) -> str:
+        """The drive's own value, past the wire: the truth that tests compare with."""
+        self._segment.settle()
+        return self._slave(slave).dictionary.read(index, subindex).hex()
+
+    def _write(self, slave: int, index: int, subindex: int, data: str) -> None:
+        self._segment.settle()
+        self._slave(slave).dictionary.write(index, subindex, bytes.fromhex(data))
+
+    def _register(self, slave: int, address: int, length: int = 2) -> int:
+        self._segment.settle()
+        return register(self._slave(slave), address, length)
+
+    def _stop(self) -> None:
+        self.stopped = True

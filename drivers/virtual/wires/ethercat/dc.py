@@ -1,0 +1,111 @@
+"""Distributed clocks of one slave: local time, system time, receive times and the SYNC0 grid.
+
+ETG.1000.4 clause 6.8. All methods take the wire's time in ns. The local clock starts at zero
+with the power; the master puts the difference to its own time into 920h.
+"""
+
+from __future__ import annotations
+
+import struct
+
+from drivers.virtual.wires.ethercat import registers as reg
+from drivers.virtual.wires.ethercat.clock import WireClock
+
+HOP_NS = 600
+"""Delay of one slave and its cable; the order of magnitude of real devices."""
+
+_ACTIVE, _SYNC0 = 0x01, 0x02
+
+
+class DistributedClock:
+    """Works on the slave's register memory, which it shares with the controller."""
+
+    def __init__(self, memory: bytearray, clock: WireClock) -> None:
+        self._memory = memory
+        self._clock = clock
+        self._zero_ns = 0
+        self.drift_ppm = 0.0
+        self._slewed_ns = 0.0
+        self.sync0_first_ns: int | None = None
+        """Wire time of the first SYNC0, None while SYNC0 is off or can never fire."""
+        self.sync0_cycle_ns = 0
+
+    def power_on(self, now_ns: int) -> None:
+        """The local clock starts from zero."""
+        self._zero_ns = now_ns
+        self._slewed_ns = 0.0
+        self.sync0_first_ns = None
+        self.sync0_cycle_ns = 0
+
+    def local(self, now_ns: int) -> int:
+        """Local time: runs since power-on, too fast by ``drift_ppm``, slewed by the master."""
+        elapsed = now_ns - self._zero_ns
+        return elapsed + int(elapsed * self.drift_ppm * 1e-6 + self._slewed_ns)
+
+    def system(self, now_ns: int) -> int:
+        """System time, modulo 2^64: local time plus the offset that the master has written."""
+        offset = struct.unpack_from("<q", self._memory, reg.DC_SYSTEM_OFFSET)[0]
+        return int(self.local(now_ns) + offset) & 0xFFFF_FFFF_FFFF_FFFF
+
+    def refresh(self, now_ns: int) -> None:
+        """Put the present system time into 910h before the master reads it."""
+        struct.pack_into("<Q", self._memory, reg.DC_SYSTEM_TIME, self.system(now_ns))
+        started = self.sync0_first_ns is not None and now_ns >= self.sync0_first_ns
+        pending = bool(self._memory[reg.DC_ACTIVATION] & _SYNC0) and not started
+        self._memory[reg.DC_ACTIVATION_STATUS] = int(pending)
+
+    def latch(self, now_ns: int, before: int, behind: int) -> None:
+        """A write to 900h latches when the frame passed (``before``/``behind`` slaves away)."""
+        arrival = self.local(now_ns + before * HOP_NS)
+        back = self.local(now_ns + (before + 2 * behind) * HOP_NS) if behind else 0
+        struct.pack_into(
+            "<IIII", self._memory, reg.DC_RECEIVE_TIMES, arrival & 0xFFFFFFFF,
+            back & 0xFFFFFFFF, 0, 0,
+        )  # fmt: skip
+        struct.pack_into("<Q", self._memory, reg.DC_RECEIVE_TIME_UNIT, arrival)
+
+    def compare(self, received: bytes, now_ns: int) -> None:
+        """A write to 910h: the master distributes the reference time (low 32 bits)."""
+        theirs = int.from_bytes(received[:4].ljust(4, b"\0"), "little")
+        delay = struct.unpack_from("<I", self._memory, reg.DC_SYSTEM_DELAY)[0]
+        raw = (self.system(now_ns) - theirs - delay) & 0xFFFFFFFF
+        difference = raw - (1 << 32) if raw & 0x80000000 else raw
+        magnitude = min(abs(difference), 0x7FFFFFFF)
+        # Bit 31 clear: the local copy is ahead (ETG.1000.4 table 65).
+        value = magnitude | (0x80000000 if difference < 0 else 0)
+        struct.pack_into("<I", self._memory, reg.DC_DIFFERENCE, value)
+        if self.drift_ppm and magnitude < 1_000_000:
+            self._slewed_ns -= difference / 8.0
+
+    def activate(self, now_ns: int) -> None:
+        """A write to 981h starts or stops SYNC0; start and cycle time are taken over now."""
+        self.sync0_first_ns = None
+        if self._memory[reg.DC_ACTIVATION] & (_ACTIVE | _SYNC0) != (_ACTIVE | _SYNC0):
+            return
+        start = struct.unpack_from("<Q", self._memory, reg.DC_START_TIME)[0]
+        self.sync0_cycle_ns = struct.unpack_from("<I", self._memory, reg.DC_SYNC0_CYCLE)[0]
+        ahead = (start - self.system(now_ns)) & 0xFFFF_FFFF_FFFF_FFFF
+        if self.sync0_cycle_ns == 0 or ahead >= 1 << 63:
+            return  # a start time in the past is met only after the counter has wrapped
+        self.sync0_first_ns = self._clock.grid(now_ns + ahead, self.sync0_cycle_ns)
+
+    @property
+    def sync0_requested(self) -> bool:
+        """The master has switched SYNC0 on, whether it can fire or not."""
+        return bool(self._memory[reg.DC_ACTIVATION] & _SYNC0)
+
+    def next_sync0(self, after_ns: int) -> int | None:
+        """Wire time of the first SYNC0 later than ``after_ns``; None without SYNC0."""
+        first = self.sync0_first_ns
+        if first is None:
+            return None
+        if after_ns < first:
+            return first
+        return first + ((after_ns - first) // self.sync0_cycle_ns + 1) * self.sync0_cycle_ns
+
+    def last_sync0(self, until_ns: int) -> int | None:
+        """Wire time of the last SYNC0 not later than ``until_ns``; None if there was none."""
+        first = self.sync0_first_ns
+        if first is None or until_ns < first:
+            return None
+        return first + ((until_ns - first) // self.sync0_cycle_ns) * self.sync0_cycle_ns

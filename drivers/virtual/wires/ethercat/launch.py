@@ -1,0 +1,153 @@
+"""Start a virtual segment as a process of its own and talk to it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import selectors
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from drivers.errors import LinkLost, LinkTimeout
+from drivers.virtual.wires.netns import Namespace, child_environment
+
+START_TIMEOUT_S = 60.0
+"""Devices may have to compile their physics first."""
+ANSWER_TIMEOUT_S = 5.0
+
+
+class VirtualSegment:
+    """A running segment. ``command`` is the control channel of `control.Control`."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self._process = process
+        self._buffer = b""
+        self._next_id = 0
+        self.description: dict[str, Any] = {}
+
+    @classmethod
+    def start(
+        cls, interface: str, arguments: Sequence[str], namespace: Namespace | None = None
+    ) -> VirtualSegment:
+        """Start it on ``interface`` and wait until it answers frames.
+
+        ``arguments`` are those of ``python -m drivers.virtual.wires.ethercat`` besides the
+        interface; with a ``namespace`` it runs inside.
+
+        Raises:
+            LinkLost: it did not start; the message is its own.
+        """
+        module = "drivers.virtual.wires.ethercat"
+        argv = [sys.executable, "-m", module, "--iface", interface, *arguments]
+        process = subprocess.Popen(
+            namespace.command(argv) if namespace else argv,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            env=child_environment(),
+        )  # fmt: skip
+        segment = cls(process)
+        try:
+            segment.description = segment._receive(START_TIMEOUT_S)
+        except (LinkLost, LinkTimeout):
+            segment.close()
+            raise
+        return segment
+
+    @classmethod
+    def from_bench(
+        cls, interface: str, bench: Path, url: str, namespace: Namespace | None = None
+    ) -> VirtualSegment:
+        """The EtherCAT axes of a bench file that hang on ``url``."""
+        return cls.start(interface, ["--bench", str(bench), "--on", url], namespace)
+
+    @property
+    def pid(self) -> int:
+        """Process of the segment."""
+        return self._process.pid
+
+    def command(self, do: str, **arguments: object) -> Any:
+        """Send one command and return its result.
+
+        Raises:
+            ValueError: the segment refuses it; the message is its own.
+            LinkLost: the segment has ended.
+            LinkTimeout: no answer within `ANSWER_TIMEOUT_S`.
+        """
+        self._next_id += 1
+        message = {"id": self._next_id, "do": do, **arguments}
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(message).encode() + b"\n")
+            self._process.stdin.flush()
+        except OSError as error:
+            raise self._ended() from error
+        deadline = time.monotonic() + ANSWER_TIMEOUT_S
+        while True:
+            answer = self._receive(deadline - time.monotonic())
+            if answer.get("id") == self._next_id:
+                break
+        if not answer["ok"]:
+            raise ValueError(f"virtual segment refuses {do!r}: {answer['error']}")
+        return answer.get("result")
+
+    def kill(self) -> None:
+        """End it at once, as a crash would."""
+        self._process.kill()
+        self._process.wait()
+
+    def close(self) -> None:
+        """End it in order. Calling again does nothing."""
+        process = self._process
+        if process.stdin is not None:
+            with contextlib.suppress(OSError):
+                process.stdin.close()
+        try:
+            process.wait(timeout=5)
+        except subprocess.TimeoutExpired:
+            self.kill()
+        for stream in (process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()
+
+    def __enter__(self) -> VirtualSegment:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _receive(self, timeout_s: float) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        handle = self._process.stdout.fileno()
+        deadline = time.monotonic() + timeout_s
+        with selectors.DefaultSelector() as selector:
+            selector.register(handle, selectors.EVENT_READ)
+            while b"\n" not in self._buffer:
+                if not selector.select(max(0.0, deadline - time.monotonic())):
+                    raise LinkTimeout(f"the virtual segment is silent for {timeout_s:.1f} s")
+                data = os.read(handle, 65536)
+                if not data:
+                    raise self._ended()
+                self._buffer += data
+        line, _, self._buffer = self._buffer.partition(b"\n")
+        message: dict[str, Any] = json.loads(line)
+        return message
+
+    def _ended(self) -> LinkLost:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout=2)
+        words = b""
+        if self._process.stderr is not None and self._process.poll() is not None:
+            words = self._process.stderr.read()
+        text = words.decode(errors="replace").strip().splitlines()
+        reason = text[-1] if text else f"exit status {self._process.poll()}"
+        return LinkLost(f"the virtual segment has ended: {reason}")

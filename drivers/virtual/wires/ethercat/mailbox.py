@@ -1,0 +1,166 @@
+"""The mailbox of one slave (ETG.1000.4 clause 7): counters, queue, repeat, errors.
+
+A request waits ``delay_ns`` before it is answered, one at a time: meanwhile the next one stays in
+sync manager 0, which is then full. A lost answer is repeated when the master toggles the repeat
+request; a request that comes twice with the same counter is taken once.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from typing import Protocol
+
+from drivers.virtual.wires.ethercat.coe import CoeServer, MailboxError
+from drivers.virtual.wires.ethercat.syncmanager import SyncManager
+
+HEADER = 6
+_ERROR, _COE, _FOE = 0, 3, 4
+_SYNTAX, _UNSUPPORTED, _INVALID_HEADER, _INVALID_SIZE = 0x01, 0x02, 0x05, 0x08
+
+
+class FileServer(Protocol):
+    """A file service behind the mailbox (FoE)."""
+
+    def handle(self, payload: bytes) -> list[bytes]:
+        """Answers to one FoE message."""
+
+
+class Mailbox:
+    """Both directions of one slave's mailbox."""
+
+    def __init__(
+        self, inbox: SyncManager, outbox: SyncManager, coe: CoeServer, foe: FileServer | None
+    ) -> None:
+        self._inbox = inbox
+        self._outbox = outbox
+        self._coe = coe
+        self._foe = foe
+        self.delay_ns = 0
+        self.muted = False
+        """Trouble: requests are taken and never answered."""
+        self.die_after_segments: int | None = None
+        """Trouble: no answer after this many segments of a segmented transfer."""
+        self.open = False
+        self._due_ns: int | None = None
+        self._request = b""
+        self._queue: deque[bytes] = deque()
+        self._last_sent = b""
+        self._last_counter = 0
+        self._counter = 0
+        inbox.on_written = self._written
+        outbox.on_read = self._send_next
+        self._now_ns = 0
+
+    @property
+    def due_ns(self) -> int | None:
+        """When a request under way will be answered."""
+        return self._due_ns
+
+    def start(self) -> None:
+        """Pre-Op is entered from below: fresh counters, empty boxes."""
+        self.open = True
+        self._inbox.locked = self._outbox.locked = False
+        self._inbox.reset()
+        self._outbox.reset()
+        self._outbox.repeat_ack = self._outbox.repeat_request
+        self._queue.clear()
+        self._due_ns = None
+        self._last_counter = self._counter = 0
+        self._last_sent = b""
+        self._coe.reset()
+
+    def stop(self) -> None:
+        """Init: nothing goes in or out."""
+        self.open = False
+        self._inbox.locked = self._outbox.locked = True
+        self._inbox.full = self._outbox.full = False
+        self._due_ns = None
+        self._queue.clear()
+
+    def at(self, now_ns: int) -> None:
+        """Time of the access that comes next; sync managers know no time."""
+        self._now_ns = now_ns
+
+    def run(self, now_ns: int) -> None:
+        """Answer the request that is due, then take the next one."""
+        self._now_ns = now_ns
+        while self._due_ns is not None and self._due_ns <= now_ns:
+            done_ns, self._due_ns = self._due_ns, None
+            self._answer(self._request)
+            self._take(done_ns)
+
+    def repeat_toggled(self) -> None:
+        """The master has written the activation byte of sync manager 1."""
+        if self._outbox.repeat_request == self._outbox.repeat_ack:
+            return
+        if self._last_sent and not self._outbox.full:
+            self._outbox.put(self._last_sent)
+        self._outbox.repeat_ack = self._outbox.repeat_request
+
+    def emergency(self, code: int, register: int, data: bytes) -> None:
+        """Queue an emergency; without an open mailbox it is lost, as in a drive."""
+        if self.open and not self.muted:
+            self._post(_COE, CoeServer.emergency(code, register, data))
+
+    # -- requests -------------------------------------------------------------------------------
+
+    def _written(self) -> None:
+        if self._due_ns is None:
+            self._take(self._now_ns)
+
+    def _take(self, now_ns: int) -> None:
+        if not self._inbox.full or not self.open:
+            return
+        message = self._inbox.take()
+        counter = message[5] >> 4 & 0x07
+        if counter and counter == self._last_counter:
+            return
+        self._last_counter = counter
+        self._request = message
+        self._due_ns = now_ns + self.delay_ns
+        if not self.delay_ns:
+            self.run(now_ns)
+
+    def _answer(self, message: bytes) -> None:
+        length, _, _, kind = struct.unpack_from("<HHBB", message)
+        if self.muted:
+            return
+        if length + HEADER > len(message):
+            self._error(_INVALID_SIZE)
+            return
+        payload = message[HEADER : HEADER + length]
+        kind &= 0x0F
+        try:
+            if kind == _COE:
+                answers = self._coe.handle(payload)
+            elif kind == _FOE and self._foe is not None:
+                answers = self._foe.handle(payload)
+            else:
+                raise MailboxError(_UNSUPPORTED)
+        except MailboxError as error:
+            self._error(error.detail)
+            return
+        limit = self.die_after_segments
+        if limit is not None and self._coe.segments_answered > limit:
+            self.muted = True
+            return
+        for answer in answers:
+            self._post(kind, answer)
+
+    def _error(self, detail: int) -> None:
+        self._post(_ERROR, struct.pack("<HH", 0x0001, detail))
+
+    # -- answers --------------------------------------------------------------------------------
+
+    def _post(self, kind: int, payload: bytes) -> None:
+        self._counter = self._counter % 7 + 1
+        header = struct.pack("<HHBB", len(payload), 0, 0, kind | self._counter << 4)
+        self._queue.append(header + payload)
+        if not self._outbox.full:
+            self._send_next()
+
+    def _send_next(self) -> None:
+        if self._queue:
+            self._last_sent = self._queue.popleft()
+            self._outbox.put(self._last_sent)

@@ -1,0 +1,162 @@
+"""Process data of one slave: outputs taken and inputs latched at SYNC0 or at the frame's event.
+
+With SYNC0 the physics run on the slave's own grid and are computed lazily, when a frame comes;
+a frame that comes too late leaves the outputs of the cycle before in force, as in a drive.
+"""
+
+from __future__ import annotations
+
+from drivers.virtual.device import Device, ProcessImage, SdoAbort
+from drivers.virtual.wires.ethercat.dc import DistributedClock
+from drivers.virtual.wires.ethercat.dictionary import CoeDictionary, SyncReport
+from drivers.virtual.wires.ethercat.registers import AlCode
+from drivers.virtual.wires.ethercat.syncmanager import SyncManager
+
+_FREE_RUN, _SYNC_MANAGER, _SYNC0 = 0, 1, 2
+
+
+class ProcessData:
+    """Binds the mapping to the sync managers 2 and 3 and to the time grid."""
+
+    def __init__(
+        self,
+        device: Device,
+        dictionary: CoeDictionary,
+        report: SyncReport,
+        clock: DistributedClock,
+        outputs: SyncManager,
+        inputs: SyncManager,
+    ) -> None:
+        self._device = device
+        self._dictionary = dictionary
+        self._report = report
+        self._clock = clock
+        self._outputs = outputs
+        self._inputs = inputs
+        self._rx: ProcessImage | None = None
+        self._tx: ProcessImage | None = None
+        self._latest = b""
+        self._fresh = False
+        self._running = False
+        self._operational = False
+        self._ticked_ns = -1
+        outputs.on_written = self._written
+        self._now_ns = 0
+        self.received = False
+        """Outputs have come since Safe-Op was entered."""
+        self.written_ns: int | None = None
+        """When outputs came last; starts the watchdog."""
+
+    @property
+    def has_outputs(self) -> bool:
+        """Something is mapped from master to drive."""
+        return self._rx is not None and self._rx.size > 0
+
+    def check(self) -> int:
+        """Compare mapping, sync managers and clock before Safe-Op: an AL status code or 0."""
+        for direction, manager, mapping_code, config_code in (
+            ("rx", self._outputs, AlCode.INVALID_OUTPUT_MAPPING, AlCode.INVALID_OUTPUT_CONFIG),
+            ("tx", self._inputs, AlCode.INVALID_INPUT_MAPPING, AlCode.INVALID_INPUT_CONFIG),
+        ):
+            try:
+                image = self._bind(direction)
+            except SdoAbort:
+                return mapping_code
+            size = image.size if image else 0
+            used = manager.length if manager.enabled else 0
+            wrong_way = manager.writable != (direction == "rx") or manager.mailbox
+            if used != size or (size and wrong_way):
+                return config_code
+        if self._clock.sync0_requested:
+            return self._check_cycle()
+        return AlCode.NONE
+
+    def _check_cycle(self) -> int:
+        if self._clock.sync0_cycle_ns == 0:
+            return AlCode.INVALID_DC_CONFIG
+        pdo = self._device.profile.pdo
+        cycle_us = self._clock.sync0_cycle_ns / 1000
+        low = pdo.cycle_min_us if pdo else None
+        high = pdo.cycle_max_us if pdo else None
+        if (low is not None and cycle_us < low) or (high is not None and cycle_us > high):
+            return AlCode.INVALID_SYNC_CYCLE
+        return AlCode.NONE
+
+    def _bind(self, direction: str) -> ProcessImage | None:
+        entries = self._dictionary.assigned(direction)
+        return self._device.map_process_data(list(entries), direction) if entries else None
+
+    def start(self, now_ns: int) -> None:
+        """Safe-Op: bind the mapping, unlock the sync managers, give the first inputs."""
+        self._rx, self._tx = self._bind("rx"), self._bind("tx")
+        self._outputs.locked = self._inputs.locked = False
+        self._latest, self._fresh, self.received = b"", False, False
+        self._ticked_ns = now_ns
+        self._running = True
+        self.written_ns = None
+        self._device.advance(now_ns)
+        self._latch()
+
+    def stop(self) -> None:
+        """Below Safe-Op nothing is exchanged."""
+        self._running = self._operational = False
+        self._outputs.locked = self._inputs.locked = True
+        self._rx = self._tx = None
+        self._report.mode = _FREE_RUN
+
+    def operate(self, on: bool) -> None:
+        """In Op the outputs act; in Safe-Op they are received and ignored."""
+        self._operational = on
+        if on:
+            self._report.mode = _SYNC0 if self._clock.sync0_requested else _SYNC_MANAGER
+            self._report.cycle_ns = self._clock.sync0_cycle_ns
+            self._report.missed = 0
+
+    @property
+    def next_tick_ns(self) -> int | None:
+        """Next SYNC0 that has work to do."""
+        return self._clock.next_sync0(self._ticked_ns) if self._running else None
+
+    def tick(self, now_ns: int) -> None:
+        """SYNC0 at ``now_ns``: take outputs, latch inputs."""
+        self._ticked_ns = now_ns
+        self._device.advance(now_ns)
+        if self._operational:
+            if not self._fresh and self.has_outputs:
+                self._report.missed += 1
+            self._fresh = False
+            if self._rx is not None and self._latest:
+                self._rx.unpack(self._latest)
+        self._latch()
+
+    def skip_to(self, now_ns: int) -> None:
+        """Outside Op nothing happens at a SYNC0 but the latching of inputs: do only the last."""
+        if self._operational:
+            return
+        last = self._clock.last_sync0(now_ns)
+        if last is not None and last > self._ticked_ns:
+            self.tick(last)
+
+    def at(self, now_ns: int) -> None:
+        """Time of the access that comes next."""
+        self._now_ns = now_ns
+
+    def _written(self) -> None:
+        self._latest = bytes(self._outputs.data)
+        self._fresh = self.received = True
+        self.written_ns = self._now_ns
+
+    def after_frame(self, now_ns: int) -> None:
+        """Without SYNC0 the event of the sync manager takes outputs and latches inputs."""
+        if not self._running or self._clock.sync0_requested:
+            return
+        if self._fresh or not self.has_outputs:
+            self._device.advance(now_ns)
+            if self._operational and self._rx is not None and self._fresh:
+                self._rx.unpack(self._latest)
+            self._fresh = False
+            self._latch()
+
+    def _latch(self) -> None:
+        if self._tx is not None:
+            self._inputs.data[:] = self._tx.pack()

@@ -1,0 +1,194 @@
+"""A line of slaves: one frame in, the same frame back with everybody's data and counters.
+
+Addressing and working counters follow ETG.1000.4 clause 5.4: position and broadcast addresses
+are incremented by every slave, a read counts 1, a write 1, in read-write commands a write 2.
+"""
+
+from __future__ import annotations
+
+import random
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drivers.virtual.wires.ethercat import registers as reg
+from drivers.virtual.wires.ethercat.clock import WireClock
+from drivers.virtual.wires.ethercat.line import Line
+from drivers.virtual.wires.ethercat.registers import Command
+from drivers.virtual.wires.ethercat.slave import Slave
+from drivers.virtual.wires.ethercat.trouble import Trouble
+
+ETHERTYPE = b"\x88\xa4"
+_ETHERNET, _HEADER, _DATAGRAM = 14, 2, 10
+_LENGTH_MASK = 0x07FF
+_LOGICAL = frozenset({Command.LRD, Command.LWR, Command.LRW})
+
+
+@dataclass(frozen=True, slots=True)
+class _Datagram:
+    """Where one datagram lies in the frame."""
+
+    command: int
+    at: int
+    length: int
+
+    @property
+    def data(self) -> slice:
+        """Its data."""
+        return slice(self.at + _DATAGRAM, self.at + _DATAGRAM + self.length)
+
+
+def datagrams(frame: bytes | bytearray) -> list[_Datagram]:
+    """Split a frame; a malformed rest is left out, as a controller leaves it alone."""
+    found: list[_Datagram] = []
+    at = _ETHERNET + _HEADER
+    while at + _DATAGRAM + 2 <= len(frame):
+        word = frame[at + 6] | frame[at + 7] << 8
+        length = word & _LENGTH_MASK
+        if at + _DATAGRAM + length + 2 > len(frame):
+            break
+        found.append(_Datagram(frame[at], at, length))
+        if not word & 0x8000:
+            break
+        at += _DATAGRAM + length + 2
+    return found
+
+
+class Segment:
+    """N slaves in a line. Not thread-safe."""
+
+    def __init__(self, slaves: Sequence[Slave], clock: WireClock, seed: int = 1) -> None:
+        self.slaves = list(slaves)
+        self.clock = clock
+        self.line = Line(self.slaves)
+        # Reproducible trouble, not a secret.
+        self.trouble = Trouble(random.Random(seed))  # noqa: S311
+        self.frames = 0
+        self.reply_delay_ns = 0
+        """How long the reply of the last frame is to be held back."""
+
+    def process_frame(self, frame: bytes, age_ns: int = 0) -> bytes | None:
+        """One frame from the master; None when nothing comes back.
+
+        ``age_ns`` is how long ago it arrived, where the network stack tells.
+        """
+        if len(frame) < _ETHERNET + _HEADER or frame[12:14] != ETHERTYPE:
+            return None
+        parts = datagrams(frame)
+        cyclic = any(part.command in _LOGICAL for part in parts)
+        now = self.clock.arrival(cyclic, self._cycle_ns() if cyclic else 0, age_ns)
+        self.frames += 1
+        reach = self.line.update(now)
+        fate = self.trouble.frame_fate(cyclic)
+        self.reply_delay_ns = fate.delay_ns
+        if fate.lost_outbound or not reach:
+            return None
+        if fate.corrupt_at is not None:
+            self.line.count_crc_error(*fate.corrupt_at)
+            reach = reach[: fate.corrupt_at[0]]
+        buffer = bytearray(frame)
+        for slave in reach:
+            slave.run(now)
+        for part in parts:
+            self._execute(part, buffer, reach, now)
+            if part.command in _LOGICAL and fate.counter_offset:
+                _count(buffer, part, fate.counter_offset)
+        for slave in reach:
+            slave.after_frame(now)
+        if fate.corrupt_at is not None or fate.lost_inbound:
+            return None
+        buffer[6] |= 0x02  # a controller marks the source address as locally administered
+        return bytes(buffer)
+
+    def settle(self) -> int:
+        """Let time pass for every slave without a frame; returns the present time."""
+        now = self.clock.now()
+        self.line.update(now)
+        for slave in self.slaves:
+            slave.run(now)
+        return now
+
+    def _cycle_ns(self) -> int:
+        for slave in self.slaves:
+            if slave.dc.sync0_first_ns is not None:
+                return slave.dc.sync0_cycle_ns
+        return 0
+
+    def _execute(
+        self, part: _Datagram, buffer: bytearray, reach: Sequence[Slave], now: int
+    ) -> None:
+        command = part.command
+        if command in _LOGICAL:
+            self._logical(part, buffer, reach, now)
+            return
+        if not Command.APRD <= command <= Command.FRMW:
+            return
+        position, offset = struct.unpack_from("<HH", buffer, part.at + 2)
+        auto = command <= Command.APRW or command == Command.ARMW
+        broadcast = Command.BRD <= command <= Command.BRW
+        for slave in reach:
+            if broadcast:
+                self._physical(slave, part, buffer, offset, command, now)
+                position = (position + 1) & 0xFFFF
+                continue
+            if auto:
+                mine = position == 0
+                position = (position + 1) & 0xFFFF
+            else:
+                mine = slave.answers_to(position)
+            if command in (Command.ARMW, Command.FRMW):
+                action = Command.FPRD if mine else Command.FPWR
+                self._physical(slave, part, buffer, offset, action, now)
+            elif mine:
+                self._physical(slave, part, buffer, offset, command, now)
+        if auto or broadcast:
+            struct.pack_into("<H", buffer, part.at + 2, position)
+
+    @staticmethod
+    def _physical(
+        slave: Slave, part: _Datagram, buffer: bytearray, offset: int, command: int, now: int
+    ) -> None:
+        """One slave, one datagram: kinds repeat every three commands (read, write, both)."""
+        kind = (command - 1) % 3
+        incoming = bytes(buffer[part.data])
+        counted = 0
+        if kind != 1:
+            data = slave.read(offset, part.length, now)
+            if data is not None:
+                if Command.BRD <= command <= Command.BRW:
+                    data = bytes(a | b for a, b in zip(incoming, data, strict=True))
+                buffer[part.data] = data
+                counted += 1
+        if kind != 0 and slave.write(offset, incoming, now):
+            counted += 2 if kind == 2 else 1
+        if counted:
+            _count(buffer, part, counted)
+
+    @staticmethod
+    def _logical(part: _Datagram, buffer: bytearray, reach: Sequence[Slave], now: int) -> None:
+        address = struct.unpack_from("<I", buffer, part.at + 2)[0]
+        reading = part.command != Command.LWR
+        writing = part.command != Command.LRD
+        data = bytearray(buffer[part.data])
+        counted = 0
+        for slave in reach:
+            read, wrote = slave.logical(address, data, reading, writing, now)
+            counted += read
+            if wrote:
+                counted += 2 if reading else 1
+        buffer[part.data] = data
+        _count(buffer, part, counted)
+
+
+def _count(buffer: bytearray, part: _Datagram, by: int) -> None:
+    at = part.at + _DATAGRAM + part.length
+    counter = (buffer[at] | buffer[at + 1] << 8) + by & 0xFFFF
+    buffer[at], buffer[at + 1] = counter & 0xFF, counter >> 8
+
+
+def register(slave: Slave, address: int, length: int) -> int:
+    """A register's present value, for tests and the control channel."""
+    return int.from_bytes(slave.memory[address : address + length], "little")
+
+
+__all__ = ["ETHERTYPE", "Segment", "datagrams", "reg", "register"]

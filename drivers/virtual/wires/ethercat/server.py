@@ -1,0 +1,162 @@
+"""The segment on a network interface: a raw socket, the clock, and late replies."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import heapq
+import os
+import selectors
+import socket
+import struct
+import time
+from pathlib import Path
+from typing import IO
+
+from drivers.errors import LinkLost
+from drivers.virtual.wires.ethercat.control import Control
+from drivers.virtual.wires.ethercat.segment import Segment
+
+_ETH_P_ECAT = 0x88A4
+_SO_TIMESTAMPNS = 35
+_PACKET_IGNORE_OUTGOING = 23
+_SOL_PACKET = 263
+_LONGEST = 1600
+_STALE_NS = 1_000_000_000
+
+
+class InterfaceLock:
+    """One slave segment per interface; held as long as the object lives."""
+
+    def __init__(self, interface: str) -> None:
+        # The inode of the network namespace tells equal names in different namespaces apart.
+        space = Path("/proc/self/ns/net").stat().st_ino
+        folder = Path(os.environ.get("XDG_RUNTIME_DIR") or "/tmp")  # noqa: S108
+        path = folder / f"servodeck-ec-{os.getuid()}-{space}-{interface}.lock"
+        self._handle = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        try:
+            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            os.close(self._handle)
+            raise LinkLost(
+                f"another virtual segment already answers on {interface}",
+                remedy="stop it or choose another interface",
+            ) from error
+
+    def release(self) -> None:
+        """Let go."""
+        os.close(self._handle)
+
+
+def open_socket(interface: str) -> socket.socket:
+    """A raw socket for EtherCAT frames that come in on ``interface``.
+
+    Raises:
+        LinkLost: no such interface or no permission; the message says which.
+    """
+    if len(interface.encode()) > 15:
+        raise LinkLost(f"interface name {interface!r} is longer than 15 bytes")
+    try:
+        raw = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0)
+    except PermissionError as error:
+        raise LinkLost(
+            "no permission for raw sockets",
+            remedy="run inside a private network (see drivers.virtual.wires.netns) or as root",
+        ) from error
+    try:
+        raw.setsockopt(_SOL_PACKET, _PACKET_IGNORE_OUTGOING, 1)
+        raw.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+        # "Ready" is only true after bind: earlier frames would be lost.
+        raw.bind((interface, _ETH_P_ECAT))
+    except OSError as error:
+        raw.close()
+        raise LinkLost(f"cannot use interface {interface}: {error.strerror}") from error
+    raw.setblocking(False)
+    return raw
+
+
+class SegmentServer:
+    """Answers frames and control commands until its control channel closes or says stop."""
+
+    def __init__(
+        self, interface: str, segment: Segment, commands: IO[bytes], answers: IO[bytes]
+    ) -> None:
+        self._segment = segment
+        self._control = Control(segment, interface, answers)
+        self._commands = commands.fileno()
+        self._lock = InterfaceLock(interface)
+        try:
+            self._socket = open_socket(interface)
+        except LinkLost:
+            self._lock.release()
+            raise
+        self._late: list[tuple[int, int, bytes]] = []
+        self._sequence = 0
+
+    def run(self) -> None:
+        """Serve. Returns when told to stop."""
+        with selectors.DefaultSelector() as selector:
+            wire = selector.register(self._socket, selectors.EVENT_READ)
+            selector.register(self._commands, selectors.EVENT_READ)
+            self._control.ready()
+            while not self._control.stopped:
+                for key, _ in selector.select(self._wait_s()):
+                    if key is wire or key.fd == wire.fd:
+                        self._drain()
+                    elif not self._command():
+                        return
+                self._send_late()
+
+    def close(self) -> None:
+        """Free socket and interface."""
+        self._socket.close()
+        self._lock.release()
+
+    def _wait_s(self) -> float | None:
+        if not self._late:
+            return None
+        return max(0.0, (self._late[0][0] - time.monotonic_ns()) / 1e9)
+
+    def _command(self) -> bool:
+        data = os.read(self._commands, 65536)
+        if data:
+            self._control.feed(data)
+        return bool(data)
+
+    def _drain(self) -> None:
+        """All frames that wait, at most a batch, so that commands are heard too."""
+        for _ in range(64):
+            try:
+                frame, ancillary, _, _ = self._socket.recvmsg(_LONGEST, 64)
+            except BlockingIOError:
+                return
+            except OSError:
+                return  # the interface was switched off; it may come back
+            reply = self._segment.process_frame(frame, _age_ns(ancillary))
+            if reply is None:
+                continue
+            delay = self._segment.reply_delay_ns
+            if delay:
+                self._sequence += 1
+                heapq.heappush(self._late, (time.monotonic_ns() + delay, self._sequence, reply))
+            else:
+                self._send(reply)
+
+    def _send_late(self) -> None:
+        while self._late and self._late[0][0] <= time.monotonic_ns():
+            self._send(heapq.heappop(self._late)[2])
+
+    def _send(self, frame: bytes) -> None:
+        # A full queue or a dead interface loses the frame, as a cable would.
+        with contextlib.suppress(OSError):
+            self._socket.send(frame)
+
+
+def _age_ns(ancillary: list[tuple[int, int, bytes]]) -> int:
+    """How long ago the kernel saw the frame; 0 if it does not tell or its clock was set."""
+    for level, kind, data in ancillary:
+        if level == socket.SOL_SOCKET and kind == _SO_TIMESTAMPNS and len(data) >= 16:
+            seconds, nanoseconds = struct.unpack_from("qq", data)
+            age = time.time_ns() - (seconds * 1_000_000_000 + nanoseconds)
+            return age if 0 <= age < _STALE_NS else 0
+    return 0

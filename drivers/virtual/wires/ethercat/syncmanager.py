@@ -1,0 +1,182 @@
+"""Sync managers and FMMUs: who may touch which byte of process memory, and when.
+
+ETG.1000.4 clauses 6.6 and 6.7. In mailbox mode a buffer is written once and read once, its state
+changing on the last byte; in buffered mode the newest complete data win.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+MAILBOX_FULL = 0x08
+_MODE_MAILBOX = 0x02
+_DIRECTION_WRITE = 0x04
+_WATCHDOG_TRIGGER = 0x40
+_ENABLE = 0x01
+_REPEAT = 0x02
+
+
+def _ignore() -> None:
+    """Default of the callbacks below."""
+
+
+@dataclass(slots=True)
+class SyncManager:
+    """One channel. ``locked`` is the slave application's side of the switch (PDI control bit 0)."""
+
+    number: int
+    start: int = 0
+    length: int = 0
+    control: int = 0
+    activate: int = 0
+    locked: bool = True
+    full: bool = False
+    repeat_ack: bool = False
+    data: bytearray = field(default_factory=bytearray)
+    on_written: Callable[[], None] = _ignore
+    on_read: Callable[[], None] = _ignore
+    _opened: bool = False
+
+    @property
+    def end(self) -> int:
+        """First address behind the buffer."""
+        return self.start + self.length
+
+    @property
+    def enabled(self) -> bool:
+        """Switched on by the master."""
+        return bool(self.activate & _ENABLE) and self.length > 0
+
+    @property
+    def mailbox(self) -> bool:
+        """Mailbox mode rather than three buffers."""
+        return self.control & 0x03 == _MODE_MAILBOX
+
+    @property
+    def writable(self) -> bool:
+        """The master writes, the slave reads."""
+        return self.control & 0x0C == _DIRECTION_WRITE
+
+    @property
+    def watches(self) -> bool:
+        """Writing triggers the process-data watchdog."""
+        return bool(self.control & _WATCHDOG_TRIGGER)
+
+    @property
+    def repeat_request(self) -> bool:
+        """The master's repeat toggle."""
+        return bool(self.activate & _REPEAT)
+
+    def configure(self, raw: bytes) -> None:
+        """Take over 8 register bytes; status (+5) and PDI control (+7) are not the master's."""
+        before = (self.start, self.length, self.control, self.activate & _ENABLE)
+        self.start, self.length, self.control = struct.unpack_from("<HHB", raw)
+        self.activate = raw[6]
+        if before != (self.start, self.length, self.control, self.activate & _ENABLE):
+            self.reset()
+
+    def reset(self) -> None:
+        """Empty buffer, as after power-on or reconfiguration."""
+        self.data = bytearray(self.length)
+        self.full = False
+        self._opened = False
+
+    def registers(self) -> bytes:
+        """The 8 register bytes as the master reads them."""
+        status = MAILBOX_FULL if self.full and self.mailbox else 0
+        pdi = (_ENABLE if self.locked else 0) | (_REPEAT if self.repeat_ack else 0)
+        return struct.pack(
+            "<HHBBBB", self.start, self.length, self.control, status, self.activate, pdi
+        )
+
+    def read(self, address: int, length: int) -> bytes | None:
+        """The master reads; None where the channel does not allow it (working counter stays)."""
+        if self.locked or self.writable:
+            return None
+        offset = address - self.start
+        if not self.mailbox:
+            data = self.data[offset : offset + length] if offset >= 0 else None
+            if data is not None and offset + length >= self.length:
+                self.on_read()
+            return None if data is None else bytes(data)
+        if not self.full or offset < 0 or (offset and not self._opened):
+            return None
+        self._opened = True
+        taken = bytes(self.data[offset : offset + length]).ljust(length, b"\0")
+        if offset + length >= self.length:
+            self._opened = False
+            self.full = False
+            self.on_read()
+        return taken
+
+    def write(self, address: int, data: bytes) -> bool:
+        """The master writes; False where the channel does not allow it."""
+        if self.locked or not self.writable:
+            return False
+        offset = address - self.start
+        if offset < 0 or offset + len(data) > self.length:
+            return False
+        if self.mailbox and (self.full or (offset and not self._opened)):
+            return False
+        self._opened = True
+        self.data[offset : offset + len(data)] = data
+        if offset + len(data) == self.length:
+            self._opened = False
+            self.full = self.mailbox
+            self.on_written()
+        return True
+
+    def put(self, message: bytes) -> None:
+        """The slave fills a mailbox that the master will read."""
+        self.data = bytearray(message.ljust(self.length, b"\0")[: self.length])
+        self._opened = False
+        self.full = True
+
+    def take(self) -> bytes:
+        """The slave empties a mailbox that the master has written."""
+        self.full = False
+        return bytes(self.data)
+
+
+@dataclass(frozen=True, slots=True)
+class Fmmu:
+    """One logical-to-physical mapping (ETG.1000.4 table 56)."""
+
+    start: int
+    length: int
+    start_bit: int
+    stop_bit: int
+    physical: int
+    physical_bit: int
+    reads: bool
+    writes: bool
+
+    @property
+    def end(self) -> int:
+        """First logical byte address behind it."""
+        return self.start + self.length
+
+    @property
+    def bytewise(self) -> bool:
+        """Whole bytes only, the usual case."""
+        return self.start_bit == 0 and self.stop_bit == 7 and self.physical_bit == 0
+
+    def bits(self) -> range:
+        """Logical bit addresses covered."""
+        last = (self.end - 1) * 8 + self.stop_bit
+        return range(self.start * 8 + self.start_bit, last + 1)
+
+
+def parse_fmmu(raw: bytes) -> Fmmu | None:
+    """16 register bytes to a mapping, None while it is not activated."""
+    start, length, start_bit, stop_bit, physical, physical_bit, kind, active = struct.unpack_from(
+        "<IHBBHBBB", raw
+    )
+    if not active & 1 or not length:
+        return None
+    return Fmmu(
+        start, length, start_bit & 7, stop_bit & 7, physical, physical_bit & 7,
+        bool(kind & 1), bool(kind & 2),
+    )  # fmt: skip

@@ -1,0 +1,269 @@
+"""Network namespaces for an ordinary user: virtual cables that nobody else can see.
+
+A *holder* process creates a user and network namespace, makes veth pairs in it by netlink (no
+system package needed) and lives until its standard input closes. Other processes run inside by
+`Namespace.command`, or join by `enter` while they still have a single thread.
+
+Run as a module it is the holder (``--hold PAIR…``) or joins and executes (``--join PID -- …``).
+It imports nothing heavy: a namespace can be changed only while there is one thread.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import errno
+import os
+import socket
+import struct
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+_CLONE_NEWUSER = 0x10000000
+_CLONE_NEWNET = 0x40000000
+
+_RTM_NEWLINK = 16
+_REQUEST, _ACK, _EXCLUSIVE, _CREATE = 0x01, 0x04, 0x200, 0x400
+_IFLA_IFNAME, _IFLA_LINKINFO, _IFLA_AF_SPEC = 3, 18, 26
+_INFO_KIND, _INFO_DATA, _VETH_PEER = 1, 2, 1
+_ADDR_GEN_MODE, _ADDR_GEN_NONE = 8, 1
+_UP = 0x1
+_NESTED = 0x8000
+
+_REMEDY = (
+    "allow unprivileged user namespaces (sysctl kernel.unprivileged_userns_clone=1 or "
+    "kernel.apparmor_restrict_unprivileged_userns=0; in a container, its security profile), or "
+    "run as root"
+)
+
+
+class NamespaceUnavailable(Exception):
+    """The system forbids namespaces; the message says what failed and the ways to allow it."""
+
+
+def unavailable() -> str | None:
+    """Why namespaces cannot be used here, in one sentence; None if they can."""
+    try:
+        Namespace.create().close()
+    except NamespaceUnavailable as error:
+        return str(error)
+    return None
+
+
+class Namespace:
+    """A user and network namespace with veth pairs; closes with its owner."""
+
+    def __init__(self, holder: subprocess.Popen[str], pairs: tuple[tuple[str, str], ...]) -> None:
+        self._holder = holder
+        self.pairs = pairs
+
+    @classmethod
+    def create(cls, pairs: Sequence[tuple[str, str]] = (("ec0m", "ec0s"),)) -> Namespace:
+        """Start a holder with these veth pairs, all up.
+
+        Raises:
+            NamespaceUnavailable: with the reason and what would allow it.
+        """
+        if not sys.platform.startswith("linux"):
+            raise NamespaceUnavailable("virtual EtherCAT cables need Linux network namespaces")
+        for name in (name for pair in pairs for name in pair):
+            if not 0 < len(name.encode()) <= 15:
+                raise ValueError(f"interface name {name!r} must have 1 to 15 bytes")
+        names = [name for pair in pairs for name in pair]
+        holder = subprocess.Popen(
+            [*_python(), "--hold", *names],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=child_environment(),
+        )  # fmt: skip
+        assert holder.stdout is not None
+        answer = holder.stdout.readline().strip()
+        if answer != "ready":
+            namespace = cls(holder, ())
+            namespace.close()
+            reason = answer or "the helper process ended without a word"
+            raise NamespaceUnavailable(f"no private network here: {reason}. Remedy: {_REMEDY}")
+        return cls(holder, tuple(pairs))
+
+    @property
+    def pid(self) -> int:
+        """Process whose namespaces others join."""
+        return self._holder.pid
+
+    def command(self, argv: Sequence[str]) -> list[str]:
+        """The command line that runs ``argv`` inside."""
+        return [*_python(), "--join", str(self.pid), "--", *argv]
+
+    def popen(self, argv: Sequence[str], **options: object) -> subprocess.Popen[str]:
+        """Start ``argv`` inside, with text pipes as the options of `subprocess.Popen` say."""
+        environment = child_environment()
+        command = self.command(argv)
+        return subprocess.Popen(command, text=True, env=environment, **options)  # type: ignore[call-overload, no-any-return]
+
+    def close(self) -> None:
+        """End the holder; the namespace goes when its last process ends."""
+        for stream in (self._holder.stdin, self._holder.stdout):
+            if stream is not None:
+                with contextlib.suppress(OSError):
+                    stream.close()
+        try:
+            self._holder.wait(timeout=5)
+        except subprocess.TimeoutExpired:
+            self._holder.kill()
+            self._holder.wait()
+
+    def __enter__(self) -> Namespace:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def enter(pid: int) -> None:
+    """Move this process into the namespaces of ``pid``. It must have a single thread.
+
+    Raises:
+        NamespaceUnavailable: not permitted, more than one thread, or no such process.
+    """
+    libc = ctypes.CDLL(None, use_errno=True)
+    for kind, flag in (("user", _CLONE_NEWUSER), ("net", _CLONE_NEWNET)):
+        path = Path(f"/proc/{pid}/ns/{kind}")
+        try:
+            if path.samefile(f"/proc/self/ns/{kind}"):
+                continue
+            handle = os.open(path, os.O_RDONLY)
+        except OSError as error:
+            raise NamespaceUnavailable(f"cannot open {path}: {error.strerror}") from error
+        try:
+            if libc.setns(handle, flag):
+                reason = os.strerror(ctypes.get_errno())
+                raise NamespaceUnavailable(f"cannot join the {kind} namespace of {pid}: {reason}")
+        finally:
+            os.close(handle)
+
+
+def _python() -> list[str]:
+    return [sys.executable, "-m", "drivers.virtual.wires.netns"]
+
+
+def child_environment() -> dict[str, str]:
+    """Children find the package wherever they start."""
+    root = str(Path(__file__).resolve().parents[3])
+    path = os.environ.get("PYTHONPATH")
+    return {**os.environ, "PYTHONPATH": f"{root}:{path}" if path else root}
+
+
+# -- inside the holder --------------------------------------------------------------------------
+
+
+def _unshare() -> None:
+    """New user and network namespace; with root and no user namespaces, the network alone."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    uid, gid = os.geteuid(), os.getegid()
+    if libc.unshare(_CLONE_NEWUSER | _CLONE_NEWNET) == 0:
+        # The kernel wants setgroups denied before an ordinary user may map a group.
+        Path("/proc/self/setgroups").write_text("deny", encoding="ascii")
+        Path("/proc/self/uid_map").write_text(f"0 {uid} 1", encoding="ascii")
+        Path("/proc/self/gid_map").write_text(f"0 {gid} 1", encoding="ascii")
+        return
+    code = ctypes.get_errno()
+    if libc.unshare(_CLONE_NEWNET):
+        raise OSError(code, f"the system forbids user namespaces ({os.strerror(code)})")
+
+
+def _attribute(kind: int, data: bytes) -> bytes:
+    length = 4 + len(data)
+    return struct.pack("<HH", length, kind) + data + bytes(-length % 4)
+
+
+def _name(name: str) -> bytes:
+    return _attribute(_IFLA_IFNAME, name.encode() + b"\0")
+
+
+def _request(flags: int, body: bytes, what: str) -> None:
+    """One netlink request with its acknowledgement.
+
+    Raises:
+        OSError: the kernel's refusal, naming ``what``.
+    """
+    header = struct.pack("<IHHII", 16 + len(body), _RTM_NEWLINK, _REQUEST | _ACK | flags, 1, 0)
+    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as netlink:
+        netlink.send(header + body)
+        answer = netlink.recv(65536)
+    code = -struct.unpack_from("<i", answer, 16)[0]
+    if code:
+        raise OSError(code, f"{what}: {os.strerror(code)}")
+
+
+def create_veth(first: str, second: str) -> None:
+    """A pair of interfaces, each the other end of the same cable."""
+    peer = _attribute(_VETH_PEER | _NESTED, bytes(16) + _name(second))
+    info = _attribute(_INFO_KIND, b"veth") + _attribute(_INFO_DATA | _NESTED, peer)
+    body = bytes(16) + _name(first) + _attribute(_IFLA_LINKINFO | _NESTED, info)
+    _request(_CREATE | _EXCLUSIVE, body, f"cannot create the veth pair {first}, {second}")
+
+
+def set_up(name: str, up: bool = True) -> None:
+    """Switch an interface on or off."""
+    index = socket.if_nametoindex(name)
+    head = struct.pack("<BxHiII", socket.AF_UNSPEC, 0, index, _UP if up else 0, _UP)
+    _request(0, head, f"cannot switch {name} {'on' if up else 'off'}")
+
+
+def silence(name: str) -> None:
+    """No IPv6 addresses, so that nothing but our frames is on the cable.
+
+    A kernel without IPv6 refuses, which is as good.
+    """
+    index = socket.if_nametoindex(name)
+    head = struct.pack("<BxHiII", socket.AF_UNSPEC, 0, index, 0, 0)
+    mode = _attribute(_ADDR_GEN_MODE, bytes([_ADDR_GEN_NONE]))
+    inet6 = _attribute(socket.AF_INET6 | _NESTED, mode)
+    with contextlib.suppress(OSError):
+        _request(0, head + _attribute(_IFLA_AF_SPEC | _NESTED, inet6), f"cannot silence {name}")
+    with contextlib.suppress(OSError):
+        Path(f"/proc/sys/net/ipv6/conf/{name}/disable_ipv6").write_text("1", encoding="ascii")
+
+
+def _hold(names: Sequence[str]) -> int:
+    try:
+        _unshare()
+        set_up("lo")
+        for first, second in zip(names[::2], names[1::2], strict=True):
+            create_veth(first, second)
+            for name in (first, second):
+                silence(name)
+                set_up(name)
+    except OSError as error:
+        text = error.strerror or errno.errorcode.get(error.errno or 0, "unknown error")
+        sys.stdout.write(f"{text}\n")
+        sys.stdout.flush()
+        return 1
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
+    sys.stdin.read()
+    return 0
+
+
+def _main(argv: Sequence[str]) -> int:
+    if argv[:1] == ["--hold"]:
+        return _hold(argv[1:])
+    if len(argv) > 3 and argv[0] == "--join" and argv[2] == "--":
+        try:
+            enter(int(argv[1]))
+        except NamespaceUnavailable as error:
+            sys.stderr.write(f"{error}\n")
+            return 1
+        os.execvp(argv[3], argv[3:])  # noqa: S606
+    sys.stderr.write("usage: netns --hold NAME PEER … | --join PID -- COMMAND …\n")
+    return 2
+
+
+if __name__ == "__main__":
+    sys.exit(_main(sys.argv[1:]))
