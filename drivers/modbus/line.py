@@ -1,0 +1,347 @@
+"""One serial line as its master sees it: one question, one answer, one thread.
+
+Blocking code; `drivers.modbus.link.RegisterLink` runs it on the bus's thread. Nothing is
+repeated here, because only the caller knows whether a repetition is harmless.
+
+Modbus RTU answers carry no number, so an answer that comes after its time-out looks like the
+answer to the next question of the same shape. Every failed question is therefore remembered
+for ``late_s``; before another question whose answer would look the same, one harmless read with
+an answer of a different shape is asked. Drives answer in order, so once that has come, nothing
+older can follow.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import NoReturn
+
+from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError, Rejected
+from drivers.link import LinkQuality
+from drivers.modbus.framing import (
+    EXCEPTION_TEXTS,
+    READ,
+    Answer,
+    Query,
+    find_answer,
+    read_query,
+    write_many_query,
+    write_one_query,
+)
+from drivers.modbus.port import LineSettings, Port, open_port
+
+#: A line that talks longer than this without a pause is no Modbus line at these settings.
+_BABBLE_S = 1.0
+
+
+@dataclass(slots=True)
+class Counters:
+    """What happened with one station since the line was opened first."""
+
+    transactions: int = 0
+    timeouts: int = 0
+    crc_errors: int = 0
+    framing_errors: int = 0
+    retries: int = 0
+    refusals: int = 0
+    late_checks: int = 0
+    round_trip_ms: float | None = None
+
+
+class Line:
+    """Master of one serial line. Not thread-safe: one thread calls it.
+
+    ``on_change`` is told of loss (False) and return (True) of the adapter, on the line's thread.
+    ``clock`` and ``sleep`` count seconds; ``opener`` makes the port: tests give their own.
+    """
+
+    def __init__(
+        self,
+        settings: LineSettings,
+        *,
+        on_change: Callable[[bool, str], None] = lambda _up, _text: None,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+        opener: Callable[[LineSettings], Port] = open_port,
+    ) -> None:
+        self.settings = settings
+        self.echo: bool | None = None
+        self.losses = 0
+        self._on_change = on_change
+        self._clock = clock
+        self._sleep = sleep
+        self._opener = opener
+        self._port: Port | None = None
+        self._counters: dict[int, Counters] = {}
+        self._late: dict[int, dict[bytes, float]] = {}
+        self._last_failed = b""
+        self._restless = False
+        self._echo_taken = False
+        self._quiet_since = 0.0
+
+    @property
+    def is_open(self) -> bool:
+        """True while the adapter is there."""
+        return self._port is not None
+
+    def open(self) -> None:
+        """Open the adapter.
+
+        Raises:
+            LinkLost: no such port, no permission, in use.
+            OutOfRange: the adapter cannot do these settings.
+        """
+        if self._port is not None:
+            return
+        self._port = self._opener(self.settings)
+        self.echo = None
+        self._late.clear()
+        self._last_failed = b""
+        self._restless = True  # bytes of a former life may be waiting
+
+    def close(self) -> None:
+        """Close the adapter. Calling again does nothing."""
+        if self._port is not None:
+            self._port.close()
+            self._port = None
+
+    def reopen(self) -> bool:
+        """Try to get a lost adapter back; True if it is open now."""
+        if self._port is None:
+            try:
+                self.open()
+            except DriveError:
+                return False
+            self._on_change(True, f"the serial port {self.settings.device} is back")
+        return True
+
+    def read(self, station: int, start: int, count: int, timeout_s: float | None = None) -> bytes:
+        """Read ``count`` registers; returns 2 · count bytes, each register high byte first.
+
+        Raises:
+            LinkTimeout, LinkLost, ProtocolError (damaged answer), Rejected, OutOfRange
+        """
+        return self._ask(read_query(station, start, count), timeout_s)[3:-2]
+
+    def write(self, station: int, start: int, words: tuple[int, ...]) -> None:
+        """Write one register (06) or several at once (16).
+
+        Raises:
+            LinkTimeout: no valid answer; whether the drive took the value is unknown.
+            LinkLost, Rejected, OutOfRange
+        """
+        if len(words) == 1:
+            query = write_one_query(station, start, words[0])
+        else:
+            query = write_many_query(station, start, words)
+        try:
+            self._ask(query, None)
+        except ProtocolError as error:
+            raise LinkTimeout(
+                f"the answer of station {station} to a write came damaged: whether the drive took "
+                "the value is unknown",
+                remedy="read the value back before writing again",
+            ) from error
+
+    def count_retry(self, station: int) -> None:
+        """Note that the caller repeats a read."""
+        self._count(station).retries += 1
+
+    def quality(self, station: int | None) -> LinkQuality:
+        """Counters of one station or of all. Callable from any thread."""
+        if station is None:
+            picked = list(self._counters.values())
+        else:
+            picked = [self._counters.get(station, Counters())]
+        times = [c.round_trip_ms for c in picked if c.round_trip_ms is not None]
+        echo = {None: "unknown", True: "yes", False: "no"}[self.echo]
+        return LinkQuality(
+            connected=self.is_open,
+            transactions=sum(c.transactions for c in picked),
+            timeouts=sum(c.timeouts for c in picked),
+            crc_errors=sum(c.crc_errors for c in picked),
+            framing_errors=sum(c.framing_errors for c in picked),
+            retries=sum(c.retries for c in picked),
+            round_trip_ms=sum(times) / len(times) if times else None,
+            state="open" if self.is_open else "no adapter",
+            details={
+                "baudrate": self.settings.baudrate,
+                "parity": self.settings.parity,
+                "echo": echo,
+                "losses": self.losses,
+                "refusals": sum(c.refusals for c in picked),
+                "late_checks": sum(c.late_checks for c in picked),
+            },
+        )
+
+    # --- one transaction ---
+
+    def _ask(self, query: Query, timeout_s: float | None) -> bytes:
+        if self._port is None:
+            raise LinkLost(
+                f"the serial port {self.settings.device} is not open",
+                remedy="check the cable and the adapter; the line opens by itself when it is back",
+            )
+        try:
+            self._settle(self._port)
+            if self.echo is None and query.frame[1] != READ:
+                self._probe(self._port, query, timeout_s)
+            self._outwait_late(self._port, query, timeout_s)
+            return self._exchange(self._port, query, timeout_s)
+        except LinkLost as error:
+            self._port.close()
+            self._port = None
+            self.losses += 1
+            self._on_change(False, error.message)
+            raise
+
+    def _exchange(self, port: Port, query: Query, timeout_s: float | None) -> bytes:
+        settings = self.settings
+        pause = self._quiet_since + settings.pause_s - self._clock()
+        if pause > 0:
+            self._sleep(pause)
+        sent_at = self._clock()
+        self._echo_taken = False
+        port.write(query.frame)
+        wire_s = (len(query.frame) + query.length) * settings.char_s
+        limit_s = settings.timeout_s if timeout_s is None else timeout_s
+        answer, received = self._await(port, query, sent_at + wire_s + limit_s)
+        counters = self._count(query.station)
+        counters.transactions += 1
+        counters.crc_errors += answer.crc_errors
+        self._quiet_since = self._clock()
+        if answer.frame is None:
+            self._fail(query, answer, received, counters, limit_s)
+        self._accept(query, answer, received, counters, sent_at)
+        code = answer.exception
+        if code is not None:
+            counters.refusals += 1
+            text = EXCEPTION_TEXTS.get(code, "the drive refused for a reason Modbus does not name")
+            raise Rejected(f"station {query.station}: {text} (exception {code})", code=code)
+        return answer.frame
+
+    def _await(self, port: Port, query: Query, deadline: float) -> tuple[Answer, bytes]:
+        """Collect bytes until the answer is there or cannot come any more."""
+        data = port.read(deadline - self._clock())
+        if self.echo is False and len(data) == query.length:
+            answer = find_answer(data, query)  # the usual case: one portion, nothing else
+            if answer.frame is not None:
+                return answer, data
+        buffer = bytearray(data)
+        while True:
+            self._cut_echo(buffer, query)
+            answer = find_answer(buffer, query)
+            if answer.frame is not None:
+                return answer, bytes(buffer)
+            left = deadline - self._clock()
+            own_echo_due = self.echo and not self._echo_taken
+            if not own_echo_due and _looks_damaged(buffer, query, answer):
+                left = min(left, self.settings.gap_s)
+            data = port.read(left) if left > 0 else b""
+            if not data:
+                return answer, bytes(buffer)
+            buffer += data
+
+    def _cut_echo(self, buffer: bytearray, query: Query) -> None:
+        """Remove our own bytes where the adapter hands them back (two-wire RS485)."""
+        if self.echo is False or not buffer:
+            return
+        place = buffer.find(query.frame)
+        if place < 0:
+            return
+        if self.echo is None and query.frame[1] == READ:
+            self.echo = True
+        if self.echo and not self._echo_taken:
+            del buffer[: place + len(query.frame)]
+            self._echo_taken = True
+
+    def _fail(
+        self, query: Query, answer: Answer, received: bytes, counters: Counters, limit_s: float
+    ) -> NoReturn:
+        """Remember that an answer may still come, and say what happened."""
+        expiry = self._clock() + self.settings.late_s
+        self._late.setdefault(query.station, {})[query.head] = expiry
+        self._last_failed = query.frame
+        if received:
+            self._restless = True
+            counters.framing_errors += not answer.crc_errors
+            shown = received[:24].hex(" ") + (" …" if len(received) > 24 else "")
+            raise ProtocolError(
+                f"station {query.station} sent a damaged answer ({shown})",
+                remedy="check baud rate, parity, shield, termination, and that no two drives have "
+                "the same address",
+            )
+        counters.timeouts += 1
+        only_echo = " (only the adapter's echo of the question came back)" if self.echo else ""
+        raise LinkTimeout(
+            f"station {query.station} did not answer within {limit_s * 1000:.0f} ms{only_echo}",
+            remedy="check the drive's supply, its address, baud rate and parity, and A/B swapped",
+        )
+
+    def _accept(
+        self, query: Query, answer: Answer, received: bytes, counters: Counters, sent_at: float
+    ) -> None:
+        self._last_failed = b""
+        if self.echo is None:
+            self.echo = False
+        if answer.start or answer.end != len(received):
+            counters.framing_errors += 1
+            self._restless = self._restless or answer.end != len(received)
+        late = self._late.get(query.station)
+        if late and query.head not in late:
+            del self._late[query.station]
+        took_ms = (self._quiet_since - sent_at) * 1000
+        old = counters.round_trip_ms
+        counters.round_trip_ms = took_ms if old is None else old + (took_ms - old) / 16
+
+    # --- what must be done before a question ---
+
+    def _settle(self, port: Port) -> None:
+        """Throw away stray bytes; if there were any, wait until the line is silent."""
+        if not self._restless and not port.read(0.0):
+            return
+        until = self._clock() + _BABBLE_S
+        pause = 0.0 if not self._counters else self.settings.gap_s
+        while port.read(pause):
+            pause = self.settings.gap_s
+            if self._clock() > until:
+                raise ProtocolError(
+                    f"the line {self.settings.device} never falls silent",
+                    remedy="another master is talking on it, or the baud rate is wrong",
+                )
+        self._restless = False
+        self._quiet_since = self._clock()
+
+    def _outwait_late(self, port: Port, query: Query, timeout_s: float | None) -> None:
+        """Make sure that no late answer can be taken for the one to ``query``."""
+        late = self._late.get(query.station)
+        if not late:
+            return
+        now = self._clock()
+        for head in [head for head, expiry in late.items() if expiry <= now]:
+            del late[head]
+        if query.head in late and query.frame != self._last_failed:
+            self._probe(port, query, timeout_s)
+
+    def _probe(self, port: Port, query: Query, timeout_s: float | None) -> None:
+        """One read whose answer looks different from all that may still come."""
+        station = query.station
+        late = self._late.get(station, {})
+        start = int.from_bytes(query.frame[2:4], "big")
+        shapes = (read_query(station, min(start, 0xFF00), count) for count in range(1, 126))
+        probe = next(q for q in shapes if q.head not in late and q.head != query.head)
+        self._count(station).late_checks += 1
+        with suppress(Rejected):
+            self._exchange(port, probe, timeout_s)
+        self._late.pop(station, None)
+        self._settle(port)
+
+    def _count(self, station: int) -> Counters:
+        return self._counters.setdefault(station, Counters())
+
+
+def _looks_damaged(buffer: bytearray, query: Query, answer: Answer) -> bool:
+    """True if what came is an answer that went wrong, not just noise before one."""
+    return bool(answer.crc_errors) or len(buffer) >= query.length or buffer.startswith(query.head)

@@ -1,0 +1,421 @@
+"""A serial bus of register-based drives as a `Link`: Modbus RTU, and MLink by another layout.
+
+Where a value lies among the registers is the business of a `Layout`; everything else (thread,
+batches, retries, loss and return of the adapter, scan) is the same for both.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol, TypeVar
+
+from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError, Rejected
+from drivers.link import (
+    Address,
+    Cyclic,
+    Found,
+    LinkEvent,
+    LinkQuality,
+    Progress,
+    Unsubscribe,
+)
+from drivers.modbus.line import Line
+from drivers.modbus.port import LineSettings
+from drivers.modbus.registers import (
+    Block,
+    Place,
+    WordOrder,
+    plan_blocks,
+    to_bytes,
+    to_words,
+    words_of,
+)
+from drivers.modbus.thread import BusThread
+from profiles.schema import LinkKind, Profile
+
+T = TypeVar("T")
+
+#: A job on the bus's thread gives way to others after this time (and always after a failure).
+_TURN_S = 0.005
+_REOPEN_S = 0.25
+_STATIONS = range(1, 248)
+_PLANS_KEPT = 256
+
+
+@dataclass(frozen=True, slots=True)
+class BlockLimits:
+    """Longest block one request may read, and the unused registers it may bridge."""
+
+    max_registers: int = 125
+    max_gap: int = 0
+
+
+class Layout(Protocol):
+    """Where the objects of one kind of link lie among the registers."""
+
+    kind: LinkKind
+
+    def configure(self, station: int, profile: Profile) -> None:
+        """Take over what the profile says of this link for one station."""
+
+    def place(self, station: int, address: Address) -> Place:
+        """Registers of a value.
+
+        Raises:
+            NotAllowed: this value cannot be reached over this link; the message says why.
+        """
+
+    def limits(self, station: int) -> BlockLimits:
+        """How values may be read together."""
+
+    def identity(self) -> tuple[Address, ...]:
+        """What a scan reads: the first must exist in every drive; the rest is for `describe`."""
+
+    def describe(self, station: int, values: Sequence[int | None]) -> Found:
+        """A scan's finding from the values of `identity` (None: could not be read)."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """Requests for one list of addresses; ``failed`` are those that never go on the line."""
+
+    places: tuple[Place | None, ...]
+    blocks: tuple[Block, ...]
+    failed: dict[int, DriveError]
+
+
+@dataclass(slots=True)
+class _Batch:
+    """A read_many under way. Only the bus's thread changes it."""
+
+    plan: _Plan
+    todo: deque[tuple[Block, int]]
+    results: list[bytes | DriveError | None]
+    silent_blocks: int = 0
+
+
+class RegisterLink:
+    """A `drivers.link.Link` over one serial line."""
+
+    cyclic: Cyclic | None = None
+
+    def __init__(
+        self,
+        url: str,
+        settings: LineSettings,
+        layout: Layout,
+        line: Callable[..., Line] = Line,
+    ) -> None:
+        self.kind: LinkKind = layout.kind
+        self.url = url
+        self._settings = settings
+        self._layout = layout
+        self._line = line(settings, on_change=self._changed)
+        self._thread: BusThread | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._watcher: asyncio.Task[None] | None = None
+        self._listeners: list[Callable[[LinkEvent], None]] = []
+        self._plans: dict[tuple[int, tuple[Address, ...]], _Plan] = {}
+        self._refused_blocks: set[tuple[int, int, int]] = set()
+
+    def configure_station(self, station: int, profile: Profile) -> None:
+        """Use what ``profile`` says of this link (word order, block lengths) for ``station``."""
+        self._layout.configure(station, profile)
+        self._plans.clear()
+        self._refused_blocks.clear()
+
+    async def open(self) -> None:
+        """Open the adapter. See `drivers.link.Link.open`."""
+        if self._thread is not None:
+            return
+        self._loop = asyncio.get_running_loop()
+        thread = BusThread(f"line {self._settings.device}")
+        try:
+            await thread.run(self._line.open)
+        except BaseException:
+            thread.stop()
+            raise
+        self._thread = thread
+
+    async def close(self) -> None:
+        """Close the adapter. Calling again does nothing."""
+        thread, self._thread = self._thread, None
+        if self._watcher is not None:
+            self._watcher.cancel()
+            self._watcher = None
+        if thread is not None:
+            await thread.run(self._line.close, urgent=True)
+            thread.stop()
+
+    async def scan(
+        self,
+        progress: Progress,
+        stations: Sequence[int] | None = None,
+        *,
+        stop_after: int | None = None,
+    ) -> list[Found]:
+        """Ask each address once (1 to 247 unless told) and identify those that answer.
+
+        A refusal counts as an answer. ``stop_after`` ends the search after so many drives.
+        """
+        found: list[Found] = []
+        wanted = list(stations if stations is not None else _STATIONS)
+        for number, station in enumerate(wanted):
+            progress(number / max(1, len(wanted)), f"asking address {station}")
+            if await self._run(partial(self._is_there, station)):
+                found.append(await self._identify(station))
+                if stop_after is not None and len(found) >= stop_after:
+                    break
+        progress(1.0, f"{len(found)} found")
+        return found
+
+    async def read(self, station: int, address: Address) -> bytes:
+        """Read one value. See `drivers.link.Link.read`."""
+        result = (await self.read_many(station, (address,)))[0]
+        if isinstance(result, DriveError):
+            raise result
+        return result
+
+    async def read_many(
+        self, station: int, addresses: Sequence[Address]
+    ) -> list[bytes | DriveError]:
+        """Read several values, neighbours in one request where the layout allows it.
+
+        Only reads are repeated (``retries`` of the settings). After two values without any
+        answer the rest fails at once instead of waiting for each.
+        """
+        plan = self._plan(station, tuple(addresses))
+        results: list[bytes | DriveError | None] = [None] * len(plan.places)
+        for item, error in plan.failed.items():
+            results[item] = _again(error)
+        batch = _Batch(plan, deque((block, 0) for block in plan.blocks), results)
+        while batch.todo:
+            await self._run(partial(self._read_turn, station, batch))
+        return [_decided(result) for result in results]
+
+    async def write(self, station: int, address: Address, data: bytes) -> None:
+        """Write one value; goes before all waiting reads. See `drivers.link.Link.write`."""
+        place = self._layout.place(station, address)
+        words = to_words(place, data)
+        await self._run(partial(self._line.write, station, place.start, words), urgent=True)
+
+    def quality(self, station: int | None = None) -> LinkQuality:
+        """Counters. See `drivers.link.Link.quality`."""
+        return self._line.quality(station)
+
+    def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
+        """Be told of loss and return of the adapter."""
+        self._listeners.append(listener)
+
+        def unsubscribe() -> None:
+            if listener in self._listeners:
+                self._listeners.remove(listener)
+
+        return unsubscribe
+
+    # --- on the bus's thread ---
+
+    def _read_turn(self, station: int, batch: _Batch) -> None:
+        """Work on a batch until its turn is over; a failure ends the turn."""
+        end = time.monotonic() + _TURN_S
+        while batch.todo:
+            block, attempt = batch.todo.popleft()
+            try:
+                data = self._line.read(station, block.start, block.count)
+            except DriveError as error:
+                self._failed_block(station, batch, block, attempt, error)
+                return
+            batch.silent_blocks = 0
+            self._cut(batch, block, data)
+            if time.monotonic() >= end:
+                return
+
+    def _cut(self, batch: _Batch, block: Block, data: bytes) -> None:
+        for item in block.items:
+            place = batch.plan.places[item]
+            assert place is not None
+            first = 2 * (place.start - block.start)
+            try:
+                batch.results[item] = to_bytes(place, data[first : first + 2 * place.count])
+            except ProtocolError as error:
+                batch.results[item] = error
+
+    def _failed_block(
+        self, station: int, batch: _Batch, block: Block, attempt: int, error: DriveError
+    ) -> None:
+        if isinstance(error, Rejected) and len(block.items) > 1:
+            # One register in it is refused: ask one by one, now and from now on.
+            self._refused_blocks.add((station, block.start, block.count))
+            self._plans.clear()
+            batch.todo.extendleft(
+                (single, 0) for single in reversed(_singles(batch.plan.places, block))
+            )
+            return
+        mute = isinstance(error, LinkTimeout)
+        repeatable = mute or isinstance(error, ProtocolError)
+        if repeatable and attempt < self._settings.retries and not batch.silent_blocks:
+            self._line.count_retry(station)
+            batch.todo.appendleft((block, attempt + 1))
+            return
+        for item in block.items:
+            batch.results[item] = _again(error)
+        batch.silent_blocks = batch.silent_blocks + 1 if mute else 0
+        if isinstance(error, LinkLost) or batch.silent_blocks >= 2:
+            for rest, _ in batch.todo:
+                for item in rest.items:
+                    batch.results[item] = _again(error)
+            batch.todo.clear()
+
+    def _is_there(self, station: int) -> bool:
+        place = self._layout.place(station, self._layout.identity()[0])
+        try:
+            self._line.read(station, place.start, place.count, self._settings.scan_timeout_s)
+        except (LinkTimeout, ProtocolError):
+            return False
+        except Rejected:
+            return True
+        return True
+
+    def _changed(self, up: bool, text: str) -> None:
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._tell, up, text)
+
+    # --- on the event loop ---
+
+    async def _run(self, job: Callable[[], T], *, urgent: bool = False) -> T:
+        if self._thread is None:
+            raise LinkLost(f"{self.url} is not open", remedy="connect the bus first")
+        return await self._thread.run(job, urgent=urgent)
+
+    def _tell(self, up: bool, text: str) -> None:
+        if self._thread is None:
+            return
+        event = LinkEvent("back" if up else "lost", None, text)
+        for listener in tuple(self._listeners):
+            listener(event)
+        if not up and (self._watcher is None or self._watcher.done()):
+            self._watcher = asyncio.ensure_future(self._watch())
+
+    async def _watch(self) -> None:
+        """Open the adapter again as soon as it is back."""
+        while True:
+            await asyncio.sleep(_REOPEN_S)
+            if await self._run(self._line.reopen):
+                return
+
+    async def _identify(self, station: int) -> Found:
+        results = await self.read_many(station, self._layout.identity())
+        values = [
+            None if isinstance(r, DriveError) else int.from_bytes(r, "little") for r in results
+        ]
+        return self._layout.describe(station, values)
+
+    def _plan(self, station: int, addresses: tuple[Address, ...]) -> _Plan:
+        """The requests for these addresses; kept, because pollers ask for the same again."""
+        plan = self._plans.get((station, addresses))
+        if plan is None:
+            if len(self._plans) >= _PLANS_KEPT:
+                self._plans.clear()
+            plan = self._plans[station, addresses] = self._new_plan(station, addresses)
+        return plan
+
+    def _new_plan(self, station: int, addresses: tuple[Address, ...]) -> _Plan:
+        places: list[Place | None] = []
+        failed: dict[int, DriveError] = {}
+        for item, address in enumerate(addresses):
+            try:
+                places.append(self._layout.place(station, address))
+            except DriveError as error:
+                places.append(None)
+                failed[item] = error
+        known = [item for item, place in enumerate(places) if place is not None]
+        limits = self._layout.limits(station)
+        blocks: list[Block] = []
+        for raw in plan_blocks(
+            [place for place in places if place is not None], limits.max_registers, limits.max_gap
+        ):
+            block = Block(raw.start, raw.count, tuple(known[i] for i in raw.items))
+            if (station, block.start, block.count) in self._refused_blocks:
+                blocks.extend(_singles(tuple(places), block))
+            else:
+                blocks.append(block)
+        return _Plan(tuple(places), tuple(blocks), failed)
+
+
+def _singles(places: tuple[Place | None, ...], block: Block) -> list[Block]:
+    """The values of a block, each in a request of its own."""
+    found: list[Block] = []
+    for item in block.items:
+        place = places[item]
+        if place is not None:
+            found.append(Block(place.start, place.count, (item,)))
+    return found
+
+
+def _again(error: DriveError) -> DriveError:
+    """The same error as a new object: callers fill in which parameter it was about."""
+    if isinstance(error, Rejected):
+        return Rejected(error.message, code=error.code, remedy=error.remedy)
+    return type(error)(error.message, value=error.value, limit=error.limit, remedy=error.remedy)
+
+
+def _decided(result: bytes | DriveError | None) -> bytes | DriveError:
+    if result is None:
+        raise ProtocolError("a value was neither read nor refused")
+    return result
+
+
+class TableLayout:
+    """Registers by table: each parameter of the profile names its own (manual 003)."""
+
+    kind: LinkKind = "modbus"
+
+    def __init__(self, word_order: WordOrder = "high_first") -> None:
+        self._default_order = word_order
+        self._orders: dict[int, WordOrder] = {}
+        self._limits: dict[int, BlockLimits] = {}
+
+    def configure(self, station: int, profile: Profile) -> None:
+        """See `Layout.configure`."""
+        spec = profile.link("modbus")
+        if spec is None:
+            return
+        self._orders[station] = spec.word_order or self._default_order
+        self._limits[station] = BlockLimits(spec.max_registers or 1, spec.max_gap or 0)
+
+    def place(self, station: int, address: Address) -> Place:
+        """See `Layout.place`."""
+        if address.register is None:
+            raise NotAllowed(
+                f"{address} has no Modbus register",
+                parameter=str(address),
+                remedy="connect the drive's other bus as well: this value is only there",
+            )
+        order = self._orders.get(station, self._default_order)
+        return Place(address.register, words_of(address.type), address.type, order)
+
+    def limits(self, station: int) -> BlockLimits:
+        """See `Layout.limits`."""
+        return self._limits.get(station, BlockLimits())
+
+    def identity(self) -> tuple[Address, ...]:
+        """Any answer to a read of register 0 shows that somebody is there."""
+        return (Address(None, 0, "UINT16", register=0),)
+
+    def describe(self, station: int, values: Sequence[int | None]) -> Found:
+        """See `Layout.describe`."""
+        answer = "refuses register 0" if values[0] is None else f"register 0 holds {values[0]}"
+        return Found(
+            station,
+            notes=(f"{answer}; Modbus RTU has no identity: choose the drive's profile",),
+        )
+
+
+def modbus_link(url: str, settings: LineSettings) -> RegisterLink:
+    """A Modbus RTU bus, not yet opened."""
+    return RegisterLink(url, settings, TableLayout())

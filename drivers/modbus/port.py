@@ -1,0 +1,222 @@
+"""The serial port under a line: opened by pyserial, read and written as directly as possible.
+
+On POSIX the bytes go through the file descriptor with ``poll``; pyserial's own read costs three
+times as much per answer. Elsewhere pyserial's read and write are used. Foreign errors end here.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, Protocol
+
+import serial
+from serial.tools import list_ports
+
+from drivers.errors import DriveError, LinkLost, OutOfRange
+
+Parity = Literal["N", "E", "O"]
+
+#: 1.75 ms above 19200 baud: MODBUS over Serial Line V1.02, clause 2.5.1.1.
+STANDARD_SILENCE_S = 0.00175
+
+
+@dataclass(frozen=True, slots=True)
+class LineSettings:
+    """How a serial line is opened and timed.
+
+    ``timeout_s`` is what a drive may take to start its answer, beyond the time that the bytes
+    need on the wire. ``silence_s`` is the pause before each request; None means 3.5 character
+    times. ``gap_s`` is how long a started answer may pause (USB adapters deliver in portions up
+    to 16 ms apart). ``late_s`` is how long after a time-out its answer may still come.
+    """
+
+    device: str
+    baudrate: int = 115_200
+    parity: Parity = "N"
+    stopbits: Literal[1, 2] = 1
+    timeout_s: float = 0.1
+    scan_timeout_s: float = 0.03
+    silence_s: float | None = None
+    gap_s: float = 0.03
+    late_s: float = 2.0
+    retries: int = 2
+
+    @property
+    def bits_per_char(self) -> int:
+        """Start, 8 data, parity and stop bits."""
+        return 9 + (self.parity != "N") + self.stopbits
+
+    @property
+    def char_s(self) -> float:
+        """Time of one character on the wire."""
+        return self.bits_per_char / self.baudrate
+
+    @property
+    def pause_s(self) -> float:
+        """Pause kept before each request."""
+        return 3.5 * self.char_s if self.silence_s is None else self.silence_s
+
+
+class Port(Protocol):
+    """Bytes in and out. All raise LinkLost when the adapter is gone."""
+
+    def read(self, timeout_s: float) -> bytes:
+        """Bytes that are there, waiting up to ``timeout_s`` for the first; empty if none came."""
+
+    def write(self, data: bytes) -> None:
+        """Send all of ``data``."""
+
+    def close(self) -> None:
+        """Give the port back. Calling again does nothing."""
+
+
+def open_port(settings: LineSettings) -> Port:
+    """Open the adapter named in ``settings``.
+
+    Raises:
+        LinkLost: no such port, no permission, in use.
+        OutOfRange: the adapter cannot do this baud rate or parity.
+    """
+    parity = "N" if is_pseudo_terminal(settings.device) else settings.parity
+    try:
+        port = serial.Serial(
+            settings.device,
+            settings.baudrate,
+            parity=parity,
+            stopbits=settings.stopbits,
+            timeout=0,
+            write_timeout=1.0,
+            exclusive=True if os.name == "posix" else None,
+        )
+    except ValueError as error:
+        raise _unsuitable(settings, str(error)) from error
+    except OSError as error:  # SerialException is one
+        raise _explain(settings, error) from error
+    if os.name == "posix":
+        return _PosixPort(port, settings.device)
+    return SerialPort(port, settings.device)
+
+
+def is_pseudo_terminal(device: str) -> bool:
+    """True if ``device`` leads to a pty: it carries bytes, not bits, and so has no parity."""
+    return str(Path(device).resolve()).startswith("/dev/pts/")
+
+
+def _unsuitable(settings: LineSettings, text: str) -> OutOfRange:
+    line = f"{settings.baudrate} baud, parity {settings.parity}, {settings.stopbits} stop bits"
+    return OutOfRange(
+        f"{settings.device} cannot be set to {line}: {text}",
+        value=line,
+        remedy="choose a baud rate and parity that the adapter's chip supports",
+    )
+
+
+def _explain(settings: LineSettings, error: OSError) -> DriveError:
+    device, text = settings.device, str(error)
+    number = error.errno or next((n for n in _ERRNOS if f"Errno {n}]" in text), 0)
+    if number == errno.ENOENT:
+        known = ", ".join(sorted(p.device for p in list_ports.comports())) or "none"
+        return LinkLost(
+            f"there is no serial port {device}",
+            remedy=f"plug the adapter in; ports found now: {known}",
+        )
+    if number == errno.EACCES:
+        return LinkLost(
+            f"no permission to open {device}",
+            remedy="on Linux add yourself to the group of the port, usually dialout: "
+            "sudo usermod -aG dialout $USER, then log in again",
+        )
+    if number in (errno.EAGAIN, errno.EBUSY) or "exclusively lock" in text:
+        return LinkLost(
+            f"{device} is in use by another program",
+            remedy="close the other program, for example the maker's tool or ModemManager",
+        )
+    if number == errno.EINVAL or "baud" in text:
+        return _unsuitable(settings, text)
+    return LinkLost(f"{device} cannot be opened: {text}", remedy="unplug and replug the adapter")
+
+
+_ERRNOS = (errno.ENOENT, errno.EACCES, errno.EAGAIN, errno.EBUSY, errno.EINVAL)
+
+
+def _gone(device: str, error: Exception | None) -> LinkLost:
+    detail = f" ({error})" if error else ""
+    return LinkLost(
+        f"the serial port {device} is gone{detail}",
+        remedy="check the cable and the adapter; the line is opened again when it is back",
+    )
+
+
+class _PosixPort:
+    """Read and write by file descriptor."""
+
+    def __init__(self, port: serial.Serial, device: str) -> None:
+        self._port = port
+        self._device = device
+        self._fd: int = port.fileno()
+        self._poll = select.poll()
+        self._poll.register(self._fd, select.POLLIN)
+        self._poll_writable = select.poll()
+        self._poll_writable.register(self._fd, select.POLLOUT)
+
+    def read(self, timeout_s: float) -> bytes:
+        """See `Port.read`."""
+        if not self._poll.poll(max(0.0, timeout_s) * 1000):
+            return b""
+        try:
+            data = os.read(self._fd, 4096)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise _gone(self._device, error) from error
+        if not data:  # readable and yet nothing: hung up
+            raise _gone(self._device, None)
+        return data
+
+    def write(self, data: bytes) -> None:
+        """See `Port.write`."""
+        sent = 0
+        while sent < len(data):
+            try:
+                sent += os.write(self._fd, data[sent:])
+            except BlockingIOError:
+                if not self._poll_writable.poll(1000):
+                    raise _gone(self._device, None) from None
+            except OSError as error:
+                raise _gone(self._device, error) from error
+
+    def close(self) -> None:
+        """See `Port.close`."""
+        self._port.close()
+
+
+class SerialPort:
+    """Read and write by pyserial, where there is no file descriptor (Windows)."""
+
+    def __init__(self, port: serial.Serial, device: str) -> None:
+        self._port = port
+        self._device = device
+
+    def read(self, timeout_s: float) -> bytes:
+        """See `Port.read`."""
+        try:
+            self._port.timeout = max(0.0, timeout_s)
+            first: bytes = self._port.read(1)
+            return first + self._port.read(self._port.in_waiting) if first else b""
+        except (OSError, TypeError) as error:
+            raise _gone(self._device, error) from error
+
+    def write(self, data: bytes) -> None:
+        """See `Port.write`."""
+        try:
+            self._port.write(data)
+        except OSError as error:
+            raise _gone(self._device, error) from error
+
+    def close(self) -> None:
+        """See `Port.close`."""
+        self._port.close()

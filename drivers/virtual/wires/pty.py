@@ -1,0 +1,178 @@
+"""A pseudo-terminal at a path of our choice: the cable of virtual serial drives.
+
+A client opens the path like a serial port. The bytes are real; bit times, parity and modem lines
+do not exist on a pty, so wire time is emulated on request: a frame counts as arrived only when
+its last bit would have been.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import select
+import sys
+import termios
+import threading
+import time
+import tty
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.errors import LinkLost
+
+_PR_SET_TIMERSLACK = 29
+_WAKE_SAMPLES = 15
+#: termios speed codes of this system, for asking which rate the client has set.
+_SPEEDS: dict[int, int] = {
+    getattr(termios, name): int(name[1:])
+    for name in dir(termios)
+    if name[0] == "B" and name[1:].isdigit()
+} | {
+    # Linux has these rates (asm-generic/termbits.h) and Python's termios names none of them.
+    0o010005: 500_000, 0o010006: 576_000, 0o010007: 921_600, 0o010010: 1_000_000,
+    0o010011: 1_152_000, 0o010012: 1_500_000, 0o010013: 2_000_000, 0o010014: 2_500_000,
+    0o010015: 3_000_000, 0o010016: 3_500_000, 0o010017: 4_000_000,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class WireTime:
+    """Speed of an emulated wire. ``turnaround_s`` is what the drive takes before it answers."""
+
+    baudrate: int
+    bits_per_char: int = 10
+    turnaround_s: float = 0.0
+
+    @property
+    def char_s(self) -> float:
+        """Time of one character."""
+        return self.bits_per_char / self.baudrate
+
+
+class PtyWire:
+    """A pty whose slave end appears at ``path``.
+
+    One thread reads and writes; `pull` and `heal` may come from any other. While the wire
+    keeps the slave end open itself, clients may come and go.
+    """
+
+    def __init__(self, path: str | Path, wire_time: WireTime | None = None) -> None:
+        self.path = Path(path)
+        self.wire_time = wire_time
+        self._master = -1
+        self._slave = -1
+        self._lock = threading.Lock()
+        self._closing = False
+        self._busy_until_s = 0.0
+        self._wake_late_s = 0.0
+
+    def open(self) -> None:
+        """Create the pty and the link to it.
+
+        Raises:
+            LinkLost: something that is not a wire of ours is already at the path.
+        """
+        with self._lock:
+            if self._master >= 0:
+                return
+            if self.path.exists() and not self.path.is_symlink():
+                raise LinkLost(
+                    f"{self.path} exists and is no virtual wire",
+                    remedy="choose another path, or remove the file",
+                )
+            self._master, self._slave = os.openpty()
+            tty.setraw(self._slave)
+            os.set_blocking(self._master, False)
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            fresh = self.path.with_name(f".{self.path.name}.{os.getpid()}")
+            fresh.unlink(missing_ok=True)
+            fresh.symlink_to(os.ttyname(self._slave))
+            fresh.replace(self.path)  # at once: a client never sees half a wire
+
+    def close(self) -> None:
+        """Remove the wire. Clients that have it open see an adapter that is gone."""
+        self._closing = True  # the reading thread lets go of the lock
+        with self._lock:
+            self._closing = False
+            if self._master < 0:
+                return
+            if self.path.is_symlink() and str(self.path.readlink()) == os.ttyname(self._slave):
+                self.path.unlink()
+            os.close(self._slave)
+            os.close(self._master)
+            self._master = self._slave = -1
+
+    def pull(self) -> None:
+        """Pull the cable: the same as closing, until `heal`."""
+        self.close()
+
+    def heal(self) -> None:
+        """Put the cable back."""
+        self.open()
+
+    @property
+    def is_open(self) -> bool:
+        """False while pulled."""
+        return self._master >= 0
+
+    def client_baudrate(self) -> int | None:
+        """Baud rate that the client has set, or None if this system has no name for it."""
+        try:
+            return _SPEEDS.get(termios.tcgetattr(self._master)[5])
+        except termios.error:
+            return None
+
+    def settle_clock(self) -> None:
+        """Call once on the thread that reads and writes: fine timers, and how late they wake."""
+        if self.wire_time is None:
+            return
+        if sys.platform == "linux":
+            ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+        late = []
+        for _ in range(_WAKE_SAMPLES):
+            due = time.monotonic() + 200e-6
+            time.sleep(200e-6)
+            late.append(time.monotonic() - due)
+        self._wake_late_s = sorted(late)[_WAKE_SAMPLES // 2]
+
+    def read(self, timeout_s: float) -> bytes:
+        """Bytes from the client, at once; empty after ``timeout_s`` without any.
+
+        With wire time the bytes are still on the wire when they are returned: `arrival_s`
+        says until when.
+        """
+        if self._closing or self._master < 0:
+            time.sleep(min(timeout_s, 0.002))
+            return b""
+        # The lock keeps the descriptor ours: a closed number may be somebody else's socket next.
+        with self._lock:
+            if self._master < 0 or not select.select([self._master], [], [], timeout_s)[0]:
+                return b""
+            try:
+                data = os.read(self._master, 4096)
+            except OSError:
+                return b""
+        if self.wire_time is not None:
+            start = max(time.monotonic(), self._busy_until_s)
+            self._busy_until_s = start + len(data) * self.wire_time.char_s
+        return data
+
+    @property
+    def arrival_s(self) -> float:
+        """Monotonic time at which the last byte read has (or will have) crossed the wire."""
+        return max(self._busy_until_s, time.monotonic()) if self.wire_time else time.monotonic()
+
+    def write(self, data: bytes) -> None:
+        """Send to the client; with wire time, when the last bit has arrived there."""
+        if self.wire_time is not None:
+            start = max(time.monotonic(), self._busy_until_s + self.wire_time.turnaround_s)
+            self._busy_until_s = start + len(data) * self.wire_time.char_s
+            pause = self._busy_until_s - self._wake_late_s - time.monotonic()
+            if pause > 0:
+                time.sleep(pause)
+        with self._lock:
+            try:
+                while data and self._master >= 0:
+                    data = data[os.write(self._master, data) :]
+            except BlockingIOError:
+                return  # nobody reads: the bytes are lost, as on a real wire
