@@ -1,0 +1,100 @@
+"""What lies between an injected sequence and the drive's continuous signals.
+
+The bus sends one value per cycle of length T; the drive holds it (zero-order), or interpolates
+towards it when 60C2h is in use (linear, one cycle later), passes it through the current loop
+(first order here) and a delay. All of that is known and can be divided out; what sampling folds
+back above half the sample rate is not, see :mod:`backend.analysis.sampled_model`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.signal import lfilter
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+
+Hold = Literal["zero", "linear"]
+
+#: Direct estimates hold to this share of the sample rate, sampled-data models to the second.
+DIRECT_SHARE = 0.25
+MODEL_SHARE = 0.4
+
+
+@dataclass(frozen=True)
+class SignalPath:
+    """Known parts around the mechanics.
+
+    ``current_bandwidth_hz`` is the current loop's corner (None: fast enough to ignore).
+    ``command_delay_s`` lies between the sent value and the torque, ``response_delay_s`` between
+    the true and the reported velocity. ``direct_gain`` is the torque that one unit of injection
+    causes at once: 1 for torque offsets, the speed gain for velocity offsets.
+    """
+
+    sample_rate_hz: float
+    hold: Hold = "zero"
+    current_bandwidth_hz: float | None = None
+    command_delay_s: float = 0.0
+    response_delay_s: float = 0.0
+    direct_gain: float = 1.0
+
+
+def hold_response(frequency_hz: FloatArray, sample_rate_hz: float, hold: Hold) -> ComplexArray:
+    """Frequency response of the hold, unit gain at 0 Hz."""
+    x = np.asarray(frequency_hz, dtype=np.float64) / sample_rate_hz
+    zero = np.sinc(x) * np.exp(-1j * np.pi * x)
+    # Linear interpolation reaches a value one cycle after it was sent: the square of the hold.
+    return np.asarray(zero if hold == "zero" else zero**2, dtype=np.complex128)
+
+
+def lag_response(frequency_hz: FloatArray, bandwidth_hz: float | None) -> ComplexArray:
+    """First-order lag with this corner; None is no lag."""
+    f = np.asarray(frequency_hz, dtype=np.float64)
+    if bandwidth_hz is None:
+        return np.ones(f.shape, dtype=np.complex128)
+    return np.asarray(1.0 / (1.0 + 1j * f / bandwidth_hz), dtype=np.complex128)
+
+
+def delay_response(frequency_hz: FloatArray, delay_s: float) -> ComplexArray:
+    """Pure delay."""
+    f = np.asarray(frequency_hz, dtype=np.float64)
+    return np.asarray(np.exp(-2j * np.pi * f * delay_s), dtype=np.complex128)
+
+
+def command_response(frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
+    """From the sent sequence to the continuous torque it causes directly."""
+    return (
+        path.direct_gain
+        * hold_response(frequency_hz, path.sample_rate_hz, path.hold)
+        * lag_response(frequency_hz, path.current_bandwidth_hz)
+        * delay_response(frequency_hz, path.command_delay_s)
+    )
+
+
+def sampled_command(sent: FloatArray, path: SignalPath) -> FloatArray:
+    """The part of the *sampled* torque that the sent sequence causes directly.
+
+    Exact for a first-order current loop, any delay and both holds. With no delay and a
+    zero-order hold it is u[k] = a·u[k-1] + (1-a)·r[k-1], a = exp(-2π·f_c·T).
+    """
+    period_s = 1.0 / path.sample_rate_hz
+    whole, part = divmod(path.command_delay_s, period_s)
+    wc = None if path.current_bandwidth_hz is None else 2 * np.pi * path.current_bandwidth_hz
+
+    def after(t: FloatArray) -> FloatArray:
+        """Response of the lag to a unit step (zero hold) or unit-slope ramp (linear hold)."""
+        late = np.maximum(t, 0.0)
+        if path.hold == "zero":
+            return np.asarray((t > 0) * 1.0 if wc is None else -np.expm1(-wc * late))
+        return np.asarray(late if wc is None else late + np.expm1(-wc * late) / wc)
+
+    t = np.arange(4) * period_s - part
+    impulse = after(t) - after(t - period_s)
+    if path.hold == "linear":
+        impulse = (impulse - after(t - period_s) + after(t - 2 * period_s)) / period_s
+    a = 0.0 if wc is None else float(np.exp(-wc * period_s))
+    numerator = impulse - a * np.concatenate([[0.0], impulse[:-1]])
+    filtered = np.asarray(lfilter(numerator, [1.0, -a], sent)) * path.direct_gain
+    return np.concatenate([np.zeros(int(whole)), filtered])[: filtered.size]
