@@ -1,1 +1,1 @@
-"""Firmware of virtual drives: dictionary, CiA 402 and one strategy per family."""
+"""Firmware of virtual drives: dictionary, CiA 402, modes, protections and the 50 µs loop."""

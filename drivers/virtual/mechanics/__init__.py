@@ -1,1 +1,29 @@
-"""Mechanics of virtual drives: inertia chain, friction, travel and their exact response."""
+"""The machine that a virtual drive turns: an inertia chain with friction, gravity and stops."""
+
+from drivers.virtual.mechanics.chain import analytic_response
+from drivers.virtual.mechanics.spec import (
+    EncoderSpec,
+    FrictionSpec,
+    LoadSpec,
+    MechanicsSpec,
+    MotorSpec,
+    SupplySpec,
+    SwitchSpec,
+    TravelSpec,
+    load_mechanics,
+    standard_mechanics,
+)
+
+__all__ = [
+    "EncoderSpec",
+    "FrictionSpec",
+    "LoadSpec",
+    "MechanicsSpec",
+    "MotorSpec",
+    "SupplySpec",
+    "SwitchSpec",
+    "TravelSpec",
+    "analytic_response",
+    "load_mechanics",
+    "standard_mechanics",
+]

@@ -1,0 +1,109 @@
+"""What every part of the firmware shares: dictionary, axis, family and units."""
+
+from __future__ import annotations
+
+import math
+
+from drivers.virtual.firmware.axis import VirtualAxis
+from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
+from drivers.virtual.firmware.families.base import Family, Units
+from profiles.schema import Profile
+
+_INT32 = (-(2**31), 2**31 - 1)
+
+
+class Core:
+    """Dictionary and axis with the conversions between user units and SI units.
+
+    ``zero_rad`` is the encoder angle at which the user's position is zero; homing and zeroing
+    move it, and like an absolute encoder's zero it survives a power cycle.
+    """
+
+    def __init__(
+        self, profile: Profile, family: Family, od: ObjectDictionary, axis: VirtualAxis
+    ) -> None:
+        self.profile = profile
+        self.family = family
+        self.od = od
+        self.axis = axis
+        self.motor = axis.motor
+        self.zero_rad = 0.0
+        self.units: Units = family.units(od, axis.motor)
+
+    def number(self, key: str, default: Number = 0) -> Number:
+        """Effective value of a parameter."""
+        return self.od.number(key, default)
+
+    def angle_of(self, position: float) -> float:
+        """User position to encoder angle."""
+        return position / self.units.position_per_rad + self.zero_rad
+
+    def position_of(self, angle_rad: float) -> float:
+        """Encoder angle to user position, not rounded."""
+        return (angle_rad - self.zero_rad) * self.units.position_per_rad
+
+    def speed_of(self, raw: float) -> float:
+        """User speed to rad/s, with the sign of the polarity."""
+        return raw / self.units.speed_per_rad_s
+
+    def torque_of(self, raw: float) -> float:
+        """‰ of rated torque to Nm."""
+        return raw / self.units.torque_per_nm
+
+    def deceleration(self, key: str) -> float:
+        """A ramp parameter in rad/s², not above the largest deceleration 60C6h."""
+        braking = self.units.ramp(self.number(key, 3276800))
+        limit = self.number("60C6:00")
+        return min(braking, self.units.ramp(limit)) if limit else braking
+
+    def acceleration(self, key: str) -> float:
+        """A ramp parameter in rad/s², not above the largest acceleration 60C5h."""
+        rising = self.units.ramp(self.number(key, 3276800))
+        limit = self.number("60C5:00")
+        return min(rising, self.units.ramp(limit)) if limit else rising
+
+    def max_speed(self) -> float:
+        """Largest motor speed 6080h in rad/s."""
+        raw = self.number("6080:00")
+        return raw / self.units.max_motor_speed_per_rad_s if raw else math.inf
+
+    def max_profile_speed(self) -> float:
+        """The smaller of 607Fh and 6080h in rad/s."""
+        raw = self.number("607F:00")
+        profile = abs(self.speed_of(raw)) if raw else math.inf
+        return min(profile, self.max_speed())
+
+    def software_limits(self) -> tuple[float, float]:
+        """607Dh in user units; equal or crossed limits mean none (CiA 402-2)."""
+        low, high = self.number("607D:01", _INT32[0]), self.number("607D:02", _INT32[1])
+        return (low, high) if low < high else _INT32
+
+    def apply_settings(self) -> None:
+        """Parameters that act through the loops came into use."""
+        od, motor = self.od, self.motor
+        self.units = self.family.units(od, motor)
+        self.axis.apply_loops(self.family.loops(od, self.profile, motor, self.units))
+        self.axis.apply_protections(self.family.protections(od, motor, self.units))
+        wiring = self.family.wiring(od)
+        self.axis.set_signals(
+            forced=wiring.forced, forced_on=wiring.forced_on, inverted=wiring.inverted
+        )
+        self.apply_motion()
+
+    def apply_motion(self, torque_limit_nm: float = math.inf) -> None:
+        """Windows and limits of the motion objects, which act at once."""
+        per_rad = abs(self.units.position_per_rad)
+        per_rad_s = abs(self.units.speed_per_rad_s)
+        following = self.number("6065:00", 2**32 - 1)
+        self.axis.apply_windows(
+            self.number("6067:00") / per_rad,
+            self.number("606D:00") / per_rad_s,
+            self.number("606F:00") / per_rad_s,
+            math.inf if following == 2**32 - 1 else following / per_rad,
+        )
+        largest = min(self.number("6072:00", 3000), self.number("6073:00", 3000))
+        sides = (
+            self.torque_of(min(largest, self.number(key, 3000))) for key in ("60E0:00", "60E1:00")
+        )
+        positive, negative = (min(side, torque_limit_nm) for side in sides)
+        self.axis.set_limits(positive, negative, self.max_speed())

@@ -1,0 +1,281 @@
+"""The object dictionary of a virtual drive: storage and the rules of access.
+
+Aborts follow CiA 301 table 22: no object or subindex, read-only, write-only, wrong length, out
+of range. A parameter that takes effect later keeps two values: the one that was written (and is
+read back) and the one in use.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator, Mapping
+
+from drivers.virtual.device import (
+    ABORT_NO_OBJECT,
+    ABORT_NO_SUBINDEX,
+    ABORT_READ_ONLY,
+    ABORT_TOO_HIGH,
+    ABORT_TOO_LONG,
+    ABORT_TOO_LOW,
+    ABORT_TOO_SHORT,
+    ABORT_UNSUPPORTED,
+    ABORT_WRITE_ONLY,
+    EntryInfo,
+    SdoAbort,
+)
+from profiles.schema import INTEGER_RANGE, Parameter, Profile, Raw
+
+_STRUCT = {
+    name: struct.Struct(form)
+    for name, form in {
+        "BOOL": "<B", "INT8": "<b", "UINT8": "<B", "INT16": "<h", "UINT16": "<H",
+        "INT32": "<i", "UINT32": "<I", "INT64": "<q", "UINT64": "<Q", "REAL32": "<f",
+    }.items()
+}  # fmt: skip
+Number = int | float
+
+
+def code_of(index: int, subindex: int) -> int:
+    """One number for index and subindex."""
+    return index << 8 | subindex
+
+
+class Entry:
+    """One object: its description, written and effective value, and who computes or reacts."""
+
+    __slots__ = ("active", "getter", "key", "parameter", "setter", "storage", "value", "wrap")
+
+    def __init__(self, parameter: Parameter) -> None:
+        self.parameter = parameter
+        self.key = parameter.key
+        self.storage = _STRUCT.get(parameter.type)
+        low, high = INTEGER_RANGE.get(parameter.type, (0, 0))
+        self.wrap = (low, high - low + 1) if high else None
+        self.value: Raw = self.default()
+        self.active: Raw = self.value
+        self.getter: Callable[[], Number] | None = None
+        self.setter: Callable[[Raw], None] | None = None
+
+    @property
+    def size(self) -> int:
+        """Bytes; text and octets as long as they are."""
+        return self.storage.size if self.storage else len(self.encoded())
+
+    def default(self) -> Raw:
+        """Printed default, brought into the type's range, or nothing at all."""
+        raw = self.parameter.default_raw
+        if self.storage is None:
+            return raw if isinstance(raw, str) else ""
+        if isinstance(raw, str) or raw is None:
+            raw = 0
+        if self.parameter.type == "REAL32":
+            return float(raw)
+        low, high = INTEGER_RANGE[self.parameter.type]
+        return min(max(int(raw), low), high)
+
+    def fit(self, number: Number) -> int:
+        """An integer that fits the type, wrapping around as a counter does."""
+        low, span = self.wrap or (0, 1)
+        return (int(number) - low) % span + low
+
+    def current(self) -> Raw:
+        """Value a reader sees."""
+        if self.getter is None:
+            return self.value
+        number = self.getter()
+        return number if self.wrap is None else self.fit(number)
+
+    def encoded(self) -> bytes:
+        """Value a reader sees, little endian."""
+        value = self.current()
+        if self.storage is not None:
+            return self.storage.pack(value)
+        if self.parameter.type == "OCTETS":
+            return bytes.fromhex(str(value))
+        return str(value).encode("utf-8")
+
+    def decode(self, data: bytes) -> Raw:
+        """Bytes of a writer to a value inside the printed range, or SdoAbort."""
+        if self.storage is None:
+            return data.hex(" ") if self.parameter.type == "OCTETS" else data.decode("utf-8")
+        if len(data) != self.storage.size:
+            raise SdoAbort(ABORT_TOO_LONG if len(data) > self.storage.size else ABORT_TOO_SHORT)
+        number: Number = self.storage.unpack(data)[0]
+        self.check(number)
+        return number
+
+    def check(self, number: Number) -> None:
+        """Refuse a number outside the printed range."""
+        low, high = self.parameter.raw_limits
+        if high is not None and number > high:
+            raise SdoAbort(ABORT_TOO_HIGH)
+        if low is not None and number < low:
+            raise SdoAbort(ABORT_TOO_LOW)
+
+
+class ObjectDictionary:
+    """Every entry of a profile, plus what CiA 301 demands and the manual leaves to it."""
+
+    def __init__(self, profile: Profile, station: int) -> None:
+        self.entries: dict[int, Entry] = {}
+        self.numbered: dict[str, Entry] = {}
+        for parameter in profile.parameters:
+            self._add(parameter)
+        for parameter in _standard_objects(profile, station):
+            if code_of(parameter.index or 0, parameter.subindex or 0) not in self.entries:
+                self._add(parameter)
+        self._add_counts()
+        self._subindices: dict[int, list[int]] = {}
+        for code in sorted(self.entries):
+            self._subindices.setdefault(code >> 8, []).append(code & 0xFF)
+
+    def _add(self, parameter: Parameter) -> None:
+        entry = Entry(parameter)
+        self.numbered[parameter.key] = entry
+        if parameter.index is not None and parameter.subindex is not None:
+            self.entries[code_of(parameter.index, parameter.subindex)] = entry
+
+    def _add_counts(self) -> None:
+        highest: dict[int, int] = {}
+        for code in self.entries:
+            highest[code >> 8] = max(highest.get(code >> 8, 0), code & 0xFF)
+        for index, last in highest.items():
+            if code_of(index, 0) not in self.entries:
+                self._add(_constant(index, 0, "Highest subindex", "UINT8", last))
+
+    def __iter__(self) -> Iterator[Entry]:
+        return iter(self.numbered.values())
+
+    def __contains__(self, code: int) -> bool:
+        return code in self.entries
+
+    def find(self, index: int, subindex: int) -> Entry:
+        """Entry, or SdoAbort with the code that tells object from subindex."""
+        entry = self.entries.get(index << 8 | subindex)
+        if entry is None:
+            raise SdoAbort(ABORT_NO_SUBINDEX if index in self._subindices else ABORT_NO_OBJECT)
+        return entry
+
+    def indices(self) -> list[int]:
+        """All indices, ascending."""
+        return list(self._subindices)
+
+    def subindices(self, index: int) -> list[int]:
+        """All subindices of an object, ascending."""
+        if index not in self._subindices:
+            raise SdoAbort(ABORT_NO_OBJECT)
+        return list(self._subindices[index])
+
+    def info(self, index: int, subindex: int) -> EntryInfo:
+        """What the SDO information service tells."""
+        entry = self.find(index, subindex)
+        parameter = entry.parameter
+        return EntryInfo(
+            name=parameter.name,
+            type=parameter.type,
+            bit_length=entry.size * 8,
+            readable=parameter.access != "wo",
+            writable=parameter.access != "ro",
+            pdo_rx=parameter.pdo in ("rx", "rxtx"),
+            pdo_tx=parameter.pdo in ("tx", "rxtx"),
+        )
+
+    def read(self, index: int, subindex: int) -> bytes:
+        """Value of an object."""
+        entry = self.find(index, subindex)
+        if entry.parameter.access == "wo":
+            raise SdoAbort(ABORT_WRITE_ONLY)
+        return entry.encoded()
+
+    def write(self, index: int, subindex: int, data: bytes) -> None:
+        """Write an object; its setter may still refuse, and then nothing changes."""
+        entry = self.find(index, subindex)
+        if entry.parameter.access == "ro":
+            raise SdoAbort(ABORT_READ_ONLY)
+        try:
+            value = entry.decode(data)
+        except UnicodeDecodeError:
+            raise SdoAbort(ABORT_UNSUPPORTED) from None
+        self.assign(entry, value)
+
+    @staticmethod
+    def assign(entry: Entry, value: Raw) -> None:
+        """Store a checked value and tell whoever reacts to it."""
+        before, before_active = entry.value, entry.active
+        entry.value = value
+        if entry.parameter.effective == "now":
+            entry.active = value
+        if entry.setter is not None:
+            try:
+                entry.setter(value)
+            except SdoAbort:
+                entry.value, entry.active = before, before_active
+                raise
+
+    def number(self, key: str, default: Number = 0) -> Number:
+        """Effective value of a numeric entry, or ``default`` where this drive has none."""
+        entry = self.numbered.get(key)
+        if entry is None or isinstance(entry.active, str):
+            return default
+        return entry.active
+
+    def put(self, key: str, value: Raw) -> None:
+        """The drive itself changes a value, in storage and in effect."""
+        entry = self.numbered.get(key)
+        if entry is not None:
+            entry.value = entry.active = value
+
+    def load(self, values: Mapping[str, Raw]) -> None:
+        """Power-on: take over stored values, all in effect; those that no longer fit are left."""
+        for key, value in values.items():
+            entry = self.numbered.get(key)
+            if entry is None:
+                continue
+            if entry.storage is not None:
+                if isinstance(value, str):
+                    continue
+                try:
+                    entry.check(value)
+                except SdoAbort:
+                    continue
+            entry.value = entry.active = value
+
+    def restore_defaults(self) -> None:
+        """All writable values back to what the manual prints."""
+        for entry in self:
+            if entry.parameter.access != "ro":
+                entry.value = entry.active = entry.default()
+
+    def activate(self, *effective: str) -> None:
+        """Written values of these effective classes come into use."""
+        for entry in self:
+            if entry.parameter.effective in effective:
+                entry.active = entry.value
+
+
+def _constant(index: int, subindex: int, name: str, kind: str, value: Raw) -> Parameter:
+    return Parameter.model_validate(
+        {
+            "key": f"{index:04X}:{subindex:02X}", "name": name, "group": "Standard",
+            "type": kind, "access": "ro", "default_raw": value, "source": "CiA 301",
+        }
+    )  # fmt: skip
+
+
+def _standard_objects(profile: Profile, station: int) -> list[Parameter]:
+    """Objects of CiA 301 and ETG.1000.6 that a master expects of every drive."""
+    identity = profile.identity
+    return [
+        _constant(0x1000, 0, "Device type", "UINT32", 0x00020192),
+        _constant(0x1001, 0, "Error register", "UINT8", 0),
+        _constant(0x1008, 0, "Device name", "STRING", identity.model),
+        _constant(0x1009, 0, "Hardware version", "STRING", "virtual"),
+        _constant(0x100A, 0, "Software version", "STRING", "virtual 1.0"),
+        _constant(0x1018, 0, "Identity", "UINT8", 4),
+        _constant(0x1018, 1, "Vendor", "UINT32", identity.vendor_id or 0),
+        _constant(0x1018, 2, "Product", "UINT32", identity.product_code or 0),
+        _constant(0x1018, 3, "Revision", "UINT32", identity.revision or 0),
+        _constant(0x1018, 4, "Serial number", "UINT32", 0x56000000 | station),
+        _constant(0x1C00, 0, "Sync manager types", "UINT8", 4),
+        *(_constant(0x1C00, i + 1, f"Sync manager {i}", "UINT8", i + 1) for i in range(4)),
+    ]

@@ -1,0 +1,1 @@
+"""What differs between drive families: conventions, protections, special commands."""

@@ -1,0 +1,96 @@
+"""The seam between the CiA 402 firmware and one drive family."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.dictionary import ObjectDictionary
+from drivers.virtual.firmware.settings import LoopSettings, MotorData, ProtectionSettings
+from drivers.virtual.mechanics import MechanicsSpec
+from profiles.schema import Profile, Raw
+
+RPM = math.pi / 30
+"""rad/s per rpm."""
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """User units per SI unit; the signs carry the polarity settings."""
+
+    position_per_rad: float
+    speed_per_rad_s: float
+    acceleration_per_rad_s2: float
+    torque_per_nm: float
+    max_motor_speed_per_rad_s: float = 1 / RPM
+    ramps_are_times_ms: bool = False
+    ramp_reference_rad_s: float = 0.0
+
+    def ramp(self, raw: float) -> float:
+        """Magnitude of an acceleration [rad/s²]; a ramp of zero means the steepest possible."""
+        if self.ramps_are_times_ms:
+            return self.ramp_reference_rad_s / max(raw, 1.0) * 1000.0
+        return max(raw, 1.0) / abs(self.acceleration_per_rad_s2)
+
+
+@dataclass(frozen=True, slots=True)
+class FaultInfo:
+    """How a family reports one protection: 603Fh, and whether 605Eh may shape the reaction."""
+
+    code: int
+    fixed: bool = False
+    error_register: int = 0x01
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """Switch signals after terminal functions, polarity and simulation; SIG_* bits."""
+
+    forced: int = 0
+    forced_on: int = 0
+    inverted: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Traits:
+    """Documented behaviours that are a matter of yes or no."""
+
+    buffered_setpoints: bool = True
+    limit_switch_faults: bool = True
+    communication_fault: int = k.F_WATCHDOG
+    faults: dict[int, FaultInfo] = field(default_factory=dict)
+    clockwise_is_negative: bool = True
+
+
+class Family(Protocol):
+    """Everything the firmware asks of a family. Implementations hold no state of a drive."""
+
+    name: str
+    traits: Traits
+
+    def factory_values(self, spec: MechanicsSpec, motor: MotorData) -> dict[str, Raw]:
+        """What the maker sets for this motor, beyond the printed defaults."""
+
+    def units(self, od: ObjectDictionary, motor: MotorData) -> Units:
+        """Units of the motion objects under the present gear settings."""
+
+    def loops(
+        self, od: ObjectDictionary, profile: Profile, motor: MotorData, units: Units
+    ) -> LoopSettings:
+        """Gains, filters and limits in SI units from the effective parameters."""
+
+    def protections(
+        self, od: ObjectDictionary, motor: MotorData, units: Units
+    ) -> ProtectionSettings:
+        """Thresholds in SI units from the effective parameters."""
+
+    def wiring(self, od: ObjectDictionary) -> Wiring:
+        """How the switches reach the drive."""
+
+
+def inertia_kgm2(od: ObjectDictionary, key: str, fallback: float, scale: float = 1e-7) -> float:
+    """Inertia parameter (g·cm² by default) in kg·m²; an unset one gives ``fallback``."""
+    raw = od.number(key)
+    return raw * scale if raw > 0 else fallback

@@ -1,0 +1,251 @@
+"""Homing as scripts: each yields what it waits for and is resumed when that happened.
+
+Methods −3, −2, 1–14, 17–30, 33, 34, 35 and 37 (CiA 402-2 clause "homing", 004:3837-3893).
+Directions are told by ``d``: +1 for the method as printed towards positive positions, −1 for its
+mirror image.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass
+
+from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.core import Core
+
+_FAR = 1e9
+_LIMITS = k.SIG_NEGATIVE | k.SIG_POSITIVE
+
+
+@dataclass(frozen=True, slots=True)
+class Until:
+    """Wait for an event; ``signals`` are the switches whose change counts."""
+
+    event: int
+    signals: int = 0
+
+
+class HomingFailed(Exception):
+    """The search ended where it must not: a limit switch, or a method this drive lacks."""
+
+
+Script = Generator[Until, None, float]
+"""Yields waits, returns the home angle [rad]."""
+_Step = Generator[Until, None, None]
+
+
+class Homing:
+    """Runs one method at a time. ``attained`` and ``failed`` feed the status word."""
+
+    def __init__(self, core: Core) -> None:
+        self._core = core
+        self._axis = core.axis
+        self._script: Generator[Until, None, None] | None = None
+        self._waiting = Until(0)
+        self.attained = False
+        self.failed = False
+        self.deadline_step: float | None = None
+
+    @property
+    def active(self) -> bool:
+        """True while searching."""
+        return self._script is not None
+
+    def start(self, method: int) -> None:
+        """Begin a method; one that is unknown or cannot work fails at once."""
+        self.attained = self.failed = False
+        core = self._core
+        timeout_s = core.number("2070:03")
+        self.deadline_step = (
+            float(self._axis.s[k.S_STEP]) + timeout_s / k.STEP_S if timeout_s else None
+        )
+        self._axis.set_alarm(self.deadline_step)
+        self._axis.p[k.P_LIMIT_STOPS] = 0.0
+        self._script = self._run(method)
+        self._resume()
+
+    def abort(self) -> None:
+        """End the search; the axis is left to whoever aborts."""
+        if self._script is not None:
+            self._script.close()
+        self._finish()
+
+    def on_events(self, events: int) -> None:
+        """Resume when what the script waits for has come, or give up at the deadline."""
+        if self._script is None:
+            return
+        if events & k.EV_ALARM_CLOCK and self.deadline_step is not None:
+            self._script.close()
+            self._fail()
+        elif events & self._waiting.event:
+            self._resume()
+
+    def _resume(self) -> None:
+        script = self._script
+        if script is None:
+            return
+        try:
+            self._waiting = next(script)
+        except StopIteration:
+            self.attained = True
+            self._finish()
+        except HomingFailed:
+            self._fail()
+        else:
+            self._axis.listen(self._waiting.event)
+            self._axis.watch_signals(self._waiting.signals)
+
+    def _fail(self) -> None:
+        self.failed = True
+        self._finish()
+        self._axis.stop_ramp(self._acceleration())
+
+    def _finish(self) -> None:
+        self._script = None
+        self.deadline_step = None
+        self._axis.set_alarm(None)
+        self._axis.listen(k.EV_ARRIVED)
+        self._axis.watch_signals(0)
+        self._axis.watch_stall(0.0, math.inf, 0.0)
+        self._axis.p[k.P_LIMIT_STOPS] = float(self._core.family.traits.limit_switch_faults)
+        self._core.apply_motion()
+
+    # --- building blocks -------------------------------------------------------------------
+    def _acceleration(self) -> float:
+        raw = self._core.number("609A:00")
+        # Zero is a printed default and cannot move anything: the profile ramp stands in.
+        return self._core.units.ramp(raw or self._core.number("6083:00", 3276800))
+
+    def _speed(self, key: str, fallback: int) -> float:
+        raw = self._core.number(key) or fallback
+        return min(abs(self._core.speed_of(raw)), self._core.max_speed())
+
+    def _signals(self) -> int:
+        return int(self._axis.s[k.S_SIGNALS])
+
+    def _drive(self, direction: int, *, slow: bool) -> None:
+        speed = self._speed("6099:02", 65536) if slow else self._speed("6099:01", 655360)
+        ramp = self._acceleration()
+        self._axis.move(math.copysign(_FAR, direction), speed, ramp, ramp)
+
+    def _travel(self, direction: int, signal: int, level: bool, *, slow: bool) -> Script:
+        """Move until a switch has this level; returns the angle there. Limits end it."""
+        blocking = (k.SIG_POSITIVE if direction > 0 else k.SIG_NEGATIVE) & ~signal
+        self._drive(direction, slow=slow)
+        while bool(self._signals() & signal) != level:
+            if self._signals() & blocking:
+                raise HomingFailed
+            yield Until(k.EV_SIGNAL, signal | blocking)
+        return self._axis.angle_rad
+
+    def _search(self, direction: int, signal: int) -> Generator[Until, None, bool]:
+        """Fast search for a switch; False when the limit switch came first."""
+        limit = k.SIG_POSITIVE if direction > 0 else k.SIG_NEGATIVE
+        self._drive(direction, slow=False)
+        while not self._signals() & signal:
+            if self._signals() & limit:
+                return False
+            yield Until(k.EV_SIGNAL, signal | limit)
+        return True
+
+    def _index(self, direction: int) -> Script:
+        """Slow search for the next index pulse; returns its angle."""
+        self._drive(direction, slow=True)
+        limit = k.SIG_POSITIVE if direction > 0 else k.SIG_NEGATIVE
+        before = float(self._axis.s[k.S_INDEX_COUNT])
+        while float(self._axis.s[k.S_INDEX_COUNT]) == before:
+            if self._signals() & limit:
+                raise HomingFailed
+            yield Until(k.EV_INDEX | k.EV_SIGNAL, limit)
+        return float(self._axis.s[k.S_INDEX_ANGLE])
+
+    def _stop(self) -> _Step:
+        self._axis.stop_ramp(self._acceleration())
+        yield Until(k.EV_STOPPED)
+
+    # --- methods ---------------------------------------------------------------------------
+    def _run(self, method: int) -> Generator[Until, None, None]:
+        if method in (35, 37):
+            home = self._axis.angle_rad
+        elif method in (-2, -3):
+            home = yield from self._by_torque(1 if method == -2 else -1)
+        elif method in (33, 34):
+            home = yield from self._index(-1 if method == 33 else 1)
+        elif 1 <= method <= 14:
+            direction = yield from self._edge(method)
+            home = yield from self._index(direction)
+        elif 17 <= method <= 30:
+            yield from self._edge(method - 16)
+            home = self._axis.angle_rad
+        else:
+            raise HomingFailed
+        if method not in (35, 37, -2, -3):
+            yield from self._stop()
+            ramp = self._acceleration()
+            self._axis.move(home, self._speed("6099:02", 65536), ramp, ramp)
+            yield Until(k.EV_ARRIVED)
+        # The zero position lies the home offset beyond the home position (004:7231-7236).
+        self._core.zero_rad = (
+            home + self._core.number("607C:00") / self._core.units.position_per_rad
+        )
+        if method in (35, 37, -2, -3):
+            self._axis.hold()
+
+    def _by_torque(self, direction: int) -> Script:
+        core = self._core
+        torque = core.torque_of(core.number("2070:01", 500))
+        core.apply_motion(torque_limit_nm=torque)
+        self._axis.watch_stall(
+            0.95 * torque, core.number("2070:02", 500) * 1e-3, float(self._axis.p[k.P_STOP_SPEED])
+        )
+        self._drive(direction, slow=False)
+        yield Until(k.EV_STALL)
+        return self._axis.angle_rad
+
+    def _edge(self, method: int) -> Generator[Until, None, int]:
+        """Find the switch edge of methods 1 to 14; returns the direction to the index pulse."""
+        if method in (1, 2):
+            d = 1 if method == 2 else -1
+            limit = k.SIG_POSITIVE if d > 0 else k.SIG_NEGATIVE
+            yield from self._travel(d, limit, True, slow=False)
+            yield from self._travel(-d, limit, False, slow=True)
+            return -d
+        if method in (3, 4, 5, 6):
+            d = 1 if method in (3, 4) else -1
+            return (yield from self._home_side(d, inside=method in (4, 6)))
+        d = 1 if method <= 10 else -1
+        return (yield from self._cam(d, (method - 7) % 4))
+
+    def _home_side(self, d: int, *, inside: bool) -> Generator[Until, None, int]:
+        """Methods 3 to 6: a home switch that is active beyond its edge in direction ``d``."""
+        active = bool(self._signals() & k.SIG_HOME)
+        if inside:
+            if active:
+                yield from self._travel(-d, k.SIG_HOME, False, slow=False)
+            yield from self._travel(d, k.SIG_HOME, True, slow=active)
+            return d
+        if not active:
+            yield from self._travel(d, k.SIG_HOME, True, slow=False)
+        yield from self._travel(-d, k.SIG_HOME, False, slow=True)
+        return -d
+
+    def _cam(self, d: int, which: int) -> Generator[Until, None, int]:
+        """Methods 7 to 14: a home cam and a limit switch in direction ``d``.
+
+        ``which``: 0 before the near edge, 1 behind it, 2 before the far edge, 3 behind it.
+        """
+        home = k.SIG_HOME
+        near = which in (0, 1)
+        if not self._signals() & home:
+            found = yield from self._search(d, home)
+            if not found:
+                yield from self._travel(-d, home, True, slow=False)
+        # Inside the cam now: leave it over the wanted edge.
+        outwards = -d if near else d
+        final = which in (0, 3)
+        yield from self._travel(outwards, home, False, slow=final)
+        if final:
+            return outwards
+        yield from self._travel(-outwards, home, True, slow=True)
+        return -outwards

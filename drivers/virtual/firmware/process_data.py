@@ -1,0 +1,130 @@
+"""Process data: checking a mapping and moving values in and out of the dictionary."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+
+from drivers.virtual.device import (
+    ABORT_NOT_MAPPABLE,
+    ABORT_PDO_LENGTH,
+    SdoAbort,
+)
+from drivers.virtual.firmware.dictionary import Entry, Number, ObjectDictionary
+
+_FORMAT = {
+    "BOOL": "B", "INT8": "b", "UINT8": "B", "INT16": "h", "UINT16": "H",
+    "INT32": "i", "UINT32": "I", "INT64": "q", "UINT64": "Q", "REAL32": "f",
+}  # fmt: skip
+
+
+def check_mapping(
+    od: ObjectDictionary, entries: Sequence[int], direction: str, max_bytes: int | None
+) -> list[Entry | int]:
+    """Entries of a mapping, or the number of bytes of a gap (index 0).
+
+    Raises SdoAbort: unknown or not mappable in this direction, wrong bit length, too long.
+    """
+    found: list[Entry | int] = []
+    total = 0
+    for item in entries:
+        code, bits = item >> 8, item & 0xFF
+        total += bits
+        if code == 0:
+            if bits == 0 or bits % 8:
+                raise SdoAbort(ABORT_PDO_LENGTH)
+            found.append(bits // 8)
+            continue
+        entry = od.entries.get(code)
+        if entry is None:
+            raise SdoAbort(ABORT_NOT_MAPPABLE)
+        if entry.parameter.pdo not in (direction, "rxtx") or entry.storage is None:
+            raise SdoAbort(ABORT_NOT_MAPPABLE)
+        if entry.size * 8 != bits:
+            raise SdoAbort(ABORT_PDO_LENGTH)
+        found.append(entry)
+    if max_bytes is not None and total > max_bytes * 8:
+        raise SdoAbort(ABORT_PDO_LENGTH)
+    return found
+
+
+def _layout(parts: Sequence[Entry | int]) -> struct.Struct:
+    fields = (f"{p}x" if isinstance(p, int) else _FORMAT[p.parameter.type] for p in parts)
+    return struct.Struct("<" + "".join(fields))
+
+
+class InputImage:
+    """Drive to master. Built once per mapping; ``pack`` is called every cycle."""
+
+    def __init__(self, parts: Sequence[Entry | int]) -> None:
+        self._struct = _layout(parts)
+        self.size = self._struct.size
+        self._readers = [_reader(part) for part in parts if isinstance(part, Entry)]
+
+    def pack(self) -> bytes:
+        """Current values."""
+        return self._struct.pack(*[read() for read in self._readers])
+
+    def unpack(self, data: bytes) -> None:
+        """Inputs cannot be written."""
+        raise SdoAbort(ABORT_NOT_MAPPABLE)
+
+
+def _reader(entry: Entry) -> Callable[[], Number]:
+    getter = entry.getter
+    if getter is None:
+        return lambda: entry.value  # type: ignore[return-value, unused-ignore]
+    if entry.wrap is None:
+        return getter
+    low, span = entry.wrap
+
+    def read() -> int:
+        return (int(getter()) - low) % span + low
+
+    return read
+
+
+class OutputImage:
+    """Master to drive. Values out of range are limited, as a drive does with process data."""
+
+    def __init__(self, parts: Sequence[Entry | int], arrived: Callable[[], None]) -> None:
+        self._struct = _layout(parts)
+        self.size = self._struct.size
+        self._entries = [part for part in parts if isinstance(part, Entry)]
+        self._arrived = arrived
+        self._last: tuple[Number, ...] | None = None
+
+    def pack(self) -> bytes:
+        """The outputs as they stand in the dictionary."""
+        return self._struct.pack(*[entry.current() for entry in self._entries])
+
+    def unpack(self, data: bytes) -> None:
+        """Take over one cycle's outputs; set-points first, the control word last."""
+        values = self._struct.unpack(data)
+        if values != self._last:
+            previous, self._last = self._last, values
+            changed: list[tuple[Entry, Number]] = []
+            for position, (entry, value) in enumerate(zip(self._entries, values, strict=True)):
+                if previous is not None and previous[position] == value and entry.value == value:
+                    continue
+                changed.append((entry, _limited(entry, value)))
+            changed.sort(key=lambda item: _ORDER.get(item[0].key, 0))
+            for entry, value in changed:
+                entry.value = entry.active = value
+            for entry, value in changed:
+                if entry.setter is not None:
+                    entry.setter(value)
+        self._arrived()
+
+
+#: The mode must act before the control word, and both after the set-points of the same cycle.
+_ORDER = {"6060:00": 1, "6040:00": 2}
+
+
+def _limited(entry: Entry, value: Number) -> Number:
+    low, high = entry.parameter.raw_limits
+    if low is not None and value < low:
+        return low
+    if high is not None and value > high:
+        return high
+    return value
