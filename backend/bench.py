@@ -20,8 +20,8 @@ from backend.library import SetLibrary
 from backend.monitor import Monitor, Snapshot
 from backend.scope import ScopeHub
 from drivers.errors import Busy, DriveError, NotAllowed
-from drivers.link import Found, Link, LinkEvent
-from drivers.urls import open_link
+from drivers.link import Found, Link, LinkEvent, NeedsProfile
+from drivers.urls import link_for
 from profiles import load_all, load_profile
 from profiles.schema import Profile
 
@@ -102,7 +102,7 @@ class Bench:
         async with self._opening:
             link = self.links.get(url)
             if link is None:
-                link = open_link(self.aliases.get(url, url))
+                link = link_for(self.aliases.get(url, url))
                 await link.open()
                 link.listen(lambda event: self._bus_event(url, event))
                 self.links[url] = link
@@ -198,6 +198,8 @@ class Bench:
                 )
         facts = load_profile(profile)
         spec = facts.link(link.kind)
+        if isinstance(link, NeedsProfile):
+            link.configure_station(station, facts)
         drive_id = self._new_id(name or f"{profile}-{station}")
         drive = Drive(drive_id, name or drive_id, facts, [Port(link, station, spec)])
         drive.found = found

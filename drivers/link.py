@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from drivers.errors import DriveError
-from profiles.schema import DataType, LinkKind
+from profiles.schema import DataType, LinkKind, Profile
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +120,14 @@ class Link(Protocol):
 
     def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
         """Be told of events, on the event loop's thread."""
+
+
+@runtime_checkable
+class NeedsProfile(Protocol):
+    """A link whose wire format depends on the family: word order, block limits, register table."""
+
+    def configure_station(self, station: int, profile: Profile) -> None:
+        """Say which family answers at ``station``."""
 
 
 @dataclass(frozen=True, slots=True)

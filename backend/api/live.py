@@ -11,6 +11,7 @@ import contextlib
 import itertools
 import struct
 from collections.abc import Awaitable, Callable
+from functools import partial
 
 import numpy as np
 from fastapi import WebSocket, WebSocketDisconnect
@@ -92,7 +93,7 @@ class LiveHub:
     def _snapshot(self, drive: str, snapshot: Snapshot) -> None:
         for connection in self._each():
             if drive in connection.watched:
-                connection.later("state", drive, lambda s=snapshot, d=drive: _state(self, d, s))
+                connection.later("state", drive, partial(_state, self.bench, drive, snapshot))
 
     def _readings(self, drive: str, readings: list[Reading]) -> None:
         for connection in self._each():
@@ -100,7 +101,7 @@ class LiveHub:
 
     def _job(self, job: Job) -> None:
         for connection in self._each():
-            connection.later("job", job.id, lambda j=job: JobChanged(job=convert.job(j)))
+            connection.later("job", job.id, partial(_job, job))
 
     def _drives(self) -> None:
         for connection in self._each():
@@ -111,11 +112,15 @@ class LiveHub:
             connection.send(Logged(entry=convert.log_entry(entry)))
 
 
-def _state(hub: LiveHub, drive: str, snapshot: Snapshot) -> BaseModel | None:
-    member = hub.bench.members.get(drive)
+def _state(bench: Bench, drive: str, snapshot: Snapshot) -> BaseModel | None:
+    member = bench.members.get(drive)
     if member is None:
         return None
-    return StateChanged(state=convert.axis_state(hub.bench, member, snapshot))
+    return StateChanged(state=convert.axis_state(bench, member, snapshot))
+
+
+def _job(job: Job) -> BaseModel:
+    return JobChanged(job=convert.job(job))
 
 
 class Connection:

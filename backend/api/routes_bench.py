@@ -10,6 +10,7 @@ import backend
 from backend.api import convert
 from backend.api.context import Connection, Controlled, TheBench, TheMember
 from backend.api.errors import NotFound
+from backend.api.interfaces import list_interfaces
 from backend.api.models import (
     Bus,
     ConnectRequest,
@@ -25,7 +26,6 @@ from backend.api.models import (
     StopRequest,
     StopResult,
 )
-from backend.api.interfaces import list_interfaces
 from backend.jobs import Job, JobResult, Progress
 from drivers.link import Found
 from profiles import load_all

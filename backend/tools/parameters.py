@@ -8,10 +8,11 @@ from datetime import UTC, datetime
 
 from backend import parameter_set
 from backend.drive import Drive
-from backend.jobs import JobResult, Progress
+from backend.jobs import JobResult
 from backend.library import SetLibrary
 from backend.parameter_set import ParameterSet
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
+from drivers.link import Progress
 from profiles.schema import Raw
 
 

@@ -1,0 +1,152 @@
+"""The command line: ``servodeck …``."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import sys
+import tempfile
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from backend.bench import Bench, match_profiles
+from backend.commands import params, profile
+from backend.commands.serve import serve as run_server
+from backend.commands.serve import state_folder
+from backend.commands.session import opened, run, show_progress
+from backend.demo import DemoBench
+from drivers.errors import NotAllowed
+from drivers.urls import parse_url
+from drivers.virtual.mechanics.spec import load_mechanics, standard_mechanics
+
+app = typer.Typer(
+    help="Servo-drive commissioning in a browser.", no_args_is_help=True, add_completion=False
+)
+app.add_typer(params.app, name="params")
+app.add_typer(profile.app, name="profile")
+
+Host = Annotated[str, typer.Option(help="address to listen on")]
+Port = Annotated[int, typer.Option(help="port to listen on; 0 takes a free one")]
+Config = Annotated[Path | None, typer.Option(help="folder of drives and parameter sets")]
+Open = Annotated[bool, typer.Option("--open", help="open the page in a browser")]
+
+
+@app.command()
+def serve(
+    host: Host = "127.0.0.1", port: Port = 8420, config: Config = None, open_: Open = False
+) -> None:
+    """Start the server and the web page."""
+
+    async def work() -> None:
+        await run_server(Bench(state_folder(config)), host, port, open_page=open_)
+
+    _until_interrupted(work)
+
+
+@app.command()
+def demo(
+    host: Host = "127.0.0.1",
+    port: Port = 8420,
+    bench: Annotated[Path | None, typer.Option(help="bench file (TOML)")] = None,
+    config: Config = None,
+    open_: Open = False,
+) -> None:
+    """Start the server on a bench of virtual drives: no hardware, no root."""
+
+    async def work() -> None:
+        with tempfile.TemporaryDirectory(prefix="servodeck-") as folder:
+            state = config or Path(folder) / "state"
+            print("starting the virtual drives …", flush=True)
+            with DemoBench(bench, Path(folder) / "wires", state / "nvm") as drives:
+                for alias, real in drives.aliases.items():
+                    print(f"  {alias}  is  {real}")
+                for problem in drives.problems:
+                    print(f"  note: {problem}")
+                server_bench = Bench(state, drives.aliases)
+                await run_server(server_bench, host, port, open_page=open_)
+
+    _until_interrupted(work)
+
+
+def _until_interrupted(work: Callable[[], Awaitable[None]]) -> None:
+    # uvicorn has already shut down in order when the interrupt arrives here.
+    with contextlib.suppress(KeyboardInterrupt):
+        run(work)
+
+
+@app.command()
+def virtual(
+    drive: str,
+    on: Annotated[str, typer.Option(help="bus URL; serial ones create the pty at that path")],
+    station: Annotated[int, typer.Option()] = 1,
+    mechanics: Annotated[Path | None, typer.Option(help="mechanics (TOML)")] = None,
+    nvm: Annotated[Path | None, typer.Option(help="folder of the drive's memory")] = None,
+) -> None:
+    """Run one virtual drive on a real wire, for any client."""
+
+    async def work() -> None:
+        parse_url(on)
+        try:
+            spec = load_mechanics(mechanics) if mechanics else standard_mechanics()
+        except (OSError, ValueError) as error:
+            raise NotAllowed(f"{mechanics}: {error}", remedy="correct the file") from error
+        with tempfile.TemporaryDirectory(prefix="servodeck-") as folder:
+            file = Path(folder) / "bench.json"
+            axis = {
+                "name": drive,
+                "drive": drive,
+                "on": on,
+                "station": station,
+                "mechanics": spec.model_dump(exclude_defaults=True),
+            }
+            file.write_text(json.dumps({"axis": [axis]}), "utf-8")
+            with DemoBench(file, Path(folder), nvm) as drives:
+                for real in drives.aliases.values():
+                    print(f"{drive} answers at {real} station {station}  (Ctrl+C ends it)")
+                sys.stdout.flush()
+                await asyncio.Event().wait()
+
+    _until_interrupted(work)
+
+
+@app.command()
+def scan(
+    url: Annotated[str, typer.Argument(metavar="BUS_URL")],
+    as_json: Annotated[bool, typer.Option("--json")] = False,
+) -> None:
+    """Look for drives on a bus."""
+
+    async def work() -> None:
+        async with opened(url) as link:
+            found = await link.scan(show_progress, None)
+            if as_json:
+                rows = [
+                    {
+                        "station": f.station, "vendor_id": f.vendor_id,
+                        "product_code": f.product_code, "revision": f.revision,
+                        "serial": f.serial, "name": f.name, "alias": f.alias,
+                        "firmware": f.firmware, "state": f.state, "notes": list(f.notes),
+                        "profiles": [m.profile.drive for m in match_profiles(link.kind, f)],
+                    }
+                    for f in found
+                ]  # fmt: skip
+                print(json.dumps(rows, indent=1))
+                return
+            for f in found:
+                fits = ", ".join(
+                    f"{m.profile.drive} ({m.confidence})" for m in match_profiles(link.kind, f)
+                )
+                print(f"station {f.station}: {f.name or 'no name'}  serial {f.serial}  {fits}")
+            if not found:
+                print("no drive answers: check power, cable, baud rate, parity and address")
+
+    run(work)
+
+
+def main() -> None:
+    """Entry point."""
+    app()

@@ -1,0 +1,93 @@
+"""A drive on a bus for the length of one command, without the server."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from typing import TypeVar
+
+import typer
+
+from backend.bench import match_profiles
+from backend.drive import Drive, Port
+from drivers.errors import DriveError, NotAllowed
+from drivers.link import Found, Link, NeedsProfile
+from drivers.urls import link_for
+from profiles import load_profile
+
+T = TypeVar("T")
+
+
+def run(work: Callable[[], Awaitable[T]]) -> T:
+    """Run a command; errors about drives become one readable message and exit code 1."""
+
+    async def body() -> T:
+        return await work()
+
+    try:
+        return asyncio.run(body())
+    except DriveError as error:
+        print(f"error: {error.message}", file=sys.stderr)
+        if error.remedy:
+            print(f"try:   {error.remedy}", file=sys.stderr)
+        raise typer.Exit(1) from error
+
+
+def show_progress(fraction: float, step: str) -> None:
+    """A line that overwrites itself, on a terminal only."""
+    if sys.stderr.isatty():
+        end = "\n" if fraction >= 1 else ""
+        print(f"\r{fraction:5.0%}  {step:60.60}", end=end, file=sys.stderr, flush=True)
+
+
+@asynccontextmanager
+async def opened(url: str) -> AsyncIterator[Link]:
+    """The bus, closed afterwards."""
+    link = link_for(url)
+    await link.open()
+    try:
+        yield link
+    finally:
+        await link.close()
+
+
+@asynccontextmanager
+async def drive_at(url: str, station: int, profile: str | None) -> AsyncIterator[Drive]:
+    """A drive on a bus. Without ``profile`` it is recognised, or the choices are named.
+
+    Raises:
+        NotAllowed: nothing answers, or several families would fit.
+    """
+    async with opened(url) as link:
+        seen = await link.scan(show_progress, [station])
+        found = next((f for f in seen if f.station == station), None)
+        if found is None:
+            raise NotAllowed(
+                f"nothing answers at station {station} of {url}",
+                remedy="check power, cable, station address, baud rate and parity",
+            )
+        facts = load_profile(profile or _recognise(link, found))
+        if isinstance(link, NeedsProfile):
+            link.configure_station(station, facts)
+        drive = Drive(
+            f"{facts.drive}-{station}",
+            f"{facts.drive} station {station}",
+            facts,
+            [Port(link, station, facts.link(link.kind))],
+        )
+        drive.found = found
+        yield drive
+
+
+def _recognise(link: Link, found: Found) -> str:
+    matches = match_profiles(link.kind, found)
+    sure = [m for m in matches if m.confidence != "possible"] or matches
+    if len(sure) != 1:
+        choices = ", ".join(match.profile.drive for match in matches) or "none"
+        raise NotAllowed(
+            f"the drive at station {found.station} could be: {choices}",
+            remedy="say which with --profile",
+        )
+    return sure[0].profile.drive

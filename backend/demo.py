@@ -1,0 +1,110 @@
+"""The demo bench: virtual drives on real wires, in processes of their own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import TracebackType
+
+from drivers.errors import LinkLost
+from drivers.virtual.bench import STANDARD_BENCH, BenchSpec, load_bench
+
+
+class DemoBench:
+    """Starts the wires of a bench file and knows their real addresses.
+
+    Use as a context manager; leaving it ends all virtual drives.
+    """
+
+    def __init__(self, bench: Path | None, folder: Path, nvm: Path | None = None) -> None:
+        self._file = bench or STANDARD_BENCH
+        self._folder = folder
+        self._nvm = nvm
+        self._host: subprocess.Popen[str] | None = None
+        self.spec: BenchSpec = load_bench(self._file)
+        self.aliases: dict[str, str] = {}
+        #: Sentences for the user about what could not be started.
+        self.problems: list[str] = []
+
+    def start(self) -> None:
+        """Start the virtual drives and wait until their wires exist.
+
+        Raises:
+            LinkLost: a wire could not be made; the message says why.
+        """
+        self._folder.mkdir(parents=True, exist_ok=True)
+        arguments = ["--bench", str(self._file), "--folder", str(self._folder)]
+        if self._nvm is not None:
+            self._nvm.mkdir(parents=True, exist_ok=True)
+            arguments += ["--nvm", str(self._nvm)]
+        self._host = subprocess.Popen(
+            [sys.executable, "-m", "drivers.virtual.host", *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            # Ctrl+C in the terminal ends the server first, which then ends the drives.
+            start_new_session=True,
+        )
+        answer = self._read()
+        if not answer.get("ready"):
+            self.stop()
+            raise LinkLost(
+                f"the virtual drives did not start: {answer.get('error', 'the process ended')}",
+                remedy="see docs/virtual-drives.md",
+            )
+        wires = answer["wires"]
+        if isinstance(wires, dict):
+            self.aliases.update(wires)
+
+    def command(self, **command: object) -> object:
+        """Cause trouble: see drivers.virtual.host.
+
+        Raises:
+            ValueError: the command is refused. LinkLost: the process has ended.
+        """
+        if self._host is None or self._host.stdin is None:
+            raise LinkLost("the virtual drives do not run")
+        try:
+            self._host.stdin.write(json.dumps(command) + "\n")
+            self._host.stdin.flush()
+        except OSError as error:
+            raise LinkLost("the virtual drives have ended") from error
+        answer = self._read()
+        if not answer.get("ok"):
+            raise ValueError(str(answer.get("error", "the process ended")))
+        return answer.get("result")
+
+    def stop(self) -> None:
+        """End the virtual drives. Calling again does nothing."""
+        host, self._host = self._host, None
+        if host is None:
+            return
+        for stream in (host.stdin, host.stdout):
+            if stream is not None:
+                stream.close()
+        try:
+            host.wait(timeout=5)
+        except subprocess.TimeoutExpired:
+            host.kill()
+            host.wait()
+
+    def _read(self) -> dict[str, object]:
+        if self._host is None or self._host.stdout is None:
+            return {}
+        line = self._host.stdout.readline()
+        message = json.loads(line) if line else {}
+        return message if isinstance(message, dict) else {}
+
+    def __enter__(self) -> DemoBench:
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()

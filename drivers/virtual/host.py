@@ -1,0 +1,169 @@
+"""Virtual drives on serial and CAN wires, in a process of their own.
+
+::
+
+    python -m drivers.virtual.host --bench FILE --folder DIR [--nvm DIR]
+
+It makes the wires under ``DIR``, prints one JSON line ``{"ready": true, "wires": {URL: URL}}``
+(the bench's URL to the real one), then takes one JSON command per line and answers each:
+``pull``, ``heal`` (a wire), ``power_cycle``, ``inject`` (an axis), ``mute``, ``stop``. It ends
+when its standard input closes, so it never outlives whoever started it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from drivers.errors import DriveError
+from drivers.urls import parse_url
+from drivers.virtual.bench import AxisSpec, BenchSpec, load_bench
+from drivers.virtual.device import Device
+from drivers.virtual.firmware.factory import make_device
+from drivers.virtual.wires.modbus import ModbusSlave, ObjectRegisters, Registers, TableRegisters
+from drivers.virtual.wires.pty import PtyWire, WireTime
+
+
+class Wires:
+    """The running wires of a bench (without EtherCAT, which has its own process)."""
+
+    def __init__(self, bench: BenchSpec, folder: Path, nvm: Path | None) -> None:
+        self.devices: dict[str, Device] = {}
+        self.real_urls: dict[str, str] = {}
+        self._slaves: dict[str, ModbusSlave] = {}
+        self._lock = threading.RLock()
+        self._bench = bench
+        self._folder = folder
+        self._nvm = nvm
+
+    def start(self) -> None:
+        """Make the devices and their wires.
+
+        Raises:
+            DriveError: a wire cannot be made.
+        """
+        for scheme in ("mlink", "modbus"):
+            for number, url in enumerate(self._bench.urls(scheme)):
+                self._start_serial(scheme, url, number)
+
+    def stop(self) -> None:
+        """Take all wires down."""
+        for slave in self._slaves.values():
+            slave.stop()
+
+    def _device(self, axis: AxisSpec, station: int) -> Device:
+        device = self.devices.get(axis.name)
+        if device is None:
+            device = make_device(axis.drive, axis.mechanics, self._nvm, station)
+            self.devices[axis.name] = device
+        return device
+
+    def _start_serial(self, scheme: str, url: str, number: int) -> None:
+        parsed = parse_url(url)
+        path = self._folder / f"{scheme}{number}" if parsed.is_virtual else Path(parsed.place)
+        options = dict(parsed.options)
+        wire_time = None
+        if (rate := options.get("wire_baudrate")) is not None:
+            wire_time = WireTime(int(rate))
+        stations: dict[int, tuple[Device, Registers]] = {}
+        for axis, station in self._bench.on(url):
+            device = self._device(axis, station)
+            registers: Registers = (
+                ObjectRegisters(device) if scheme == "mlink" else TableRegisters(device)
+            )
+            stations[station] = (device, registers)
+        slave = ModbusSlave(PtyWire(path, wire_time), stations, lock=self._lock)
+        slave.start()
+        self._slaves[url] = slave
+        # A pty refuses parity (EINVAL), so the address that is handed out asks for none.
+        self.real_urls[url] = f"{scheme}://{path}?parity=N"
+
+    # --- trouble ----------------------------------------------------------------------
+
+    def carry_out(self, command: dict[str, object]) -> object:
+        """One command of the control channel.
+
+        Raises:
+            ValueError: no such command, wire or axis.
+        """
+        actions: dict[str, Callable[[dict[str, object]], object]] = {
+            "pull": lambda c: self._slave(c).wire.pull(),
+            "heal": lambda c: self._slave(c).wire.heal(),
+            "mute": self._mute,
+            "power_cycle": self._power_cycle,
+            "inject": self._inject,
+            "read": self._read,
+        }
+        action = actions.get(str(command.get("do")))
+        if action is None:
+            raise ValueError(f"no command {command.get('do')!r}; there are {', '.join(actions)}")
+        return action(command)
+
+    def _slave(self, command: dict[str, object]) -> ModbusSlave:
+        slave = self._slaves.get(str(command.get("wire")))
+        if slave is None:
+            raise ValueError(f"no wire {command.get('wire')!r}; there are {list(self._slaves)}")
+        return slave
+
+    def _axis(self, command: dict[str, object]) -> Device:
+        device = self.devices.get(str(command.get("axis")))
+        if device is None:
+            raise ValueError(f"no axis {command.get('axis')!r}; there are {list(self.devices)}")
+        return device
+
+    def _mute(self, command: dict[str, object]) -> None:
+        self._slave(command).mute = bool(command.get("on", True))
+
+    def _power_cycle(self, command: dict[str, object]) -> None:
+        with self._lock:
+            self._axis(command).power_cycle(float(str(command.get("off_s", 0.0))))
+
+    def _inject(self, command: dict[str, object]) -> None:
+        with self._lock:
+            value = float(str(command.get("value", 1.0)))
+            self._axis(command).inject(str(command.get("what")), value)
+
+    def _read(self, command: dict[str, object]) -> str:
+        with self._lock:
+            index, subindex = int(str(command["index"])), int(str(command["subindex"]))
+            return self._axis(command).read(index, subindex).hex()
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run until standard input closes."""
+    parser = argparse.ArgumentParser(prog="python -m drivers.virtual.host")
+    parser.add_argument("--bench", type=Path, required=True)
+    parser.add_argument("--folder", type=Path, required=True)
+    parser.add_argument("--nvm", type=Path)
+    options = parser.parse_args(argv)
+    try:
+        wires = Wires(load_bench(options.bench), options.folder, options.nvm)
+        wires.start()
+    except (DriveError, ValueError) as error:
+        _answer({"ready": False, "error": str(error)})
+        return 1
+    _answer({"ready": True, "wires": wires.real_urls})
+    try:
+        for line in sys.stdin:
+            try:
+                _answer({"ok": True, "result": wires.carry_out(json.loads(line))})
+            except (ValueError, KeyError) as error:
+                _answer({"ok": False, "error": str(error)})
+    except KeyboardInterrupt:
+        pass
+    finally:
+        wires.stop()
+    return 0
+
+
+def _answer(message: dict[str, object]) -> None:
+    sys.stdout.write(json.dumps(message) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
