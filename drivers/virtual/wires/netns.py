@@ -260,7 +260,7 @@ def _main(argv: Sequence[str]) -> int:
         except NamespaceUnavailable as error:
             sys.stderr.write(f"{error}\n")
             return 1
-        os.execvp(argv[3], argv[3:])  # noqa: S606
+        os.execvp(argv[3], list(argv[3:]))  # noqa: S606
     sys.stderr.write("usage: netns --hold NAME PEER … | --join PID -- COMMAND …\n")
     return 2
 

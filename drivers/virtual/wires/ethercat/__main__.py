@@ -68,8 +68,8 @@ def build(arguments: argparse.Namespace) -> Segment:
     for slave in slaves:
         slave.al.delay_ns = int(arguments.al_ms * 1e6)
         slave.mailbox.delay_ns = int(arguments.sdo_ms * 1e6)
-        slave.eeprom.read_ns = int(arguments.eeprom_us * 1e3)
-        slave.eeprom.write_ns = 5_000_000
+        slave.controller.eeprom.read_ns = int(arguments.eeprom_us * 1e3)
+        slave.controller.eeprom.write_ns = 5_000_000
     return Segment(slaves, clock, arguments.seed)
 
 

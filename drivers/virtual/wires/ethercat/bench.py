@@ -40,7 +40,7 @@ def load_bench(path: Path, url: str | None = None) -> list[BenchAxis]:
         content = tomllib.loads(path.read_text("utf-8"))
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path}: {error}") from error
-    axes = []
+    axes: list[BenchAxis] = []
     for number, table in enumerate(content.get("axis", []), 1):
         bus = str(table.get("on", ""))
         if bus != url if url is not None else not bus.startswith("ethercat://"):

@@ -100,16 +100,7 @@ class CoeServer:
         if kind in (0, 3) and transfer is not None:
             index, subindex = transfer.index, transfer.subindex
         try:
-            if kind == 1:
-                answer = self._download(command, index, subindex, body[4:])
-            elif kind == 2:
-                answer = self._upload(command, index, subindex)
-            elif kind == 3:
-                answer = self._upload_segment(command)
-            elif kind == 0:
-                answer = self._download_segment(command, body[1:])
-            else:
-                raise SdoAbort(ABORT_COMMAND)
+            answer = self._execute(kind, command, index, subindex, body)
         except SdoAbort as abort:
             self._transfer = None
             # An abort is an SDO *request* with command exactly 80h (ETG.1000.6 table 39).
@@ -118,6 +109,17 @@ class CoeServer:
                 + struct.pack("<BHBI", _ABORT_COMMAND, index, subindex, abort.code)
             ]
         return [_header(_SDO_RESPONSE) + answer]
+
+    def _execute(self, kind: int, command: int, index: int, subindex: int, body: bytes) -> bytes:
+        if kind == 1:
+            return self._download(command, index, subindex, body[4:])
+        if kind == 2:
+            return self._upload(command, index, subindex)
+        if kind == 3:
+            return self._upload_segment(command)
+        if kind == 0:
+            return self._download_segment(command, body[1:])
+        raise SdoAbort(ABORT_COMMAND)
 
     # -- upload ---------------------------------------------------------------------------------
 

@@ -70,18 +70,18 @@ class Control:
         """One command line to its answer."""
         identifier: object = None
         try:
-            request = json.loads(line)
-            if not isinstance(request, dict):
-                raise TypeError("a command is a JSON object")
+            request = dict(json.loads(line))
             identifier = request.pop("id", None)
-            name = request.pop("do", None)
-            command = self._commands.get(str(name))
-            if command is None:
-                known = ", ".join(sorted(self._commands))
-                raise ValueError(f"unknown command {name!r}; there are: {known}")
+            command = self._find(str(request.pop("do", None)))
             return {"id": identifier, "ok": True, "result": command(**request)}
         except (ValueError, TypeError, IndexError, KeyError, SdoAbort) as error:
             return {"id": identifier, "ok": False, "error": str(error)}
+
+    def _find(self, name: str) -> Callable[..., object]:
+        if name not in self._commands:
+            known = ", ".join(sorted(self._commands))
+            raise ValueError(f"unknown command {name!r}; there are: {known}")
+        return self._commands[name]
 
     def _send(self, message: dict[str, Any]) -> None:
         self._answers.write(json.dumps(message).encode() + b"\n")
@@ -105,14 +105,14 @@ class Control:
             "trouble": dict(self._segment.trouble.counted),
             "slaves": [
                 {
-                    "station": s.station,
+                    "station": s.controller.station,
                     "state": s.al.state.name,
                     "error": s.al.error,
                     "al_code": s.al.code,
                     "powered": s.device.powered,
                     "missed": s.report.missed,
-                    "lost_links": list(s.memory[reg.LOST_LINK : reg.LOST_LINK + 4]),
-                    "rx_errors": list(s.memory[reg.RX_ERRORS : reg.RX_ERRORS + 8]),
+                    "lost_links": list(s.controller.memory[reg.LOST_LINK : reg.LOST_LINK + 4]),
+                    "rx_errors": list(s.controller.memory[reg.RX_ERRORS : reg.RX_ERRORS + 8]),
                 }
                 for s in self._segment.slaves
             ],
@@ -170,6 +170,7 @@ class Control:
 
     def _timing(
         self,
+        *,
         slave: int | None = None,
         al_s: float | None = None,
         sdo_s: float | None = None,
@@ -183,16 +184,16 @@ class Control:
             if sdo_s is not None:
                 chosen.mailbox.delay_ns = int(sdo_s * _NS)
             if eeprom_read_s is not None:
-                chosen.eeprom.read_ns = int(eeprom_read_s * _NS)
+                chosen.controller.eeprom.read_ns = int(eeprom_read_s * _NS)
             if eeprom_write_s is not None:
-                chosen.eeprom.write_ns = int(eeprom_write_s * _NS)
+                chosen.controller.eeprom.write_ns = int(eeprom_write_s * _NS)
             if drift_ppm is not None:
                 chosen.dc.drift_ppm = drift_ppm
 
     def _eeprom_busy(self, slave: int, for_s: float | None = None) -> None:
         now = self._segment.settle()
         until = now + (_FOREVER_NS if for_s is None else int(for_s * _NS))
-        self._slave(slave).eeprom.busy_until_ns = until
+        self._slave(slave).controller.eeprom.busy_until_ns = until
 
     def _mute(self, slave: int, on: bool = True) -> None:
         self._slave(slave).mailbox.muted = on

@@ -7,13 +7,11 @@ types 1C00h, PDO assignment 1C12h/1C13h, PDO mapping 16xxh/1Axxh (writable in Pr
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from drivers.virtual.device import (
     ABORT_DEVICE_STATE,
-    ABORT_NO_OBJECT,
     ABORT_NO_SUBINDEX,
     ABORT_NOT_MAPPABLE,
     ABORT_PDO_LENGTH,

@@ -16,7 +16,7 @@ from drivers.virtual.wires.ethercat.syncmanager import SyncManager
 
 HEADER = 6
 _ERROR, _COE, _FOE = 0, 3, 4
-_SYNTAX, _UNSUPPORTED, _INVALID_HEADER, _INVALID_SIZE = 0x01, 0x02, 0x05, 0x08
+_UNSUPPORTED, _INVALID_SIZE = 0x02, 0x08
 
 
 class FileServer(Protocol):
@@ -132,12 +132,7 @@ class Mailbox:
         payload = message[HEADER : HEADER + length]
         kind &= 0x0F
         try:
-            if kind == _COE:
-                answers = self._coe.handle(payload)
-            elif kind == _FOE and self._foe is not None:
-                answers = self._foe.handle(payload)
-            else:
-                raise MailboxError(_UNSUPPORTED)
+            answers = self._dispatch(kind, payload)
         except MailboxError as error:
             self._error(error.detail)
             return
@@ -147,6 +142,13 @@ class Mailbox:
             return
         for answer in answers:
             self._post(kind, answer)
+
+    def _dispatch(self, kind: int, payload: bytes) -> list[bytes]:
+        if kind == _COE:
+            return self._coe.handle(payload)
+        if kind == _FOE and self._foe is not None:
+            return self._foe.handle(payload)
+        raise MailboxError(_UNSUPPORTED)
 
     def _error(self, detail: int) -> None:
         self._post(_ERROR, struct.pack("<HH", 0x0001, detail))

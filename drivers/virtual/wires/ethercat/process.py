@@ -24,6 +24,7 @@ class ProcessData:
         dictionary: CoeDictionary,
         report: SyncReport,
         clock: DistributedClock,
+        *,
         outputs: SyncManager,
         inputs: SyncManager,
     ) -> None:

@@ -1,4 +1,4 @@
-"""Registers and codes of an EtherCAT slave controller (ETG.1000.4 clause 6, ETG.1000.6 clause 5.3)."""
+"""Registers and codes of a slave controller (ETG.1000.4 clause 6, ETG.1000.6 clause 5.3)."""
 
 from __future__ import annotations
 

@@ -33,24 +33,24 @@ _WITH_DEFAULT, _WITH_MINIMUM, _WITH_MAXIMUM = 0x10, 0x20, 0x40
 
 def answer(dictionary: CoeDictionary, body: bytes, capacity: int) -> list[bytes]:
     """Fragments that answer one request; ``capacity`` is bytes of one fragment with its header."""
-    opcode = body[0] & 0x7F
-    data = body[_HEADER:]
-    try:
-        if opcode == _LIST_REQUEST:
-            kind = struct.unpack_from("<H", data)[0]
-            return _fragments(_LIST_ANSWER, _object_list(dictionary, kind), capacity)
-        if opcode == _OBJECT_REQUEST:
-            index = struct.unpack_from("<H", data)[0]
-            return _fragments(_OBJECT_ANSWER, _describe_object(dictionary, index), capacity)
-        if opcode == _ENTRY_REQUEST:
-            index, subindex, wanted = struct.unpack_from("<HBB", data)
-            described = _describe_entry(dictionary, index, subindex, wanted)
-            return _fragments(_ENTRY_ANSWER, described, capacity)
-        raise SdoAbort(ABORT_UNSUPPORTED)
-    except struct.error:
+    if len(body) < _HEADER:
         return [_error(ABORT_UNSUPPORTED)]
+    try:
+        opcode, data = _look_up(dictionary, body[0] & 0x7F, body[_HEADER:].ljust(4, b"\0"))
     except SdoAbort as abort:
         return [_error(abort.code)]
+    return _fragments(opcode, data, capacity)
+
+
+def _look_up(dictionary: CoeDictionary, opcode: int, request: bytes) -> tuple[int, bytes]:
+    word, subindex, wanted = struct.unpack_from("<HBB", request)
+    if opcode == _LIST_REQUEST:
+        return _LIST_ANSWER, _object_list(dictionary, word)
+    if opcode == _OBJECT_REQUEST:
+        return _OBJECT_ANSWER, _describe_object(dictionary, word)
+    if opcode == _ENTRY_REQUEST:
+        return _ENTRY_ANSWER, _describe_entry(dictionary, word, subindex, wanted)
+    raise SdoAbort(ABORT_UNSUPPORTED)
 
 
 def _error(code: int) -> bytes:

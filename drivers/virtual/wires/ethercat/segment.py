@@ -11,7 +11,6 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivers.virtual.wires.ethercat import registers as reg
 from drivers.virtual.wires.ethercat.clock import WireClock
 from drivers.virtual.wires.ethercat.line import Line
 from drivers.virtual.wires.ethercat.registers import Command
@@ -123,43 +122,42 @@ class Segment:
             return
         if not Command.APRD <= command <= Command.FRMW:
             return
-        position, offset = struct.unpack_from("<HH", buffer, part.at + 2)
+        position = struct.unpack_from("<H", buffer, part.at + 2)[0]
         auto = command <= Command.APRW or command == Command.ARMW
         broadcast = Command.BRD <= command <= Command.BRW
         for slave in reach:
             if broadcast:
-                self._physical(slave, part, buffer, offset, command, now)
+                self._physical(slave, part, buffer, command, now)
                 position = (position + 1) & 0xFFFF
                 continue
             if auto:
                 mine = position == 0
                 position = (position + 1) & 0xFFFF
             else:
-                mine = slave.answers_to(position)
+                mine = slave.controller.answers_to(position)
             if command in (Command.ARMW, Command.FRMW):
                 action = Command.FPRD if mine else Command.FPWR
-                self._physical(slave, part, buffer, offset, action, now)
+                self._physical(slave, part, buffer, action, now)
             elif mine:
-                self._physical(slave, part, buffer, offset, command, now)
+                self._physical(slave, part, buffer, command, now)
         if auto or broadcast:
             struct.pack_into("<H", buffer, part.at + 2, position)
 
     @staticmethod
-    def _physical(
-        slave: Slave, part: _Datagram, buffer: bytearray, offset: int, command: int, now: int
-    ) -> None:
+    def _physical(slave: Slave, part: _Datagram, buffer: bytearray, command: int, now: int) -> None:
         """One slave, one datagram: kinds repeat every three commands (read, write, both)."""
+        offset = buffer[part.at + 4] | buffer[part.at + 5] << 8
         kind = (command - 1) % 3
         incoming = bytes(buffer[part.data])
         counted = 0
         if kind != 1:
-            data = slave.read(offset, part.length, now)
+            data = slave.controller.read(offset, part.length, now)
             if data is not None:
                 if Command.BRD <= command <= Command.BRW:
                     data = bytes(a | b for a, b in zip(incoming, data, strict=True))
                 buffer[part.data] = data
                 counted += 1
-        if kind != 0 and slave.write(offset, incoming, now):
+        if kind != 0 and slave.controller.write(offset, incoming, now):
             counted += 2 if kind == 2 else 1
         if counted:
             _count(buffer, part, counted)
@@ -172,7 +170,7 @@ class Segment:
         data = bytearray(buffer[part.data])
         counted = 0
         for slave in reach:
-            read, wrote = slave.logical(address, data, reading, writing, now)
+            read, wrote = slave.controller.logical(address, data, reading, writing, now)
             counted += read
             if wrote:
                 counted += 2 if reading else 1
@@ -188,7 +186,7 @@ def _count(buffer: bytearray, part: _Datagram, by: int) -> None:
 
 def register(slave: Slave, address: int, length: int) -> int:
     """A register's present value, for tests and the control channel."""
-    return int.from_bytes(slave.memory[address : address + length], "little")
+    return int.from_bytes(slave.controller.memory[address : address + length], "little")
 
 
-__all__ = ["ETHERTYPE", "Segment", "datagrams", "reg", "register"]
+__all__ = ["ETHERTYPE", "Segment", "datagrams", "register"]

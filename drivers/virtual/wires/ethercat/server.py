@@ -23,6 +23,8 @@ _PACKET_IGNORE_OUTGOING = 23
 _SOL_PACKET = 263
 _LONGEST = 1600
 _STALE_NS = 1_000_000_000
+_IDLE_S = 0.05
+"""Without frames, time is made up for this often, so that no backlog of physics builds up."""
 
 
 class InterfaceLock:
@@ -100,22 +102,25 @@ class SegmentServer:
             selector.register(self._commands, selectors.EVENT_READ)
             self._control.ready()
             while not self._control.stopped:
-                for key, _ in selector.select(self._wait_s()):
-                    if key is wire or key.fd == wire.fd:
+                events = selector.select(self._wait_s())
+                for key, _ in events:
+                    if key.fd == wire.fd:
                         self._drain()
                     elif not self._command():
                         return
                 self._send_late()
+                if not events:
+                    self._segment.settle()
 
     def close(self) -> None:
         """Free socket and interface."""
         self._socket.close()
         self._lock.release()
 
-    def _wait_s(self) -> float | None:
+    def _wait_s(self) -> float:
         if not self._late:
-            return None
-        return max(0.0, (self._late[0][0] - time.monotonic_ns()) / 1e9)
+            return _IDLE_S
+        return max(0.0, min(_IDLE_S, (self._late[0][0] - time.monotonic_ns()) / 1e9))
 
     def _command(self) -> bool:
         data = os.read(self._commands, 65536)
