@@ -44,3 +44,28 @@ def worst_case_bits(data_bytes: int) -> int:
 def wire_time_s(data_bytes: int, bitrate: int) -> float:
     """Longest time a frame occupies a bus of ``bitrate`` bit/s, in seconds."""
     return worst_case_bits(data_bytes) / bitrate
+
+
+def exact_bits(frame: Frame) -> int:
+    """Bits that this very frame occupies, with the stuff bits its contents need.
+
+    Source: ISO 11898-1 clauses 10.4.2 (frame format), 10.5 (stuffing) and 10.4.2.6 (CRC).
+    """
+    length = len(frame.data)
+    header = frame.cob_id << 7 | frame.remote << 6 | length
+    word = header << 8 * length | int.from_bytes(frame.data, "big")
+    count = 19 + 8 * length
+    crc = 0
+    for position in range(count - 1, -1, -1):
+        bit = word >> position & 1
+        crc = (crc << 1 & 0x7FFF) ^ (0x4599 if bit ^ crc >> 14 else 0)
+    word, count = word << 15 | crc, count + 15
+    stuff, run, last = 0, 0, -1
+    for position in range(count - 1, -1, -1):
+        bit = word >> position & 1
+        run = run + 1 if bit == last else 1
+        last = bit
+        if run == 5:
+            stuff += 1
+            run, last = 1, 1 - bit
+    return count + stuff + 13

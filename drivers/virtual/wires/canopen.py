@@ -1,0 +1,302 @@
+"""A virtual CANopen node: CiA 301 around a `Device`, without any I/O.
+
+`CanopenNode` takes frames and yields frames with the time at which they are due; a wire
+(`drivers.virtual.wires.can_wire`) moves them. Trouble is switched on by attributes and methods:
+``mute``, ``delay_answers``, ``reboot``, ``guard_repeats`` …; two nodes of one number are simply
+two nodes on one wire.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+
+from drivers.canopen import frames
+from drivers.canopen.frames import Frame
+from drivers.virtual.device import ABORT_NO_OBJECT, ABORT_NO_SUBINDEX, Device, SdoAbort
+from drivers.virtual.wires.canopen_objects import CommunicationObjects, Pdo
+from drivers.virtual.wires.sdo_server import SdoServer
+
+_STOPPED, _OPERATIONAL, _PREOPERATIONAL = 4, 5, 127
+_HEARTBEAT_LOST = 0x8130
+_PDO_TOO_SHORT = 0x8210
+_SERVO_DEVICE_TYPE = 0x00020192
+_HISTORY = 8
+
+
+class CanopenNode:
+    """One node. ``clock`` gives nanoseconds; one thread at a time may call it."""
+
+    def __init__(
+        self,
+        device: Device,
+        node_id: int,
+        clock: Callable[[], int],
+        *,
+        offers_block: bool = True,
+    ) -> None:
+        self.device = device
+        self.node_id = node_id
+        self.state = _PREOPERATIONAL
+        self.mute = False
+        """Takes everything in and says nothing."""
+        self.guard_repeats = False
+        """Answers guarding with the same toggle bit each time."""
+        self._clock = clock
+        self._objects = CommunicationObjects(device, node_id)
+        self._server = SdoServer(self._read, self._write, offers_block=offers_block)
+        self._outbox: list[tuple[int, Frame]] = []
+        self._answers_due_ns = 0
+        self._delays: list[int] = []
+        self._guard_toggle = 0
+        self._error_register = 0
+        self._history: list[int] = []
+        self._heartbeat_due_ns = 0
+        self._master_seen_ns: int | None = None
+        self._syncs = 0
+        self._pending: dict[int, bytes] = {}
+        self._sent: dict[int, tuple[int, bytes]] = {}
+        self._was_powered = False
+        self._error_told = False
+
+    def delay_answers(self, seconds: float, count: int = 1) -> None:
+        """The next ``count`` SDO answers come that late, in order as from a slow drive."""
+        self._delays += [round(seconds * 1e9)] * count
+
+    def reboot(self) -> None:
+        """Restart as after a power cut: the drive too."""
+        self.device.power_cycle()
+        self._boot(self._clock())
+
+    def take(self, frame: Frame) -> None:
+        """A frame from the bus."""
+        now = self._clock()
+        self._follow_power(now)
+        if not self.device.powered:
+            return
+        self.device.advance(now)
+        if frame.cob_id == frames.NMT and len(frame.data) == 2:
+            if frame.data[1] in (0, self.node_id):
+                self._command(frame.data[0], now)
+        elif frame.cob_id == self._objects.sync_cob & 0x7FF and not frame.remote:
+            self._sync(now)
+        elif frame.cob_id == frames.SDO_REQUEST + self.node_id and self.state != _STOPPED:
+            self._answer(frame.data, now)
+        elif frame.cob_id == frames.HEARTBEAT + self.node_id and frame.remote:
+            self._guard(now)
+        elif frame.cob_id >> 7 == 0x0E and not frame.remote:
+            if frame.cob_id & 0x7F == self._objects.consumer >> 16 & 0x7F:
+                self._master_seen_ns = now
+        else:
+            self._take_pdo(frame, now)
+
+    def due(self) -> list[Frame]:
+        """Frames whose time has come; also runs everything that depends on time alone."""
+        now = self._clock()
+        self._follow_power(now)
+        if not self.device.powered:
+            self._outbox.clear()
+            return []
+        self.device.advance(now)
+        self._beat(now)
+        self._watch_master(now)
+        self._report_emergencies(now)
+        if self.state == _OPERATIONAL:
+            self._send_events(now)
+        ready = [frame for at, frame in self._outbox if at <= now]
+        self._outbox = [(at, frame) for at, frame in self._outbox if at > now]
+        return [] if self.mute else ready
+
+    def next_due_s(self, longest_s: float) -> float:
+        """Seconds until `due` has something that is already known, at most ``longest_s``."""
+        if not self._outbox:
+            return longest_s
+        earliest = min(at for at, _ in self._outbox)
+        return min(max((earliest - self._clock()) / 1e9, 0.0), longest_s)
+
+    # Power, NMT and error control
+
+    def _follow_power(self, now: int) -> None:
+        if not self.device.powered:
+            self.device.advance(now)
+        if self.device.powered and not self._was_powered:
+            self._boot(now)
+        self._was_powered = self.device.powered
+
+    def _boot(self, now: int) -> None:
+        self._was_powered = self.device.powered
+        self._reset_communication(now)
+
+    def _reset_communication(self, now: int) -> None:
+        self._objects.reset()
+        self._outbox.clear()
+        self._answers_due_ns = 0
+        self._guard_toggle = 0
+        self._master_seen_ns = None
+        self._syncs = 0
+        self._pending.clear()
+        self._sent.clear()
+        self.state = _PREOPERATIONAL
+        self._say(frames.HEARTBEAT + self.node_id, b"\0", now)
+
+    def _command(self, command: int, now: int) -> None:
+        if command == frames.NMT_RESET_NODE:
+            self.reboot()
+        elif command == frames.NMT_RESET_COMMUNICATION:
+            self._reset_communication(now)
+        elif command == frames.NMT_START:
+            self._objects.bind()
+            self.state = _OPERATIONAL
+        elif command == frames.NMT_STOP:
+            self.state = _STOPPED
+            self.device.communication_lost("NMT stopped")
+        elif command == frames.NMT_PREOPERATIONAL:
+            self.state = _PREOPERATIONAL
+
+    def _guard(self, now: int) -> None:
+        self._say(
+            frames.HEARTBEAT + self.node_id, bytes([self.state | self._guard_toggle << 7]), now
+        )
+        if not self.guard_repeats:
+            self._guard_toggle ^= 1
+
+    def _beat(self, now: int) -> None:
+        period = self._objects.heartbeat_ms * 1_000_000
+        if period and now >= self._heartbeat_due_ns:
+            self._heartbeat_due_ns = max(self._heartbeat_due_ns + period, now)
+            self._say(frames.HEARTBEAT + self.node_id, bytes([self.state]), now)
+
+    def _watch_master(self, now: int) -> None:
+        limit = (self._objects.consumer & 0xFFFF) * 1_000_000
+        if limit and self._master_seen_ns is not None and now - self._master_seen_ns > limit:
+            self._master_seen_ns = None
+            self._emergency(_HEARTBEAT_LOST, 0x10, bytes(5), now)
+            self.device.communication_lost("heartbeat of the master")
+
+    # SDO
+
+    def _answer(self, request: bytes, now: int) -> None:
+        answers = self._server.request(request)
+        if not answers:
+            return
+        delay = self._delays.pop(0) if self._delays else 0
+        # A drive answers in order: nothing overtakes a late answer.
+        self._answers_due_ns = max(self._answers_due_ns, now + delay)
+        for data in answers:
+            self._say(frames.SDO_ANSWER + self.node_id, data, self._answers_due_ns)
+
+    def _read(self, index: int, subindex: int) -> bytes:
+        if self._objects.owns(index):
+            return self._objects.read(index, subindex)
+        try:
+            return self.device.read(index, subindex)
+        except SdoAbort as refusal:
+            if refusal.code not in (ABORT_NO_OBJECT, ABORT_NO_SUBINDEX):
+                raise
+            return self._standard(index, subindex, refusal)
+
+    def _standard(self, index: int, subindex: int, refusal: SdoAbort) -> bytes:
+        """What every node has, for drives whose dictionary leaves it out."""
+        identity = self.device.profile.identity
+        if (index, subindex) == (0x1000, 0):
+            return struct.pack("<I", _SERVO_DEVICE_TYPE)
+        if (index, subindex) == (0x1001, 0):
+            return bytes([self._error_register])
+        if index == 0x1003 and subindex <= len(self._history):
+            if subindex == 0:
+                return bytes([len(self._history)])
+            return struct.pack("<I", self._history[subindex - 1])
+        if index == 0x1018 and identity.vendor_id is not None:
+            known = [identity.vendor_id, identity.product_code, identity.revision]
+            values = [v for v in known if v is not None]
+            if subindex == 0:
+                return bytes([len(values)])
+            if subindex <= len(values):
+                return struct.pack("<I", values[subindex - 1])
+        raise refusal
+
+    def _write(self, index: int, subindex: int, data: bytes) -> None:
+        if self._objects.owns(index):
+            self._objects.write(index, subindex, data)
+        elif (index, subindex) == (0x1003, 0) and data == b"\0":
+            self._history.clear()
+        else:
+            self.device.write(index, subindex, data)
+
+    # Emergencies
+
+    def _report_emergencies(self, now: int) -> None:
+        for code, register, extra in self.device.take_emergencies():
+            self._emergency(code, register, extra, now)
+
+    def _emergency(self, code: int, register: int, extra: bytes, now: int) -> None:
+        self._error_register = register
+        if code:
+            self._history = [code, *self._history][:_HISTORY]
+        if self.state != _STOPPED:
+            data = struct.pack("<HB", code, register) + extra[:5].ljust(5, b"\0")
+            self._say(frames.EMERGENCY + self.node_id, data, now)
+
+    # Process data
+
+    def _take_pdo(self, frame: Frame, now: int) -> None:
+        if self.state != _OPERATIONAL:
+            return
+        for pdo in self._objects.pdos:
+            if not pdo.valid or pdo.image is None or pdo.identifier != frame.cob_id:
+                continue
+            if pdo.direction == "tx" and frame.remote:
+                self._say(pdo.identifier, pdo.image.pack(), now)
+            elif pdo.direction == "rx" and not frame.remote:
+                if len(frame.data) < pdo.image.size:
+                    self._emergency(_PDO_TOO_SHORT, 0x10, bytes(5), now)
+                elif pdo.kind <= 240:
+                    self._pending[pdo.number] = frame.data
+                else:
+                    pdo.image.unpack(frame.data[: pdo.image.size])
+
+    def _sync(self, now: int) -> None:
+        if self.state != _OPERATIONAL:
+            return
+        self._syncs += 1
+        # Inputs are what was true at this SYNC, before the outputs of the last cycle act.
+        for pdo in self._of("tx"):
+            if pdo.kind == 0:
+                self._send_if_changed(pdo, now)
+            elif pdo.kind <= 240 and self._syncs % pdo.kind == 0 and pdo.image is not None:
+                self._say(pdo.identifier, pdo.image.pack(), now)
+        for pdo in self._of("rx"):
+            data = self._pending.pop(pdo.number, None)
+            if data is not None and pdo.image is not None:
+                pdo.image.unpack(data[: pdo.image.size])
+
+    def _of(self, direction: str) -> list[Pdo]:
+        return [
+            p
+            for p in self._objects.pdos
+            if p.direction == direction and p.valid and p.image is not None
+        ]
+
+    def _send_events(self, now: int) -> None:
+        for pdo in self._of("tx"):
+            if pdo.kind < 254:
+                continue
+            last = self._sent.get(pdo.number)
+            if last is not None and now - last[0] < pdo.inhibit_100us * 100_000:
+                continue
+            timed = (
+                pdo.event_ms > 0 and last is not None and now - last[0] >= pdo.event_ms * 1_000_000
+            )
+            self._send_if_changed(pdo, now, anyway=timed)
+
+    def _send_if_changed(self, pdo: Pdo, now: int, *, anyway: bool = False) -> None:
+        if pdo.image is None:
+            return
+        data = pdo.image.pack()
+        last = self._sent.get(pdo.number)
+        if anyway or last is None or last[1] != data:
+            self._sent[pdo.number] = (now, data)
+            self._say(pdo.identifier, data, now)
+
+    def _say(self, cob_id: int, data: bytes, at: int) -> None:
+        self._outbox.append((at, Frame(cob_id, data)))

@@ -1,0 +1,208 @@
+"""Communication objects of a virtual CANopen node (1005h … 1A03h), and its PDOs.
+
+Source: CiA 301 v4.2.0 clause 7.5.2.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import Literal
+
+from drivers.canopen.frames import RPDO, TPDO
+from drivers.virtual.device import (
+    ABORT_DEVICE_STATE,
+    ABORT_LENGTH,
+    ABORT_NO_SUBINDEX,
+    ABORT_PDO_LENGTH,
+    ABORT_READ_ONLY,
+    ABORT_VALUE_RANGE,
+    Device,
+    ProcessImage,
+    SdoAbort,
+)
+
+INVALID = 0x80000000
+_IDENTIFIER = 0x7FF
+_ENTRIES = 8
+
+
+@dataclass(slots=True)
+class Pdo:
+    """One PDO of the node as its objects describe it."""
+
+    direction: Literal["rx", "tx"]
+    number: int
+    cob_id: int
+    kind: int
+    entries: list[int]
+    count: int
+    inhibit_100us: int = 0
+    event_ms: int = 0
+    image: ProcessImage | None = None
+
+    @property
+    def valid(self) -> bool:
+        """Exchanged at all."""
+        return not self.cob_id & INVALID
+
+    @property
+    def identifier(self) -> int:
+        """The CAN identifier."""
+        return self.cob_id & _IDENTIFIER
+
+
+class CommunicationObjects:
+    """Read and write access to what belongs to the node and not to the drive behind it."""
+
+    def __init__(self, device: Device, node_id: int) -> None:
+        self._device = device
+        self._node_id = node_id
+        self.heartbeat_ms = 0
+        self.consumer = 0
+        self.sync_cob = 0x80
+        self.pdos: list[Pdo] = []
+        self.reset()
+
+    def reset(self) -> None:
+        """Power-on values."""
+        self.heartbeat_ms = 0
+        self.consumer = 0
+        self.pdos = [self._default("rx", n) for n in range(4)]
+        self.pdos += [self._default("tx", n) for n in range(4)]
+
+    def _default(self, direction: Literal["rx", "tx"], number: int) -> Pdo:
+        base = (RPDO if direction == "rx" else TPDO)[number] + self._node_id
+        index = (0x1600 if direction == "rx" else 0x1A00) + number
+        spec = self._device.profile.pdo
+        entries = [
+            self._entry(key)
+            for pdo_set in (spec.sets if spec else ())
+            if pdo_set.index == index and pdo_set.direction == direction
+            for key in pdo_set.entries
+        ]
+        cob_id = base if entries else base | INVALID
+        padded = (entries + [0] * _ENTRIES)[:_ENTRIES]
+        return Pdo(direction, number, cob_id, 255, padded, len(entries))
+
+    def _entry(self, key: str) -> int:
+        index, subindex = int(key[:4], 16), int(key[5:], 16)
+        bits = self._device.entry(index, subindex).bit_length
+        return index << 16 | subindex << 8 | bits
+
+    def owns(self, index: int) -> bool:
+        """Whether ``index`` is served here rather than by the drive."""
+        return index in (0x1005, 0x1014, 0x1016, 0x1017, 0x1200) or (
+            index & 0xFFFC in (0x1400, 0x1600, 0x1800, 0x1A00)
+        )
+
+    def read(self, index: int, subindex: int) -> bytes:
+        """Value of an object. Raises SdoAbort."""
+        plain = {
+            (0x1005, 0): struct.pack("<I", self.sync_cob),
+            (0x1014, 0): struct.pack("<I", 0x80 + self._node_id),
+            (0x1016, 0): b"\x01",
+            (0x1016, 1): struct.pack("<I", self.consumer),
+            (0x1017, 0): struct.pack("<H", self.heartbeat_ms),
+            (0x1200, 0): b"\x02",
+            (0x1200, 1): struct.pack("<I", 0x600 + self._node_id),
+            (0x1200, 2): struct.pack("<I", 0x580 + self._node_id),
+        }
+        if (index, subindex) in plain:
+            return plain[index, subindex]
+        if index < 0x1400:
+            raise SdoAbort(ABORT_NO_SUBINDEX)
+        pdo = self._pdo(index)
+        return self._read_mapping(pdo, subindex) if index & 0x200 else _read_pdo(pdo, subindex)
+
+    def _read_mapping(self, pdo: Pdo, subindex: int) -> bytes:
+        if subindex == 0:
+            return bytes([pdo.count])
+        if subindex > _ENTRIES:
+            raise SdoAbort(ABORT_NO_SUBINDEX)
+        return struct.pack("<I", pdo.entries[subindex - 1])
+
+    def write(self, index: int, subindex: int, data: bytes) -> None:
+        """Write an object. Raises SdoAbort with nothing changed."""
+        if (index, subindex) == (0x1017, 0):
+            self.heartbeat_ms = _number(data, 2)
+        elif (index, subindex) == (0x1016, 1):
+            self.consumer = _number(data, 4)
+        elif (index, subindex) == (0x1005, 0):
+            self.sync_cob = _number(data, 4)
+        elif index < 0x1400:
+            self.read(index, subindex)
+            raise SdoAbort(ABORT_READ_ONLY)
+        elif index & 0x200:
+            self._write_mapping(self._pdo(index), subindex, data)
+        else:
+            self._write_pdo(self._pdo(index), subindex, data)
+
+    def _pdo(self, index: int) -> Pdo:
+        return self.pdos[(index & 3) + (4 if index & 0x0800 else 0)]
+
+    def _write_pdo(self, pdo: Pdo, subindex: int, data: bytes) -> None:
+        if subindex == 1:
+            cob_id = _number(data, 4)
+            if pdo.valid and not cob_id & INVALID and cob_id & _IDENTIFIER != pdo.identifier:
+                raise SdoAbort(ABORT_VALUE_RANGE)
+            pdo.cob_id = cob_id
+        elif subindex == 2:
+            kind = _number(data, 1)
+            if 241 <= kind <= 251 or (pdo.direction == "rx" and kind in (252, 253)):
+                raise SdoAbort(ABORT_VALUE_RANGE)
+            pdo.kind = kind
+        elif subindex == 3 and pdo.direction == "tx":
+            pdo.inhibit_100us = _number(data, 2)
+        elif subindex == 5:
+            pdo.event_ms = _number(data, 2)
+        else:
+            _read_pdo(pdo, subindex)
+            raise SdoAbort(ABORT_READ_ONLY)
+
+    def _write_mapping(self, pdo: Pdo, subindex: int, data: bytes) -> None:
+        if subindex > _ENTRIES:
+            raise SdoAbort(ABORT_NO_SUBINDEX)
+        if pdo.valid:
+            raise SdoAbort(ABORT_DEVICE_STATE)
+        if subindex == 0:
+            count = _number(data, 1)
+            if count > _ENTRIES:
+                raise SdoAbort(ABORT_PDO_LENGTH)
+            entries = pdo.entries[:count]
+            image = self._device.map_process_data(entries, pdo.direction) if count else None
+            if image is not None and image.size > 8:
+                raise SdoAbort(ABORT_PDO_LENGTH)
+            pdo.count, pdo.image = count, image
+            return
+        if pdo.count:
+            raise SdoAbort(ABORT_DEVICE_STATE)
+        entry = _number(data, 4)
+        if entry:
+            self._device.map_process_data([entry], pdo.direction)
+        pdo.entries[subindex - 1] = entry
+
+    def bind(self) -> None:
+        """Bind every valid PDO to the drive's values (on entering Operational)."""
+        for pdo in self.pdos:
+            if pdo.count and pdo.image is None:
+                pdo.image = self._device.map_process_data(pdo.entries[: pdo.count], pdo.direction)
+
+
+def _read_pdo(pdo: Pdo, subindex: int) -> bytes:
+    values = {
+        0: b"\x05",
+        1: struct.pack("<I", pdo.cob_id),
+        2: bytes([pdo.kind]),
+        3: struct.pack("<H", pdo.inhibit_100us),
+        5: struct.pack("<H", pdo.event_ms),
+    }
+    if subindex not in values:
+        raise SdoAbort(ABORT_NO_SUBINDEX)
+    return values[subindex]
+
+
+def _number(data: bytes, size: int) -> int:
+    if len(data) != size:
+        raise SdoAbort(ABORT_LENGTH)
+    return int.from_bytes(data, "little")

@@ -1,0 +1,215 @@
+"""URLs, node watching, PDO planning and setpoints: the pure parts."""
+
+from __future__ import annotations
+
+import errno
+
+import can
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.canopen.adapter import open_bus, translate
+from drivers.canopen.frames import Frame, exact_bits, worst_case_bits
+from drivers.canopen.link import _fit
+from drivers.canopen.nodes import NodeWatch, emergency_text
+from drivers.canopen.pdo import plan, set_up
+from drivers.canopen.scanning import readable
+from drivers.canopen.setpoints import Player
+from drivers.canopen.url import INTERFACES, parse_canopen_url
+from drivers.errors import LinkLost, OutOfRange
+from drivers.link import Address, CyclicSignal, Envelope, Trajectory
+
+
+def test_urls_of_the_documentation() -> None:
+    url = parse_canopen_url("canopen://socketcan/can0?bitrate=500000")
+    assert (url.interface, url.channel, url.bitrate) == ("socketcan", "can0", 500_000)
+    assert parse_canopen_url("canopen://slcan//dev/ttyACM0").channel == "/dev/ttyACM0"
+    assert parse_canopen_url("canopen://pcan/").channel == "PCAN_USBBUS1"
+    assert parse_canopen_url("canopen://slcan/COM8?timeout=0.2&guard=1").timeout_s == 0.2
+    assert parse_canopen_url("canopen://udp_multicast").channel == "239.74.163.2"
+
+
+@pytest.mark.parametrize(
+    ("url", "says"),
+    [
+        ("canopen://can0", "socketcan, slcan"),
+        ("canopen://slcan", "names no channel"),
+        ("canopen://socketcan/can0?bitrate=123", "not a CANopen bit rate"),
+        ("canopen://socketcan/can0?bitrate=fast", "must be a number"),
+        ("canopen://socketcan/can0?bitrate=nan", "must be a number"),
+        ("canopen://socketcan/can0?speed=1", "unknown option speed"),
+        ("modbus:///dev/ttyS0", "not a canopen://"),
+    ],
+)
+def test_wrong_urls_say_what_is_wrong(url: str, says: str) -> None:
+    with pytest.raises(OutOfRange) as refused:
+        parse_canopen_url(url)
+    assert says in f"{refused.value} {refused.value.limit}"
+
+
+@pytest.mark.parametrize("interface", sorted(set(INTERFACES) - {"virtual", "udp_multicast"}))
+def test_an_adapter_that_is_not_there_is_a_lost_link(interface: str) -> None:
+    with pytest.raises(LinkLost) as lost:
+        open_bus(parse_canopen_url(f"canopen://{interface}/no-such-channel-7"))
+    assert lost.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("code", "says"),
+    [
+        (errno.EACCES, "no permission"),
+        (errno.EBUSY, "in use"),
+        (errno.ENODEV, "no such adapter"),
+        (errno.ENETDOWN, "interface is down"),
+        (errno.ENOBUFS, "nobody acknowledges"),
+    ],
+)
+def test_the_adapters_errors_are_translated(code: int, says: str) -> None:
+    url = parse_canopen_url("canopen://socketcan/can0")
+    wrapped = can.CanOperationError("wrapped")
+    wrapped.__cause__ = OSError(code, "text")
+    error = translate(url, wrapped)
+    assert says in error.message
+    assert error.remedy
+
+
+def test_a_silent_node_is_told_once_and_its_return_too() -> None:
+    watch = NodeWatch()
+    beat = Frame(0x705, b"\x05")
+    for tick in range(5):
+        assert watch.observe(beat, tick * 0.1) == []
+        assert watch.overdue(tick * 0.1) == []
+    # 0.1 s period: late after 2.5 periods and 0.1 s.
+    assert watch.overdue(0.4 + 0.34) == []
+    assert [e.kind for e in watch.overdue(0.4 + 0.36)] == ["lost"]
+    assert watch.overdue(2.0) == []
+    assert [e.kind for e in watch.observe(beat, 3.0)] == ["back"]
+
+
+def test_state_changes_and_restarts_are_told() -> None:
+    watch = NodeWatch()
+    watch.record(5).in_use = True
+    watch.observe(Frame(0x705, b"\x05"), 0.0)
+    stopped = watch.observe(Frame(0x705, b"\x04"), 0.1)
+    assert [e.text for e in stopped] == ["node 5 is stopped"]
+    boot = watch.observe(Frame(0x705, b"\x00"), 0.2)
+    assert [e.kind for e in boot] == ["boot"]
+    assert "restarted" in boot[0].text
+
+
+def test_guarding_notices_a_toggle_bit_that_stands_still() -> None:
+    watch = NodeWatch()
+    watch.record(5).in_use = True
+    assert watch.guard_due(0.1, 0.0) == ([5], [])
+    assert watch.observe(Frame(0x705, b"\x7f"), 0.01) == []
+    watch.guard_due(0.1, 0.2)
+    assert watch.observe(Frame(0x705, b"\xff"), 0.21) == []
+    watch.guard_due(0.1, 0.4)
+    events = watch.observe(Frame(0x705, b"\xff"), 0.41)
+    assert "two nodes have this number" in events[0].text
+
+
+@pytest.mark.parametrize(
+    ("code", "text"),
+    [
+        (0x0000, "error reset or no error"),
+        (0x8150, "two nodes send with the same identifier"),
+        (0x3210, "voltage inside the drive"),
+        (0x7305, "additional modules"),
+        (0xFF12, "specific to the maker"),
+    ],
+)
+def test_emergency_codes(code: int, text: str) -> None:
+    assert emergency_text(code) == text
+
+
+@given(st.binary(max_size=9), st.integers(0, 0x7FF), st.booleans())
+def test_the_watch_survives_any_frame(data: bytes, cob_id: int, remote: bool) -> None:
+    watch = NodeWatch()
+    watch.observe(Frame(cob_id, data, remote), 1.0)
+
+
+@given(st.binary(max_size=8), st.integers(0, 0x7FF))
+def test_no_frame_is_longer_than_the_worst_case(data: bytes, cob_id: int) -> None:
+    bits = exact_bits(Frame(cob_id, data))
+    assert 47 + 8 * len(data) <= bits <= worst_case_bits(len(data))
+
+
+def _signal(index: int, kind: str = "INT32", station: int = 3) -> CyclicSignal:
+    return CyclicSignal(station, Address(index, 0, kind), f"{index:04X}")  # type: ignore[arg-type]
+
+
+def test_signals_are_packed_into_pdos_of_eight_bytes() -> None:
+    inputs = [_signal(0x6064), _signal(0x606C), _signal(0x6041, "UINT16"), _signal(0x6077, "INT16")]
+    pdos, left = plan(inputs, [_signal(0x607A)])
+    assert left == ()
+    assert [(p.direction, p.cob_id, p.size) for p in pdos] == [
+        ("tx", 0x183, 8), ("tx", 0x283, 4), ("rx", 0x203, 4),
+    ]  # fmt: skip
+    assert (pdos[1].communication, pdos[1].mapping) == (0x1801, 0x1A01)
+
+
+def test_the_ninth_long_signal_of_a_node_finds_no_room() -> None:
+    inputs = [_signal(0x2000 + n) for n in range(9)]
+    pdos, left = plan(inputs, [])
+    assert len(pdos) == 4
+    assert left == (inputs[8],)
+
+
+def test_a_pdo_is_invalid_while_it_is_mapped() -> None:
+    pdos, _ = plan([_signal(0x6064)], [])
+    writes = [(w.index, w.subindex, w.data.hex()) for w in set_up(pdos[0])]
+    assert writes == [
+        (0x1800, 1, "83010080"),
+        (0x1800, 2, "01"),
+        (0x1A00, 0, "00"),
+        (0x1A00, 1, "20006460"),
+        (0x1A00, 0, "01"),
+        (0x1800, 1, "83010000"),
+    ]
+
+
+def _player(index: int, values: list[int], renew_s: float = 0.01) -> Player:
+    target = Address(index, 0, "INT32")
+    return Player(Trajectory(1, target, np.array(values), Envelope(), renew_s=renew_s), 0.001)
+
+
+def test_a_position_stops_without_a_jump() -> None:
+    player = _player(0x607A, [0, 1, 3, 6, 10, 15, 20, 25, 30, 35])
+    played = [player.step()[0] for _ in range(10)]
+    assert played == [0, 1, 3, 6, 10, 15, 20, 25, 30, 35]
+    player.brake(disable_at_end=True)
+    rest = []
+    while not player.finished:
+        rest.append(player.step()[0])
+    # Five per cycle, one less in each: 4 + 3 + 2 + 1.
+    assert rest == [39, 42, 44, 45, 45]
+
+
+def test_a_speed_is_held_for_its_life_and_then_ramps_to_zero() -> None:
+    player = _player(0x60FF, [0, 100, 200], renew_s=0.004)
+    assert [player.step()[0] for _ in range(7)] == [0, 100, 200, 200, 200, 200, 200]
+    assert [player.step()[0] for _ in range(2)] == [100, 0]
+    assert player.finished
+    assert player.disable_at_end
+
+
+def test_renewal_extends_the_life() -> None:
+    player = _player(0x60FF, [100], renew_s=0.003)
+    for _ in range(20):
+        player.renew()
+        assert player.step()[0] == 100
+
+
+def test_padding_is_cut_and_other_bytes_are_kept() -> None:
+    assert _fit(b"\x05\0\0\0", 2) == b"\x05\0"
+    assert _fit(b"\xfe\xff\xff\xff", 2) == b"\xfe\xff"
+    assert _fit(b"\x05\0\x01\0", 2) == b"\x05\0\x01\0"
+    assert _fit(b"\x05", 2) == b"\x05"
+
+
+def test_version_numbers_and_texts() -> None:
+    assert readable(b"V1.2\0\0") == "V1.2"
+    assert readable(b"\x65\x00") == "101"
