@@ -20,7 +20,7 @@ BITRATES = (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000,
 """Bit rates of CiA 301 clause 6.2, and 100 kbit/s, which it no longer recommends."""
 
 _DEFAULT_CHANNEL = {"pcan": "PCAN_USBBUS1", "kvaser": "0", "udp_multicast": "239.74.163.2"}
-_OPTIONS = ("bitrate", "timeout", "own_id", "guard", "settle", "port", "tty_baudrate")
+_OPTIONS = ("bitrate", "timeout_ms", "own_id", "guard_ms", "settle_ms", "port", "tty_baudrate")
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,10 +87,10 @@ def parse_canopen_url(url: str) -> CanUrl:
         interface=interface,
         channel=channel,
         bitrate=int(bitrate),
-        timeout_s=_number(options, "timeout", 0.5, 0.005, 60),
+        timeout_s=_number(options, "timeout_ms", 500, 5, 60_000) / 1e3,
         own_id=int(_number(options, "own_id", 127, 1, 127)),
-        guard_s=_number(options, "guard", 0, 0, 60),
-        settle_s=_number(options, "settle", 0, 0, 10),
+        guard_s=_number(options, "guard_ms", 0, 0, 60_000) / 1e3,
+        settle_s=_number(options, "settle_ms", 0, 0, 10_000) / 1e3,
         port=int(_number(options, "port", 0, 0, 65535)) or None,
         tty_baudrate=int(_number(options, "tty_baudrate", 0, 0, 20_000_000)) or None,
     )

@@ -189,7 +189,7 @@ async def test_a_lost_heartbeat_and_its_return_are_told(bench: Bench, link: Cano
 
 
 async def test_node_guarding_notices_a_silent_node(bench: Bench) -> None:
-    link = CanopenLink(bench.url + "&guard=0.05")
+    link = CanopenLink(bench.url + "&guard_ms=50")
     events: list[LinkEvent] = []
     link.listen(events.append)
     await link.open()
@@ -209,7 +209,7 @@ async def test_bus_off_is_told_and_recovered(slcan_bench: Bench) -> None:
     await link.open()
     try:
         assert await link.read(5, SMALL) == b"\x07"
-        slcan_bench.wire.side.bus_off()
+        slcan_bench.wire.do(slcan_bench.wire.side.bus_off)
         with pytest.raises((LinkLost, LinkTimeout)):
             await link.read(5, SMALL)
         await until(lambda: any("bus-off" in e.text for e in events))

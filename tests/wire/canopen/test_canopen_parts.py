@@ -27,7 +27,7 @@ def test_urls_of_the_documentation() -> None:
     assert (url.interface, url.channel, url.bitrate) == ("socketcan", "can0", 500_000)
     assert parse_canopen_url("canopen://slcan//dev/ttyACM0").channel == "/dev/ttyACM0"
     assert parse_canopen_url("canopen://pcan/").channel == "PCAN_USBBUS1"
-    assert parse_canopen_url("canopen://slcan/COM8?timeout=0.2&guard=1").timeout_s == 0.2
+    assert parse_canopen_url("canopen://slcan/COM8?timeout_ms=200&guard_ms=1000").timeout_s == 0.2
     assert parse_canopen_url("canopen://udp_multicast").channel == "239.74.163.2"
 
 

@@ -128,11 +128,14 @@ def test_python_cans_own_slcan_client_sees_a_refused_frame_as_nothing(tmp_path: 
     """Why `drivers.canopen.slcan` exists: bus-off must not look like silence."""
     side = SlcanSide(tmp_path / "tty")
     node = CanopenNode(SmallDevice(), 5, time.monotonic_ns)
-    with CanWire(side, [node]), can.Bus(
+    with CanWire(side, [node]) as wire, can.Bus(
         interface="slcan", channel=str(tmp_path / "tty"), bitrate=1_000_000, sleep_after_open=0
     ) as bus:  # fmt: skip
-        side.bus_off()
-        bus.send(can.Message(arbitration_id=0x605, is_extended_id=False, data=bytes(8)))
+        request = can.Message(arbitration_id=0x605, is_extended_id=False, data=bytes(8))
+        bus.send(request)
+        assert bus.recv(2) is not None  # the commands that open the channel have been obeyed
+        wire.do(side.bus_off)
+        bus.send(request)
         assert bus.recv(0.1) is None
         assert side.refused == 1
 
@@ -141,7 +144,7 @@ async def test_wire_time_is_emulated_on_request(tmp_path: Path) -> None:
     node = CanopenNode(SmallDevice(), 5, time.monotonic_ns)
     side = SlcanSide(tmp_path / "tty")
     with CanWire(side, [node], bitrate=10_000):
-        link = CanopenLink(f"canopen://slcan/{tmp_path / 'tty'}?timeout=2")
+        link = CanopenLink(f"canopen://slcan/{tmp_path / 'tty'}?timeout_ms=2000")
         await link.open()
         try:
             started = time.monotonic()
