@@ -78,7 +78,8 @@ class MlinkLayout:
                 parameter=str(address),
                 remedy="use EtherCAT for this object",
             )
-        group = address.index if count == 1 else None
+        blocks = self.limits(station).max_registers > _MAX_WORDS
+        group = address.index if blocks and count == 1 else None
         start = register_of(address.index, address.subindex)
         return Place(start, count, address.type, "low_first", group)
 

@@ -322,7 +322,8 @@ class Line:
         now = self._clock()
         for head in [head for head, expiry in late.items() if expiry <= now]:
             del late[head]
-        if query.head in late and query.frame != self._last_failed:
+        same_read_again = query.frame[1] == READ and query.frame == self._last_failed
+        if query.head in late and not same_read_again:
             self._probe(port, query, timeout_s)
 
     def _probe(self, port: Port, query: Query, timeout_s: float | None) -> None:

@@ -1,0 +1,74 @@
+"""Find out how a serial line is set, where nobody knows any more (or no manual prints it)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drivers.errors import OutOfRange
+from drivers.link import Found, Progress
+from drivers.modbus.port import Parity, is_pseudo_terminal
+from drivers.urls import BusUrl, link_for, parse_url
+
+#: In the order in which they are likely: makers' defaults first.
+USUAL_BAUDRATES: dict[str, tuple[int, ...]] = {
+    "mlink": (2_500_000, 115_200, 1_000_000, 5_000_000, 921_600, 460_800, 230_400, 57_600, 38_400,
+              19_200, 9600),
+    "modbus": (115_200, 9600, 19_200, 57_600, 38_400, 230_400, 460_800, 921_600),
+}  # fmt: skip
+USUAL_PARITIES: dict[str, tuple[Parity, ...]] = {
+    "mlink": ("E", "N", "O"),
+    "modbus": ("N", "E", "O"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class LineFound:
+    """The URL with the settings at which something answered, and what did."""
+
+    url: str
+    drives: tuple[Found, ...]
+
+
+async def search_line_settings(
+    url: str | BusUrl,
+    progress: Progress,
+    *,
+    baudrates: Sequence[int] = (),
+    parities: Sequence[Parity] = (),
+    stations: Sequence[int] = (1,),
+) -> LineFound | None:
+    """Try baud rates and parities until a drive answers with a right CRC; None if none does.
+
+    Only reads go out. Ask few stations: the time is the product of all three lists and of one
+    time-out. Rates that the adapter cannot do are skipped. Cancel by cancelling the task.
+
+    Raises:
+        LinkLost: the adapter is missing, in use, or pulled during the search.
+    """
+    bus = parse_url(url) if isinstance(url, str) else url
+    rates = baudrates or USUAL_BAUDRATES[bus.scheme]
+    kinds = parities or USUAL_PARITIES[bus.scheme]
+    if is_pseudo_terminal(bus.place):
+        kinds = kinds[:1]  # no bits, no parity: the others would be the same again
+    settings = [(rate, parity) for rate in rates for parity in kinds]
+    for number, (rate, parity) in enumerate(settings):
+        progress(number / len(settings), f"trying {rate} baud, parity {parity}")
+        candidate = bus.with_options(baudrate=rate, parity=parity)
+        link = link_for(candidate)
+        try:
+            await link.open()
+            found = await link.scan(_quiet, stations)
+        except OutOfRange:
+            continue
+        finally:
+            await link.close()
+        if found:
+            progress(1.0, f"answers at {rate} baud, parity {parity}")
+            return LineFound(str(candidate), tuple(found))
+    progress(1.0, "nothing answered at any of these settings")
+    return None
+
+
+def _quiet(_fraction: float, _text: str) -> None:
+    """A scan of few stations inside a search needs no progress of its own."""
