@@ -1,0 +1,261 @@
+"""The cyclic exchange: an absolute time grid, process data first, everything else after them.
+
+Allocation is kept to the few short-lived objects that pysoem itself makes; the garbage
+collector is off. A frame that does not come back costs its cycle and nothing more: the socket
+is asked with `select`, because SOEM's own time-outs round up to a jiffy of 4 ms.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import struct
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from drivers.ethercat.mapping import Entry
+from drivers.ethercat.playback import AxisLoop, Phase
+from drivers.ethercat.ring import RESYNCED, VALID, Ring
+from drivers.ethercat.segment import Segment
+
+DISTRUST_S = 0.03
+"""Without valid process data for this long no setpoint can be trusted: every axis brakes."""
+
+_DISTRUST_CYCLES = 5
+_RECEIVE_US = 300
+_MARGIN_NS = 120_000
+_LATE_BINS = 16
+
+
+@dataclass
+class Image:
+    """Process data of one station in the loop."""
+
+    station: int
+    axis: AxisLoop
+    unpack: Callable[[bytes], tuple[int, ...]]
+    pack: Callable[..., bytes]
+    output_size: int
+    input_size: int
+    wkc: int
+    outputs: bytes = b""
+    inputs: bytes = b""
+    lost: bool = False
+
+
+@dataclass
+class CycleCounters:
+    """Since the start of the exchange. ``late`` counts wake-ups by powers of two of 1 µs."""
+
+    cycles: int = 0
+    overruns: int = 0
+    lost_frames: int = 0
+    wkc_errors: int = 0
+    last_wkc: int = 0
+    late: list[int] = field(default_factory=lambda: [0] * _LATE_BINS)
+    late_max_us: int = 0
+    dc_deviation_ns: int = 0
+    dc_deviation_max_ns: int = 0
+
+
+def layout(entries: tuple[Entry, ...]) -> struct.Struct:
+    """The process data of one direction; bytes of no interest are skipped."""
+    parts = (f"{entry.size}x" if entry.code == "x" else entry.code for entry in entries)
+    return struct.Struct("<" + "".join(parts))
+
+
+def places(entries: tuple[Entry, ...]) -> dict[int, int]:
+    """Object index (of subindex 0) to its place among the unpacked values."""
+    known = [entry for entry in entries if entry.code != "x"]
+    return {entry.index: place for place, entry in enumerate(known) if entry.subindex == 0}
+
+
+class CyclicLoop:
+    """See the module. One call of `cycle` is one cycle; the caller uses the time that is left."""
+
+    def __init__(
+        self, segment: Segment, ring: Ring, images: list[Image], cycle_ns: int, *, dc: bool
+    ) -> None:
+        self.images = images
+        self.cycle_ns = cycle_ns
+        self.dc = dc
+        self.counters = CycleCounters()
+        self.number = 0
+        self.next_ns = 0
+        self.expected_wkc = sum(image.wkc for image in images)
+        self._segment = segment
+        self._master = segment.master
+        self._ring = ring
+        self._slaves = [segment.slaves[image.station - 1] for image in images]
+        self._fd = segment.socket_fd
+        self._wait_s = max(cycle_ns * 0.6e-9, 150e-6)
+        self._distrust = max(round(DISTRUST_S * 1e9 / cycle_ns), _DISTRUST_CYCLES)
+        self._invalid_run = 0
+        self._integral_ns = 0.0
+        self._late_ns = 0
+        self._resynced = 0
+
+    def start(self) -> None:
+        """Begin the grid now; frames no longer block."""
+        if self._fd is not None:
+            os.set_blocking(self._fd, False)
+        for image in self.images:
+            image.outputs = image.pack(*image.axis.outputs)
+            self._segment.set_output(image.station, image.outputs)
+        self.next_ns = time.monotonic_ns() + self.cycle_ns
+
+    def stop(self) -> None:
+        """Frames block again, for everything that is not cyclic."""
+        if self._fd is not None:
+            os.set_blocking(self._fd, True)
+
+    def cycle(self) -> None:
+        """Wait for the grid, exchange process data, let every axis decide, keep the sample."""
+        self._wait_for_grid()
+        counters = self.counters
+        wkc = self._exchange()
+        valid = wkc == self.expected_wkc
+        counters.cycles += 1
+        counters.last_wkc = wkc
+        for image, slave in zip(self.images, self._slaves, strict=True):
+            if wkc > 0 and not image.lost:
+                image.inputs = slave.input
+        self._sample(wkc, valid=valid)
+        if valid:
+            self._invalid_run = 0
+        else:
+            self._count_invalid(wkc)
+        for image, slave in zip(self.images, self._slaves, strict=True):
+            self._decide(image, slave, valid=valid)
+        self.number += 1
+        self.next_ns += self.cycle_ns + (self._follow_clock() if self.dc and wkc > 0 else 0)
+
+    def spare_ns(self) -> int:
+        """Time left for mailbox frames before the next cycle, with a margin kept."""
+        return self.next_ns - time.monotonic_ns() - max(_MARGIN_NS, self.cycle_ns // 5)
+
+    def moving(self) -> bool:
+        """Whether any axis plays or brakes."""
+        return any(image.axis.phase is not Phase.IDLE for image in self.images)
+
+    def stop_axes(self, why: str, station: int | None = None) -> None:
+        """Brake one axis or all."""
+        for image in self.images:
+            if station in (None, image.station):
+                image.axis.stop(why)
+
+    def leave_out(self, station: int, *, lost: bool) -> None:
+        """Take a lost station out of the expected working counter, or back in."""
+        for image in self.images:
+            if image.station == station and image.lost is not lost:
+                image.lost = lost
+                self.expected_wkc += -image.wkc if lost else image.wkc
+                self._invalid_run = 0
+
+    # Parts ---------------------------------------------------------------------------------
+
+    def _wait_for_grid(self) -> None:
+        now = time.monotonic_ns()
+        ahead = self.next_ns - now
+        if ahead > 0:
+            time.sleep(ahead * 1e-9)
+            now = time.monotonic_ns()
+        late = max(now - self.next_ns, 0)
+        self._resynced = 0
+        if late >= self.cycle_ns:
+            skipped = late // self.cycle_ns
+            self.next_ns += skipped * self.cycle_ns
+            self.number += skipped
+            self.counters.overruns += skipped
+            self._resynced = RESYNCED
+        late_us = late // 1000
+        self._late_ns = late
+        self.counters.late[min(late_us.bit_length(), _LATE_BINS - 1)] += 1
+        self.counters.late_max_us = max(self.counters.late_max_us, late_us)
+
+    def _exchange(self) -> int:
+        self._master.send_processdata()
+        if self._fd is not None:
+            ready, _, _ = select.select((self._fd,), (), (), self._wait_s)
+            if not ready:
+                # Tells SOEM to give the frame up; it returns at once.
+                self._master.receive_processdata(0)
+                return -1
+        wkc: int = self._master.receive_processdata(_RECEIVE_US)
+        return wkc
+
+    def _count_invalid(self, wkc: int) -> None:
+        if wkc < 0:
+            self.counters.lost_frames += 1
+        else:
+            self.counters.wkc_errors += 1
+        self._invalid_run += 1
+        if self._invalid_run == self._distrust and self.moving():
+            self.stop_axes(
+                f"no valid process data for {self._invalid_run} cycles: the axis is braked"
+            )
+
+    def _decide(self, image: Image, slave: object, *, valid: bool) -> None:
+        axis = image.axis
+        if valid and not image.lost:
+            axis.step(image.unpack(image.inputs))
+        else:
+            axis.blind()
+        try:
+            outputs = image.pack(*axis.outputs)
+        except struct.error:
+            # A setpoint outside its type: the last good one stays while the axis brakes.
+            axis.stop("a setpoint does not fit its object: the axis is braked")
+            return
+        if outputs != image.outputs:
+            image.outputs = outputs
+            slave.output = outputs  # type: ignore[attr-defined]
+
+    def _sample(self, wkc: int, *, valid: bool) -> None:
+        self._ring.put(
+            (
+                self.number,
+                self.next_ns,
+                self._master.dc_time if self.dc else 0,
+                wkc,
+                self.expected_wkc,
+                (VALID if valid else 0) | self._resynced,
+                self._late_ns // 1000,
+            ),
+            self._payload(),
+        )
+
+    def _payload(self) -> list[bytes]:
+        parts = []
+        for image in self.images:
+            parts.append(image.outputs)
+            parts.append(image.inputs)
+        return parts
+
+    def _follow_clock(self) -> int:
+        """Correction of the grid so that frames pass half a cycle before SYNC0.
+
+        A PI controller on the reference clock's time in the frame, limited to 2 % of a cycle.
+        """
+        cycle = self.cycle_ns
+        phase = (self._master.dc_time - cycle // 2) % cycle
+        error = phase - cycle if phase > cycle // 2 else phase
+        self.counters.dc_deviation_ns = error
+        if abs(error) > self.counters.dc_deviation_max_ns and self.number > 2000:
+            self.counters.dc_deviation_max_ns = abs(error)
+        limit = cycle / 50
+        self._integral_ns = min(max(self._integral_ns + error * 0.0005, -limit), limit)
+        correction: float = min(max(error * 0.05 + self._integral_ns, -limit), limit)
+        return -round(correction)
+
+
+def percentile_us(late: list[int], fraction: float) -> int:
+    """Upper edge [µs] of the bin below which ``fraction`` of all wake-ups lie."""
+    total = sum(late)
+    seen = 0
+    for place, count in enumerate(late):
+        seen += count
+        if total and seen >= fraction * total:
+            return int(2**place)
+    return 0

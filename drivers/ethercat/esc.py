@@ -1,0 +1,121 @@
+"""ESC registers as values: ports, error counters, topology, and which cable is bad.
+
+Source: ETG.1000.4 clauses 6.1 (0x0110 DL status) and 6.2 (0x0300 error counters).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+DL_STATUS = 0x0110
+ERROR_COUNTERS = 0x0300
+ERROR_COUNTERS_SIZE = 20
+
+#: A frame goes through the open ports of a slave in this order.
+_PORT_ORDER = (0, 3, 1, 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Port:
+    """One port of a slave. Counters stop at 255 and count since they were last cleared."""
+
+    link: bool
+    communicating: bool
+    invalid_frames: int = 0
+    rx_errors: int = 0
+    forwarded_errors: int = 0
+    lost_links: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PortCounters:
+    """All ports of a slave and its two counters that belong to no port."""
+
+    station: int
+    ports: tuple[Port, ...]
+    processing_errors: int = 0
+    pdi_errors: int = 0
+
+
+def decode_ports(station: int, dl_status: bytes, counters: bytes | None) -> PortCounters:
+    """Ports from register 0x110 (2 bytes) and 0x300 (20 bytes, or None where unread)."""
+    status = int.from_bytes(dl_status, "little")
+    raw = counters if counters is not None and len(counters) >= 20 else bytes(20)
+    ports = tuple(
+        Port(
+            link=bool(status >> (4 + number) & 1),
+            communicating=bool(status >> (9 + 2 * number) & 1),
+            invalid_frames=raw[2 * number],
+            rx_errors=raw[2 * number + 1],
+            forwarded_errors=raw[8 + number],
+            lost_links=raw[16 + number],
+        )
+        for number in range(4)
+    )
+    return PortCounters(station, ports, raw[12], raw[13])
+
+
+def parents(stations: Sequence[PortCounters]) -> dict[int, tuple[int, int]]:
+    """For each station the station before it and the port there; 0 is the computer.
+
+    Follows the frame: each slave hands it to its open ports in the order 0, 3, 1, 2, and a
+    branch is finished before the next port opens.
+    """
+    found: dict[int, tuple[int, int]] = {}
+    open_ports: list[tuple[int, int]] = []
+    for here in stations:
+        found[here.station] = open_ports.pop() if open_ports else (0, 0)
+        down = [number for number in _PORT_ORDER[1:] if here.ports[number].communicating]
+        open_ports.extend((here.station, number) for number in reversed(down))
+    return found
+
+
+def cable_findings(stations: Sequence[PortCounters]) -> list[str]:
+    """Which cable or connector the counters accuse, in words; empty when nothing is wrong.
+
+    Only ``rx_errors`` and ``invalid_frames`` that are not forwarded ones arise at the port
+    itself. Port 0 of a station hears the one before it, so errors there and at the port of the
+    station before are the same cable, each direction for itself.
+    """
+    upstream = parents(stations)
+    before = {(parent, port): station for station, (parent, port) in upstream.items()}
+    findings = []
+    for here in stations:
+        for number, port in enumerate(here.ports):
+            other = upstream[here.station][0] if number == 0 else before.get((here.station, number))
+            own = max(port.invalid_frames + port.rx_errors - port.forwarded_errors, 0)
+            if port.lost_links:
+                findings.append(
+                    f"{_cable(here.station, number, other)}: the link was lost"
+                    f" {_times(port.lost_links)}; check plug and cable"
+                )
+            if own:
+                findings.append(
+                    f"{_cable(here.station, number, other)}: damaged frames arrived"
+                    f" {_times(own)}; check cable, screen and earth"
+                )
+        if here.processing_errors:
+            findings.append(
+                f"station {here.station}: {here.processing_errors} frames that are not EtherCAT;"
+                " something else sends on this segment"
+            )
+        if here.pdi_errors:
+            findings.append(
+                f"station {here.station}: {here.pdi_errors} errors between its EtherCAT chip and"
+                " its processor; a fault inside the drive"
+            )
+    return findings
+
+
+def _times(count: int) -> str:
+    return f"{count} time{'' if count == 1 else 's'}" if count < 255 else "255 times or more"
+
+
+def _cable(station: int, port: int, other: int | None) -> str:
+    if other is None:
+        return f"station {station}, port {port} (nothing behind it)"
+    if port == 0:
+        before = "the computer" if other == 0 else f"station {other}"
+        return f"cable between {before} and station {station}"
+    return f"cable between station {station} and station {other}"

@@ -1,0 +1,162 @@
+"""The process that owns one EtherCAT segment: ``python -m drivers.ethercat.host INTERFACE …``.
+
+One thread does everything on the wire. While process data are exchanged it follows the grid and
+uses what is left of each cycle for mailbox frames and commands; otherwise it works through
+transactions as fast as the slaves answer. The server may kill it at any time: pysoem holds the
+interpreter lock in many calls, and this way only this process hangs with it.
+
+It ends by itself when the server's end of the pipe closes: axes are braked first. Should even
+that hang, the slaves' watchdogs stop the axes and an alarm ends the process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import select
+import signal
+import socket
+import sys
+import time
+from types import FrameType
+
+from drivers.errors import DriveError, LinkLost
+from drivers.ethercat import protocol, realtime
+from drivers.ethercat.operations import Operations
+from drivers.ethercat.protocol import Message
+from drivers.ethercat.ring import Ring
+
+_LAST_WORDS_S = 5
+_STATUS_S = 0.2
+_SERVER_SILENT_S = 3.0
+
+
+class Host:
+    """Commands in, replies and events out, and the loop that never waits for either."""
+
+    def __init__(self, interface: str, control: socket.socket, ring: Ring) -> None:
+        self._control = control
+        control.setblocking(False)
+        self._unpacker = protocol.Unpacker()
+        self._outgoing = bytearray()
+        self._ring = ring
+        self._orphaned = False
+        self._next_status = 0.0
+        self.operations = Operations(interface, ring, self.send)
+
+    def run(self, granted: realtime.RealTime) -> None:
+        """Until the server goes away."""
+        self.operations.granted = granted
+        try:
+            self.operations.open()
+            self.send({"event": "ready", "fifo": granted.fifo_priority, "notes": granted.notes})
+        except DriveError as error:
+            self.send({"event": "failed", "error": protocol.error_to_wire(error)})
+            self._flush()
+            return
+        while not self._orphaned:
+            self._turn()
+        self._ring.host_lives_until(time.monotonic_ns() + 10_000_000_000, "ending")
+        self.operations.shut_down("the server is gone: the axis is braked and disabled")
+
+    def _turn(self) -> None:
+        operations = self.operations
+        now = time.monotonic()
+        self._ring.host_lives_until(int((now + 2) * 1e9))
+        loop = operations.loop
+        if loop is not None:
+            loop.cycle()
+            self._commands(0.0)
+            if self._server_is_silent():
+                loop.stop_axes("the server has been silent for 3 s: the axis is braked")
+            operations.use_spare_time()
+        else:
+            worked = any(operations.lanes.step() for _ in range(8))
+            self._commands(0.0 if worked else self._idle_s(now))
+        operations.housekeeping(now)
+        if now >= self._next_status:
+            self._next_status = now + _STATUS_S
+            self.send({"event": "status"} | operations.status())
+        self._flush()
+
+    def _idle_s(self, now: float) -> float:
+        wake = self.operations.lanes.wake_s()
+        return 0.05 if wake is None else min(max(wake - now, 0.0), 0.05)
+
+    def _server_is_silent(self) -> bool:
+        seen = self._ring.server_seen_ns()
+        return bool(seen) and time.monotonic_ns() - seen > _SERVER_SILENT_S * 1e9
+
+    def _commands(self, timeout_s: float) -> None:
+        if timeout_s > 0 and not select.select((self._control,), (), (), timeout_s)[0]:
+            return
+        try:
+            data = self._control.recv(1 << 16)
+        except BlockingIOError:
+            return
+        except ConnectionError:
+            data = b""
+        if not data:
+            self._orphaned = True
+            return
+        for message in self._unpacker.feed(data):
+            self._handle(message)
+
+    def _handle(self, message: Message) -> None:
+        number = message["id"]
+
+        def done(result: object, error: DriveError | None) -> None:
+            if error is None:
+                self.send({"id": number, "result": result})
+            else:
+                self.send({"id": number, "error": protocol.error_to_wire(error)})
+
+        try:
+            self.operations.handle(message, done)
+        except DriveError as error:
+            done(None, error)
+
+    def send(self, message: Message) -> None:
+        """Queue a message; a slow server never holds up the wire."""
+        self._outgoing += protocol.pack(message)
+
+    def _flush(self) -> None:
+        if not self._outgoing:
+            return
+        try:
+            sent = self._control.send(self._outgoing)
+        except BlockingIOError:
+            return
+        except ConnectionError:
+            self._orphaned = True
+            return
+        del self._outgoing[:sent]
+
+    def orphan(self, _signal: int, _frame: FrameType | None) -> None:
+        """SIGTERM: end in good order."""
+        signal.alarm(_LAST_WORDS_S)
+        self._orphaned = True
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry point of the process."""
+    parser = argparse.ArgumentParser(description="EtherCAT host process of servodeck")
+    parser.add_argument("interface")
+    parser.add_argument("--control", type=int, required=True, help="descriptor of the socket")
+    parser.add_argument("--ring", type=int, required=True, help="descriptor of the ring")
+    parser.add_argument("--no-realtime", action="store_true")
+    options = parser.parse_args(argv)
+    realtime.die_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    control = socket.socket(fileno=options.control)
+    host = Host(options.interface, control, Ring(options.ring))
+    signal.signal(signal.SIGTERM, host.orphan)
+    granted = realtime.claim(wanted=not options.no_realtime)
+    with contextlib.suppress(LinkLost):
+        host.run(granted)
+    signal.alarm(_LAST_WORDS_S)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,294 @@
+"""Starting, watching, killing and restarting the host process. Runs on the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import os
+import socket
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from drivers.errors import DriveError, LinkLost, LinkTimeout
+from drivers.ethercat import protocol
+from drivers.ethercat.protocol import Message
+from drivers.ethercat.ring import Ring
+from drivers.link import Progress
+
+_WATCH_S = 0.1
+_RESTART_PAUSE_S = (0.2, 1.0, 3.0, 10.0)
+_FAREWELL_S = 3.0
+
+
+class HostProcess:
+    """One child; ``received`` gets its events, ``restarted`` the reason of every restart."""
+
+    def __init__(
+        self,
+        interface: str,
+        launcher: Sequence[str],
+        received: Callable[[Message], None],
+        restarted: Callable[[str], None],
+    ) -> None:
+        self.restarts = 0
+        self.words = "not opened"
+        self.granted: tuple[str, ...] = ()
+        self.ring: Ring | None = None
+        self._interface = interface
+        self._launcher = tuple(launcher)
+        self._received = received
+        self._restarted = restarted
+        self._process: asyncio.subprocess.Process | None = None
+        self._socket: socket.socket | None = None
+        self._numbers = itertools.count(1)
+        self._waiting: dict[int, tuple[asyncio.Future[Any], Progress | None]] = {}
+        self._ready: asyncio.Future[None] | None = None
+        self._care: asyncio.Task[None] | None = None
+        self._outgoing = asyncio.Lock()
+        self._wanted = False
+
+    @property
+    def running(self) -> bool:
+        """Whether the child lives and has opened its interface."""
+        return (
+            self._process is not None
+            and self._process.returncode is None
+            and self._ready is not None
+            and self._ready.done()
+            and self._ready.exception() is None
+        )
+
+    @property
+    def pid(self) -> int | None:
+        """Process number of the child."""
+        return None if self._process is None else self._process.pid
+
+    async def start(self, timeout_s: float) -> None:
+        """Start the child and wait until it has opened the interface.
+
+        Raises:
+            DriveError: why the interface could not be opened.
+        """
+        if self._wanted:
+            return
+        self._wanted = True
+        try:
+            await self._spawn(timeout_s)
+        except BaseException:
+            self._wanted = False
+            await self._end(kill=True)
+            raise
+        self._care = asyncio.get_running_loop().create_task(self._look_after())
+
+    async def stop(self) -> None:
+        """End the child in good order, by force after some seconds."""
+        self._wanted = False
+        if self._care is not None:
+            self._care.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._care
+            self._care = None
+        await self._end(kill=False)
+        self.words = "closed"
+
+    async def call(
+        self, message: Message, timeout_s: float, progress: Progress | None = None
+    ) -> Any:
+        """Send a request and wait for its reply.
+
+        Raises:
+            LinkLost: the child is not there, or went away meanwhile.
+            LinkTimeout: no reply in time.
+            DriveError: what the child says.
+        """
+        if not self.running or self._socket is None:
+            raise LinkLost(
+                f"the EtherCAT process for {self._interface} is not running: {self.words}",
+                remedy="it is started again by itself; or open the bus again",
+            )
+        number = next(self._numbers)
+        future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        self._waiting[number] = (future, progress)
+        try:
+            await self._write(protocol.pack(message | {"id": number}))
+            async with asyncio.timeout(timeout_s):
+                return await future
+        except TimeoutError:
+            raise LinkTimeout(
+                f"the EtherCAT process did not answer {message['op']!r} within {timeout_s:g} s"
+            ) from None
+        finally:
+            self._waiting.pop(number, None)
+
+    async def _spawn(self, timeout_s: float) -> None:
+        loop = asyncio.get_running_loop()
+        ours, theirs = socket.socketpair()
+        ring_fd = Ring.create()
+        try:
+            self.ring = Ring(ring_fd)
+            self._process = await asyncio.create_subprocess_exec(
+                *self._launcher, sys.executable, "-m", "drivers.ethercat.host", self._interface,
+                "--control", str(theirs.fileno()), "--ring", str(ring_fd),
+                pass_fds=(theirs.fileno(), ring_fd), env=_environment(),
+                stdin=asyncio.subprocess.DEVNULL,
+            )  # fmt: skip
+        finally:
+            theirs.close()
+            os.close(ring_fd)
+        ours.setblocking(False)
+        self._socket = ours
+        self._ready = loop.create_future()
+        self._reader = loop.create_task(self._read(ours))
+        self.words = "starting"
+        try:
+            async with asyncio.timeout(timeout_s):
+                await asyncio.shield(self._ready)
+        except TimeoutError:
+            raise LinkTimeout(
+                f"the EtherCAT process for {self._interface} did not start within {timeout_s:g} s"
+            ) from None
+        self.words = "open"
+
+    async def _read(self, ours: socket.socket) -> None:
+        loop = asyncio.get_running_loop()
+        unpacker = protocol.Unpacker()
+        while True:
+            try:
+                data = await loop.sock_recv(ours, 1 << 18)
+            except OSError:
+                data = b""
+            if not data:
+                self._gone("the EtherCAT process ended")
+                return
+            for message in unpacker.feed(data):
+                self._take(message)
+
+    def _take(self, message: Message) -> None:
+        number = message.get("id")
+        if number is None:
+            self._take_event(message)
+            return
+        future, progress = self._waiting.get(number, (None, None))
+        if "progress" in message:
+            if progress is not None:
+                progress(message["progress"], message["text"])
+        elif future is None or future.done():
+            return
+        elif "error" in message:
+            future.set_exception(protocol.error_from_wire(message["error"]))
+        else:
+            future.set_result(message["result"])
+
+    def _take_event(self, message: Message) -> None:
+        ready = self._ready
+        if message["event"] == "ready":
+            self.granted = tuple(message["notes"])
+            if ready is not None and not ready.done():
+                ready.set_result(None)
+        elif message["event"] == "failed":
+            error = protocol.error_from_wire(message["error"])
+            self.words = error.message
+            if ready is not None and not ready.done():
+                ready.set_exception(error)
+        else:
+            self._received(message)
+
+    def _gone(self, why: str) -> None:
+        self.words = why
+        lost = LinkLost(why, remedy="it is started again by itself")
+        if self._ready is not None and not self._ready.done():
+            self._ready.set_exception(lost)
+        for future, _ in self._waiting.values():
+            if not future.done():
+                future.set_exception(LinkLost(why, remedy="it is started again by itself"))
+
+    async def _write(self, data: bytes) -> None:
+        ours = self._socket
+        if ours is None:
+            raise LinkLost(self.words)
+        async with self._outgoing:
+            try:
+                await asyncio.get_running_loop().sock_sendall(ours, data)
+            except OSError as error:
+                raise LinkLost("the EtherCAT process ended") from error
+
+    async def _look_after(self) -> None:
+        """Give signs of life, and replace a child that died or hangs."""
+        while True:
+            await asyncio.sleep(_WATCH_S)
+            ring, process = self.ring, self._process
+            if ring is None or process is None:
+                continue
+            now = time.monotonic_ns()
+            ring.server_lives(now)
+            if process.returncode is not None:
+                await self._replace(f"the EtherCAT process died (status {process.returncode})")
+            elif 0 < ring.host_deadline_ns() < now:
+                doing = ring.host_doing() or "exchanging frames"
+                await self._replace(f"the EtherCAT process hung while {doing} and was killed")
+
+    async def _replace(self, why: str) -> None:
+        self.restarts += 1
+        self._restarted(f"{why}; it is started again")
+        await self._end(kill=True)
+        for pause_s in itertools.chain(_RESTART_PAUSE_S, itertools.repeat(_RESTART_PAUSE_S[-1])):
+            await asyncio.sleep(pause_s)
+            try:
+                await self._spawn(8.0)
+            except DriveError as error:
+                await self._end(kill=True)
+                self.words = error.message
+                continue
+            self._received(
+                {
+                    "event": "link",
+                    "kind": "back",
+                    "station": None,
+                    "code": None,
+                    "text": "the EtherCAT process runs again",
+                }
+            )
+            return
+
+    async def _end(self, *, kill: bool) -> None:
+        process, self._process = self._process, None
+        if self._socket is not None:
+            # The end of the pipe is what makes the child brake its axes and leave.
+            self._socket.close() if process is None else self._hang_up()
+        if process is not None and process.returncode is None:
+            if kill:
+                process.kill()
+            try:
+                async with asyncio.timeout(_FAREWELL_S):
+                    await process.wait()
+            except TimeoutError:
+                process.kill()
+                await process.wait()
+        self._gone(self.words if self.words != "open" else "the EtherCAT process was ended")
+        if self._ready is not None and self._ready.done() and not self._ready.cancelled():
+            self._ready.exception()
+        self._ready = None
+        self._close_ring()
+
+    def _hang_up(self) -> None:
+        assert self._socket is not None
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
+        self._reader.cancel()
+        self._socket.close()
+        self._socket = None
+
+    def _close_ring(self) -> None:
+        ring, self.ring = self.ring, None
+        if ring is not None:
+            ring.close()
+
+
+def _environment() -> dict[str, str]:
+    root = str(Path(__file__).resolve().parents[2])
+    path = os.environ.get("PYTHONPATH")
+    return {**os.environ, "PYTHONPATH": f"{root}:{path}" if path else root}

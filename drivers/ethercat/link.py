@@ -1,0 +1,283 @@
+"""The EtherCAT link in the server: commands to the host process, and its care.
+
+The host is started by `EthercatLink.open` and whenever it dies or hangs; what happened is an
+event. Nothing here blocks: the wire belongs to the other process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from drivers.codec import size_of
+from drivers.errors import DriveError, NotAllowed, ProtocolError
+from drivers.ethercat import coe, permissions
+from drivers.ethercat.al_status import AlState
+from drivers.ethercat.hostprocess import HostProcess
+from drivers.ethercat.protocol import Message, error_from_wire
+from drivers.ethercat.segmentcyclic import EthercatCyclic
+from drivers.link import Address, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
+from profiles.schema import LinkKind, Profile
+
+_OPEN_S, _ANSWER_S, _SCAN_S, _CONFIGURE_S, _FOE_S = 8.0, 15.0, 60.0, 60.0, 1800.0
+
+
+class EthercatLink:
+    """One segment. ``launcher`` is put before the host's command line, as to enter a namespace.
+
+    Stations count from 1 in the order of the cable. All methods of `drivers.link.Link`, and what
+    only EtherCAT has.
+    """
+
+    kind: LinkKind = "ethercat"
+
+    def __init__(
+        self, interface: str, *, url: str | None = None, launcher: Sequence[str] = ()
+    ) -> None:
+        self.interface = interface
+        self.url = url or f"ethercat://{interface}"
+        self._profiles: dict[int, Profile] = {}
+        self._listeners: list[Callable[[LinkEvent], None]] = []
+        self._status: Message = {}
+        self._counts = {"transactions": 0, "timeouts": 0}
+        self._host = HostProcess(interface, launcher, self._received, self._restarted)
+        self.cyclic: EthercatCyclic | None = EthercatCyclic(self._host, self._profiles)
+
+    # Link ----------------------------------------------------------------------------------
+
+    async def open(self) -> None:
+        """Start the host process and open the interface.
+
+        Raises:
+            LinkLost: no such interface, switched off, or a permission is missing; with commands.
+            Busy: another servodeck has it.
+        """
+        await self._host.start(_OPEN_S)
+
+    async def close(self) -> None:
+        """Brake, leave OP, end the host. Calling again does nothing."""
+        if self.cyclic is not None:
+            self.cyclic.shut_down()
+        await self._host.stop()
+
+    async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
+        """Search the segment: every drive is reset to PREOP and identified.
+
+        Raises:
+            Busy: the cyclic exchange runs.
+        """
+        wanted = None if stations is None else list(stations)
+        found: list[Message] = await self._call(
+            {"op": "scan", "stations": wanted}, _SCAN_S, progress=progress
+        )
+        return [_found(item) for item in found]
+
+    async def read(self, station: int, address: Address) -> bytes:
+        """Read one value; text as sent."""
+        index, subindex = _object(address)
+        data: bytes = await self._call(
+            {"op": "read", "station": station, "index": index, "subindex": subindex}, _ANSWER_S
+        )
+        return _fitted(address, data)
+
+    async def read_many(
+        self, station: int, addresses: Sequence[Address]
+    ) -> list[bytes | DriveError]:
+        """Read several; objects of which all subindices are wanted are read at once."""
+        items = [[*_object(address), size_of(address.type)] for address in addresses]
+        answers: list[bytes | Message] = await self._call(
+            {"op": "read_many", "station": station, "items": items},
+            _ANSWER_S + 1.5 * len(items),
+        )
+        self._counts["transactions"] += len(items)
+        results: list[bytes | DriveError] = []
+        for address, answer in zip(addresses, answers, strict=True):
+            try:
+                results.append(_fitted(address, _value(answer)))
+            except DriveError as error:
+                results.append(error.at(parameter=str(address)))
+        return results
+
+    async def write(self, station: int, address: Address, data: bytes) -> None:
+        """Write one value; never repeated. A mapped output is set in the process data.
+
+        Raises:
+            NotAllowed: control word or setpoint while the cyclic exchange owns it.
+        """
+        index, subindex = _object(address)
+        await self._call(
+            {"op": "write", "station": station, "index": index, "subindex": subindex, "data": data},
+            _ANSWER_S,
+        )
+
+    def quality(self, station: int | None = None) -> LinkQuality:
+        """Counters as of at most 200 ms ago."""
+        cyclic = self._status.get("cyclic", {})
+        stations: Mapping[int, Message] = self._status.get("stations", {})
+        here = stations.get(station) if station is not None else None
+        details: dict[str, float | int | str] = {
+            "host_restarts": self._host.restarts,
+            "mailbox_repeats": sum(int(item["repeats"]) for item in stations.values()),
+        }
+        for key, value in cyclic.items():
+            if isinstance(value, int | float | str) and key not in ("wkc_errors", "lost_frames"):
+                details[f"cyclic_{key}"] = value
+        if cyclic.get("running"):
+            for power, count in enumerate(cyclic["late_histogram"]):
+                details[f"late_below_{2**power}_us"] = count
+        lost = bool(here["lost"]) if here else station is not None and bool(stations)
+        return LinkQuality(
+            connected=self._host.running and not lost and bool(self._status.get("open")),
+            transactions=self._counts["transactions"],
+            timeouts=self._counts["timeouts"],
+            retries=int(details["mailbox_repeats"]),
+            lost_frames=int(cyclic.get("lost_frames", 0)),
+            wkc_errors=int(cyclic.get("wkc_errors", 0)),
+            state=str(here["words"]) if here else self._host.words,
+            details=details,
+        )
+
+    def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
+        """Be told of lost and returned stations, emergencies, states, and restarts of the host."""
+        self._listeners.append(listener)
+
+        def unsubscribe() -> None:
+            with contextlib.suppress(ValueError):
+                self._listeners.remove(listener)
+
+        return unsubscribe
+
+    # What only EtherCAT has ----------------------------------------------------------------
+
+    def know(self, station: int, profile: Profile | None) -> None:
+        """Tell which drive family a station is, for the limits of its process data."""
+        if profile is None:
+            self._profiles.pop(station, None)
+        else:
+            self._profiles[station] = profile
+
+    async def enumerate(
+        self, station: int, progress: Progress
+    ) -> list[coe.EntryDescription | coe.ObjectInfo]:
+        """The drive's own dictionary, by the SDO information service."""
+        found: list[Message] = await self._call(
+            {"op": "enumerate", "station": station}, 600.0, progress=progress
+        )
+        described: list[coe.EntryDescription | coe.ObjectInfo] = []
+        for item in found:
+            whole = item.pop("kind") == "object"
+            described.append(coe.ObjectInfo(**item) if whole else coe.EntryDescription(**item))
+        return described
+
+    async def set_state(self, station: int, state: AlState) -> None:
+        """Drive one slave to a state.
+
+        Raises:
+            NotAllowed: it refuses; the reason is its AL status code in words.
+        """
+        await self._call({"op": "state", "station": station, "state": state.name}, _ANSWER_S)
+
+    async def port_counters(self) -> tuple[list[Message], list[str]]:
+        """ESC error counters per port, and which cable they accuse, in words."""
+        answer: Message = await self._call({"op": "counters"}, _ANSWER_S)
+        return answer["ports"], answer["findings"]
+
+    async def clear_port_counters(self, station: int) -> None:
+        """Set the ESC error counters of a slave to zero."""
+        await self._call({"op": "clear_counters", "station": station}, _ANSWER_S)
+
+    async def set_alias(self, station: int, alias: int) -> None:
+        """Write the station alias and the checksum to the EEPROM; valid after a power cycle."""
+        await self._call({"op": "alias", "station": station, "alias": alias}, _ANSWER_S)
+
+    async def load_firmware(
+        self, station: int, name: str, data: bytes, progress: Progress, *, password: int = 0
+    ) -> None:
+        """Send a file by FoE. An interrupted download can leave a drive without firmware.
+
+        The station must be in the state that its manual asks for (PREOP, or BOOT).
+        """
+        message = {"op": "foe", "station": station, "name": name, "data": data}
+        await self._call(message | {"password": password}, _FOE_S, progress=progress)
+
+    def permissions(self) -> permissions.Permissions:
+        """What is missing on the interface, with the commands that grant it."""
+        return permissions.check(self.interface)
+
+    # Parts ---------------------------------------------------------------------------------
+
+    async def _call(
+        self, message: Message, timeout_s: float, progress: Progress | None = None
+    ) -> Any:
+        self._counts["transactions"] += message["op"] in ("read", "write")
+        try:
+            return await self._host.call(message, timeout_s, progress)
+        except DriveError as error:
+            self._counts["timeouts"] += error.kind == "link-timeout"
+            raise
+
+    def _received(self, message: Message) -> None:
+        if message["event"] == "status":
+            self._status = message
+            if self.cyclic is not None:
+                self.cyclic.update(message["cyclic"])
+        elif message["event"] == "link":
+            self._tell(
+                LinkEvent(message["kind"], message["station"], message["text"], message["code"])
+            )
+
+    def _restarted(self, why: str) -> None:
+        self._status = {}
+        if self.cyclic is not None:
+            self.cyclic.host_gone()
+        self._tell(LinkEvent("lost", None, why))
+
+    def _tell(self, event: LinkEvent) -> None:
+        for listener in tuple(self._listeners):
+            listener(event)
+
+
+def _object(address: Address) -> tuple[int, int]:
+    if address.index is None:
+        raise NotAllowed(f"{address} has no object index: EtherCAT does not reach it")
+    return address.index, address.subindex
+
+
+def _value(answer: bytes | Message) -> bytes:
+    if isinstance(answer, bytes):
+        return answer
+    raise error_from_wire(answer)  # type: ignore[arg-type]
+
+
+def _fitted(address: Address, data: bytes) -> bytes:
+    """Exactly the bytes of the type; a longer answer is cut only where the rest is padding."""
+    size = size_of(address.type)
+    if size is None or len(data) == size:
+        return data
+    if len(data) > size and not any(data[size:]):
+        return data[:size]
+    raise ProtocolError(
+        f"{address} came with {len(data)} bytes, its type {address.type} has {size}",
+        parameter=str(address),
+        remedy="the drive's firmware may be of another version: compare with its dictionary",
+    )
+
+
+def _found(item: Message) -> Found:
+    parent = item["parent"]
+    behind = "the computer" if parent == 0 else f"station {parent}, port {item['parent_port']}"
+    notes = (f"connected behind {behind}", *item["notes"])
+    return Found(
+        station=item["station"],
+        vendor_id=item["vendor_id"],
+        product_code=item["product_code"],
+        revision=item["revision"],
+        serial=item["serial"],
+        name=item["name"],
+        alias=item["alias"],
+        hardware=item["hardware"],
+        firmware=item["firmware"],
+        state=item["state"],
+        notes=notes,
+    )

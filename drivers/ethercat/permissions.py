@@ -1,0 +1,93 @@
+"""What is missing on a real interface, and the exact commands that grant it.
+
+SOEM opens a raw packet socket (CAP_NET_RAW) and switches the interface to promiscuous mode
+(CAP_NET_ADMIN): both are needed. CAP_SYS_NICE and CAP_IPC_LOCK only make cycles more punctual.
+"""
+
+from __future__ import annotations
+
+import socket
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+_NEEDED = {"CAP_NET_RAW": 13, "CAP_NET_ADMIN": 12}
+_USEFUL = {"CAP_SYS_NICE": 23, "CAP_IPC_LOCK": 14}
+
+
+@dataclass(frozen=True, slots=True)
+class Permissions:
+    """``missing`` prevents EtherCAT, ``advised`` makes it more punctual; both capability names."""
+
+    interface: str
+    exists: bool
+    up: bool
+    missing: tuple[str, ...]
+    advised: tuple[str, ...]
+    commands: tuple[str, ...]
+
+    @property
+    def ready(self) -> bool:
+        """Whether EtherCAT can be opened on this interface."""
+        return self.exists and self.up and not self.missing
+
+    def words(self) -> str:
+        """What is missing, in one sentence for the user."""
+        if not self.exists:
+            return f"there is no network interface {self.interface!r} on this computer"
+        parts = []
+        if self.missing:
+            parts.append(
+                f"{' and '.join(self.missing)} {'is' if len(self.missing) == 1 else 'are'} missing"
+            )
+        if not self.up:
+            parts.append(f"the interface {self.interface} is switched off")
+        return "; ".join(parts) or "everything needed is granted"
+
+
+def check(interface: str, *, status: str | None = None, python: str | None = None) -> Permissions:
+    """Look at the capabilities of this process and at the interface.
+
+    ``status`` is the text of /proc/self/status and ``python`` the interpreter's path, given only
+    by tests.
+    """
+    text = Path("/proc/self/status").read_text("ascii") if status is None else status
+    held = _effective(text)
+    missing = tuple(name for name, bit in _NEEDED.items() if not held >> bit & 1)
+    advised = tuple(name for name, bit in _USEFUL.items() if not held >> bit & 1)
+    exists = interface in {name for _, name in socket.if_nameindex()}
+    up = exists and _is_up(interface)
+    commands = []
+    if missing:
+        names = ",".join(name.lower() for name in (*_NEEDED, *_USEFUL))
+        path = str(Path(sys.executable if python is None else python).resolve())
+        commands.append(f"sudo setcap {names}+ep {path}")
+        caps = ",".join(f"+{name.removeprefix('CAP_').lower()}" for name in (*_NEEDED, *_USEFUL))
+        commands.append(
+            f"sudo setpriv --reuid $USER --init-groups --inh-caps {caps} --ambient-caps {caps}"
+            " servodeck serve"
+        )
+    if exists and not up:
+        commands.append(f"sudo ip link set {interface} up")
+    return Permissions(interface, exists, up, missing, advised, tuple(commands))
+
+
+def _effective(status: str) -> int:
+    for line in status.splitlines():
+        if line.startswith("CapEff:"):
+            return int(line.split()[1], 16)
+    return 0
+
+
+def _is_up(interface: str) -> bool:
+    """IFF_UP by ioctl: /sys shows another network namespace's interfaces."""
+    import fcntl
+    import struct
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        request = struct.pack("16sH14x", interface.encode(), 0)
+        try:
+            answer = fcntl.ioctl(sock, 0x8913, request)  # SIOCGIFFLAGS
+        except OSError:
+            return False
+    return bool(struct.unpack("16sH14x", answer)[1] & 1)

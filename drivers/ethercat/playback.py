@@ -1,0 +1,382 @@
+"""One axis in the cyclic loop: control word, setpoints, expiry and envelope.
+
+Pure: `AxisLoop.step` gets the inputs of a cycle and leaves the outputs of the next one in
+``outputs``. It never sleeps, never raises for what a drive does, and reports through ``report``.
+
+Whatever ends a motion by force (expiry, envelope, halt, invalid data) brakes and then leaves
+Operation enabled. Position and velocity setpoints are ramped down in `STOP_S`; a torque setpoint
+becomes zero with a quick stop, because no torque does not stop an axis that moves.
+"""
+
+from __future__ import annotations
+
+import array
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from drivers import cia402
+from drivers.cia402 import State
+from drivers.errors import NotAllowed
+
+STOP_S = 0.1
+"""From any speed to standstill; shorter than the 200 ms in which a lost setpoint must end."""
+
+_CONTROL, _MODE, _POSITION, _VELOCITY, _TORQUE = 0x6040, 0x6060, 0x607A, 0x60FF, 0x6071
+_OFFSETS = (0x60B0, 0x60B1, 0x60B2)
+_STATUS, _MODE_SHOWN = 0x6041, 0x6061
+_ACTUAL_POSITION, _ACTUAL_VELOCITY, _ACTUAL_TORQUE, _FOLLOWING = 0x6064, 0x606C, 0x6077, 0x60F4
+_MODE_OF = {_POSITION: cia402.Mode.CSP, _VELOCITY: cia402.Mode.CSV, _TORQUE: cia402.Mode.CST}
+_ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
+
+
+class Phase(Enum):
+    """What the setpoints of an axis do."""
+
+    IDLE = "idle"
+    PLAYING = "playing"
+    HOLDING = "holding the last setpoint"
+    BRAKING = "braking"
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """The envelope in raw drive units; None means no limit of that kind."""
+
+    position_min: float | None = None
+    position_max: float | None = None
+    speed_max: float | None = None
+    torque_max: float | None = None
+    following_error_max: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """One value per cycle for one target, and the same for one offset."""
+
+    target: int
+    values: array.array[int]
+    limits: Limits
+    renew_cycles: int
+    longest_step: int
+    """Largest change between two values, found by the server: the loop has no time for it."""
+    offset: int | None = None
+    offset_values: array.array[int] | None = None
+
+
+class AxisLoop:
+    """See the module. ``inputs`` and ``outputs`` name the positions of CiA 402 objects."""
+
+    def __init__(
+        self,
+        station: int,
+        *,
+        inputs: dict[int, int],
+        outputs: dict[int, int],
+        output_count: int,
+        cycle_s: float,
+        report: Callable[[int, str], None],
+    ) -> None:
+        self.station = station
+        self.outputs: list[int] = [0] * output_count
+        self.phase = Phase.IDLE
+        self.state = State.UNKNOWN
+        self.goal: State | None = None
+        self.halted = ""
+        """Why the last motion was ended by force, in words."""
+        self._in = inputs
+        self._out = outputs
+        self._report = report
+        self._stop_cycles = max(round(STOP_S / cycle_s), 1)
+        self._motion: Motion | None = None
+        self._place = 0
+        self._life = 0
+        self._reset = False
+        self._setpoint = 0.0
+        self._speed = 0.0
+        self._brake_step = 0.0
+        self._brake_left = 0
+        self._brake_target = _POSITION
+        self._after_brake = State.READY
+        self._after_quick_stop = State.READY
+        self._was_enabled = False
+
+    # Commands ------------------------------------------------------------------------------
+
+    def drive_to(self, goal: State, mode: int | None) -> None:
+        """Head for a power state; leaving Operation enabled brakes first.
+
+        Raises:
+            NotAllowed: the control word is not in the process data, or the axis is in a fault.
+        """
+        if _CONTROL not in self._out:
+            raise NotAllowed(f"station {self.station}: the control word is not in the cyclic data")
+        if goal is State.OPERATION_ENABLED:
+            if self.state in (State.FAULT, State.FAULT_REACTION):
+                raise NotAllowed(
+                    f"station {self.station} has a fault and cannot be enabled",
+                    remedy="read its active faults, remove the cause and reset the fault",
+                )
+            self.halted = ""
+        if mode is not None and _MODE in self._out:
+            self.outputs[self._out[_MODE]] = mode
+        if (
+            goal is not State.OPERATION_ENABLED
+            and goal is not State.QUICK_STOP_ACTIVE
+            and self.phase is not Phase.IDLE
+        ):
+            self.stop("the axis is being disabled", goal)
+            return
+        self.goal = goal
+
+    def reset_fault(self) -> None:
+        """Reset a fault once; the axis stays disabled."""
+        self._reset = True
+        self.goal = State.SWITCH_ON_DISABLED
+        self.halted = ""
+
+    def play(self, motion: Motion) -> None:
+        """Begin with the first value in the next cycle.
+
+        Raises:
+            NotAllowed: not enabled, something needed is not mapped, or the first value is a jump.
+        """
+        self.check(motion)
+        self._motion = motion
+        self._place = 0
+        self._life = motion.renew_cycles
+        self.phase = Phase.PLAYING
+        self.halted = ""
+
+    def renew(self) -> None:
+        """Extend the life of the setpoints."""
+        if self._motion is not None:
+            self._life = self._motion.renew_cycles
+
+    def stop(self, why: str, goal: State = State.READY) -> None:
+        """Brake now, then head for ``goal``."""
+        if self.phase is Phase.BRAKING:
+            return
+        if self.phase is Phase.IDLE:
+            self.goal = goal if self.goal is State.OPERATION_ENABLED else self.goal
+            return
+        self.halted = why
+        self._report(self.station, why)
+        motion, self._motion = self._motion, None
+        self._clear_offsets()
+        if motion is not None and motion.target == _TORQUE:
+            self._set(_TORQUE, 0)
+            self.phase, self._brake_left = Phase.IDLE, 0
+            self._brake_target = _TORQUE
+            self.goal = State.QUICK_STOP_ACTIVE
+            self._after_quick_stop = goal
+            return
+        self._brake_target = motion.target if motion is not None else _POSITION
+        self.phase = Phase.BRAKING
+        self._brake_left = self._stop_cycles
+        start = self._speed if self._brake_target == _POSITION else self._setpoint
+        self._brake_step = start / self._stop_cycles
+        self._after_brake = goal
+
+    # One cycle -----------------------------------------------------------------------------
+
+    def step(self, values: Sequence[int]) -> None:
+        """Outputs of the next cycle from the inputs of this one, which must be valid."""
+        place = self._in.get(_STATUS)
+        if place is not None:
+            self.state = cia402.decode_state(values[place])
+        enabled = self.state is State.OPERATION_ENABLED
+        if self._was_enabled and not enabled:
+            self._fell_out()
+        self._was_enabled = enabled
+        if self.phase in (Phase.PLAYING, Phase.HOLDING):
+            self._guard(values)
+        self._setpoints(values, enabled=enabled)
+        if _CONTROL in self._out:
+            self._control()
+
+    def blind(self) -> None:
+        """A cycle without trusted inputs: setpoints go on, nothing is concluded from inputs."""
+        if self.phase is not Phase.IDLE:
+            self._advance()
+
+    def _fell_out(self) -> None:
+        if self.goal is State.OPERATION_ENABLED:
+            self.goal = State.SWITCH_ON_DISABLED
+            self._report(self.station, f"the drive left Operation enabled: {self.state.value}")
+            if self.phase is not Phase.IDLE:
+                self.halted = f"the drive left Operation enabled: {self.state.value}"
+        self.phase = Phase.IDLE
+        self._motion = None
+        self._clear_offsets()
+
+    def _guard(self, values: Sequence[int]) -> None:
+        """Envelope and expiry; a violation begins to brake in this very cycle."""
+        assert self._motion is not None
+        self._life -= 1
+        if self._life < 0:
+            self.stop("the setpoints were not renewed in time: the axis is braked and disabled")
+            return
+        limits = self._motion.limits
+        position = self._value(values, _ACTUAL_POSITION)
+        if position is not None:
+            if limits.position_min is not None and position < limits.position_min:
+                self.stop(_beyond("position", position, limits.position_min))
+                return
+            if limits.position_max is not None and position > limits.position_max:
+                self.stop(_beyond("position", position, limits.position_max))
+                return
+        for name, index, limit in (
+            ("speed", _ACTUAL_VELOCITY, limits.speed_max),
+            ("torque", _ACTUAL_TORQUE, limits.torque_max),
+        ):
+            value = self._value(values, index)
+            if limit is not None and value is not None and abs(value) > limit:
+                self.stop(_beyond(name, value, limit))
+                return
+        if limits.following_error_max is not None:
+            error = self._following_error(values)
+            if abs(error) > limits.following_error_max:
+                self.stop(_beyond("following error", error, limits.following_error_max))
+
+    def _following_error(self, values: Sequence[int]) -> float:
+        told = self._value(values, _FOLLOWING)
+        if told is not None:
+            return told
+        actual = self._value(values, _ACTUAL_POSITION)
+        moving = self._motion is not None and self._motion.target == _POSITION
+        return self._setpoint - actual if moving and actual is not None else 0.0
+
+    def _setpoints(self, values: Sequence[int], *, enabled: bool) -> None:
+        if self.phase is Phase.IDLE:
+            if not enabled:
+                # Enabling must never move: the setpoint waits where the axis is.
+                actual = self._value(values, _ACTUAL_POSITION)
+                if actual is not None:
+                    self._set(_POSITION, round(actual))
+                self._set(_VELOCITY, 0)
+                self._set(_TORQUE, 0)
+                self._clear_offsets()
+            self._speed = 0.0
+            return
+        self._advance()
+
+    def _advance(self) -> None:
+        if self.phase is Phase.BRAKING:
+            self._brake()
+            return
+        motion = self._motion
+        if motion is None:
+            return
+        if self._place < len(motion.values):
+            value = motion.values[self._place]
+            self._speed = value - self._setpoint if self._place or motion.target == _POSITION else 0
+            self._setpoint = value
+            self._set(motion.target, value)
+            if motion.offset is not None and motion.offset_values is not None:
+                self._set(motion.offset, motion.offset_values[self._place])
+            self._place += 1
+            if self._place == len(motion.values):
+                self.phase = Phase.HOLDING
+        else:
+            self._speed = 0.0
+
+    def _brake(self) -> None:
+        self._brake_left -= 1
+        if self._brake_target == _POSITION:
+            self._speed -= self._brake_step
+            if self._brake_left > 0:
+                self._setpoint += self._speed
+            self._set(_POSITION, round(self._setpoint))
+        else:
+            self._setpoint = self._setpoint - self._brake_step if self._brake_left > 0 else 0.0
+            self._set(self._brake_target, round(self._setpoint))
+        if self._brake_left <= 0:
+            self.phase = Phase.IDLE
+            self._speed = 0.0
+            self.goal = self._after_brake
+
+    def _control(self) -> None:
+        place = self._out[_CONTROL]
+        if self.goal is None:
+            return
+        if self.state in (State.FAULT, State.FAULT_REACTION) and not self._reset:
+            self.outputs[place] = cia402.DISABLE_VOLTAGE
+            return
+        if self.goal is State.QUICK_STOP_ACTIVE and self.state not in _ALIVE_STATES:
+            self.goal = self._after_quick_stop
+        word = cia402.next_control_word(self.state, self.goal, self.outputs[place])
+        if word is not None:
+            self.outputs[place] = word
+        elif self.state is self.goal:
+            self._reset = False
+
+    # Parts ---------------------------------------------------------------------------------
+
+    def setpoint_now(self, target: int) -> int | None:
+        """The value of a target in the outputs, None where it is not mapped."""
+        return self.outputs[self._out[target]] if target in self._out else None
+
+    def check(self, motion: Motion) -> None:
+        """Raise `NotAllowed` if this motion cannot begin in the next cycle."""
+        where = f"station {self.station}"
+        for index in (motion.target, motion.offset):
+            if index is not None and index not in self._out:
+                raise NotAllowed(
+                    f"{where}: {index:04X}h is not in the cyclic data",
+                    remedy="configure the cyclic data with this target",
+                )
+        if self.state is not State.OPERATION_ENABLED or self.goal is not State.OPERATION_ENABLED:
+            raise NotAllowed(
+                f"{where} is in {self.state.value!r}, a motion needs 'Operation enabled'",
+                remedy=self.halted or "enable the axis first",
+            )
+        for name, index, limit in (
+            ("travel", _ACTUAL_POSITION, motion.limits.position_min),
+            ("travel", _ACTUAL_POSITION, motion.limits.position_max),
+            ("speed", _ACTUAL_VELOCITY, motion.limits.speed_max),
+            ("torque", _ACTUAL_TORQUE, motion.limits.torque_max),
+        ):
+            if limit is not None and index not in self._in:
+                raise NotAllowed(
+                    f"{where}: the {name} limit cannot be watched, {index:04X}h is not mapped",
+                    remedy=f"configure the cyclic data with {index:04X}h",
+                )
+        if self.phase is Phase.BRAKING:
+            raise NotAllowed(f"{where} is braking: {self.halted}", remedy="wait until it stands")
+        if not len(motion.values):
+            raise NotAllowed(f"{where}: a trajectory without values")
+        if motion.target == _POSITION:
+            self._check_jump(motion, where)
+
+    def _check_jump(self, motion: Motion, where: str) -> None:
+        """The first position may be no further away than the longest step that follows."""
+        now = self.setpoint_now(_POSITION)
+        assert now is not None
+        self._setpoint = now
+        first = motion.values[0]
+        longest = max(motion.longest_step, abs(round(self._speed)), 1)
+        if abs(first - now) > longest:
+            raise NotAllowed(
+                f"{where}: the trajectory begins at {first}, the axis is held at {now}",
+                value=first,
+                limit=f"{longest} per cycle",
+                remedy="begin where the axis stands",
+            )
+
+    def _value(self, values: Sequence[int], index: int) -> float | None:
+        place = self._in.get(index)
+        return None if place is None else values[place]
+
+    def _set(self, index: int, value: int) -> None:
+        place = self._out.get(index)
+        if place is not None:
+            self.outputs[place] = value
+
+    def _clear_offsets(self) -> None:
+        for index in _OFFSETS:
+            self._set(index, 0)
+
+
+def _beyond(name: str, value: float, limit: float) -> str:
+    return f"{name} {value:g} is beyond the limit of {limit:g}: the axis is braked and disabled"

@@ -1,0 +1,100 @@
+"""Messages between the server and the EtherCAT host process.
+
+A message is a msgpack map behind its length (4 bytes, little endian). Requests carry ``id`` and
+``op``; replies the same ``id`` with ``result`` or ``error``; ``progress`` may come before the
+reply; ``event`` comes unasked.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any, TypedDict
+
+import msgpack  # type: ignore[import-untyped]
+
+from drivers import errors
+from drivers.errors import DriveError, Rejected
+
+#: A message is a closed set of keys, but its values differ by operation: the boundary is here.
+Message = dict[str, Any]
+
+_LENGTH = struct.Struct("<I")
+MAX_MESSAGE_BYTES = 64 << 20
+HEARTBEAT_S = 0.5
+
+
+class WireError(TypedDict):
+    """A `DriveError` on its way to the server."""
+
+    kind: str
+    message: str
+    parameter: str | None
+    limit: str | None
+    remedy: str | None
+    code: int | None
+
+
+_KINDS: dict[str, type[DriveError]] = {
+    kind.kind: kind
+    for kind in (
+        DriveError, errors.LinkTimeout, errors.LinkLost, errors.ProtocolError,
+        errors.OutOfRange, errors.NotAllowed, errors.Busy,
+    )
+}  # fmt: skip
+
+
+def pack(message: Message) -> bytes:
+    """A message with its length in front."""
+    body: bytes = msgpack.packb(message, use_bin_type=True)
+    return _LENGTH.pack(len(body)) + body
+
+
+class Unpacker:
+    """Collects bytes and gives back whole messages."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+
+    def feed(self, data: bytes) -> list[Message]:
+        """Messages completed by ``data``."""
+        self._buffer += data
+        found: list[Message] = []
+        while len(self._buffer) >= 4:
+            (length,) = _LENGTH.unpack_from(self._buffer)
+            if length > MAX_MESSAGE_BYTES:
+                raise errors.ProtocolError(f"a message of {length} bytes between our processes")
+            if len(self._buffer) < 4 + length:
+                break
+            found.append(msgpack.unpackb(bytes(self._buffer[4 : 4 + length]), raw=False))
+            del self._buffer[: 4 + length]
+        return found
+
+
+def error_to_wire(error: DriveError) -> WireError:
+    """The error as a map."""
+    return WireError(
+        kind=error.kind,
+        message=error.message,
+        parameter=error.parameter,
+        limit=error.limit,
+        remedy=error.remedy,
+        code=error.code if isinstance(error, Rejected) else None,
+    )
+
+
+def error_from_wire(wire: WireError) -> DriveError:
+    """The same error again, of the same class."""
+    if wire["code"] is not None:
+        return Rejected(
+            wire["message"],
+            code=wire["code"],
+            parameter=wire["parameter"],
+            limit=wire["limit"],
+            remedy=wire["remedy"],
+        )
+    return _KINDS.get(wire["kind"], DriveError)(
+        wire["message"],
+        parameter=wire["parameter"],
+        limit=wire["limit"],
+        remedy=wire["remedy"],
+    )

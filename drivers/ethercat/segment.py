@@ -1,0 +1,238 @@
+"""The pysoem Master behind guards.
+
+Every guard answers a crash or a leak that was reproduced with pysoem 1.1.13: interface names
+longer than 15 characters overflow a buffer; ``close()`` on a master that never opened closes
+descriptor 0 and a second one closes a stranger's; a failed open leaks its socket; outputs longer
+than the slave's overwrite memory; the IO map of 4096 bytes is not checked; errors of earlier
+calls stay in a global queue and are raised by later ones.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Sequence
+from pathlib import Path
+
+import pysoem
+
+from drivers.errors import Busy, LinkLost, NotAllowed, ProtocolError
+from drivers.ethercat import permissions
+
+IO_MAP_BYTES = 4096
+MAX_STATIONS = 199
+_NAME_LIMIT = 15
+_FRAME_TIMEOUT_US = 2000
+
+
+class Segment:
+    """One interface with its slaves. Stations count from 1, in the order of the cable."""
+
+    def __init__(self, interface: str) -> None:
+        self.interface = interface
+        self._master: pysoem.Master | None = None
+        self._lock: socket.socket | None = None
+        self._index = 0
+        self.socket_fd: int | None = None
+        self.slaves: Sequence[pysoem.CdefSlave] = ()
+        self.mapped = False
+
+    def open(self) -> None:
+        """Open the interface for us alone.
+
+        Raises:
+            LinkLost: no such interface, switched off, or not permitted; the message says which.
+            Busy: another programme of ours has it.
+        """
+        if self._master is not None:
+            return
+        self._check_interface()
+        self._lock = _lock(self.interface)
+        master = pysoem.Master()
+        before = _sockets()
+        try:
+            master.open(self.interface)
+        except ConnectionError as error:
+            # pysoem leaves the socket of a failed open behind.
+            for descriptor in _sockets() - before:
+                os.close(descriptor)
+            self._unlock()
+            raise LinkLost(
+                f"the interface {self.interface} could not be opened"
+                f" ({permissions.check(self.interface).words()})",
+                remedy="; ".join(permissions.check(self.interface).commands)
+                or "check that the interface is a wired Ethernet one",
+            ) from error
+        new = _sockets() - before
+        self.socket_fd = min(new) if new else None
+        self._index = socket.if_nametoindex(self.interface)
+        self._master = master
+
+    def close(self) -> None:
+        """Close the interface once; calling again does nothing."""
+        master, self._master = self._master, None
+        self.slaves, self.socket_fd, self.mapped = (), None, False
+        if master is not None:
+            master.close()
+        self._unlock()
+
+    def replaced(self) -> bool:
+        """Whether the interface vanished or came back as another since `open`."""
+        try:
+            return socket.if_nametoindex(self.interface) != self._index
+        except OSError:
+            return True
+
+    @property
+    def master(self) -> pysoem.Master:
+        """The open master.
+
+        Raises:
+            LinkLost: it is not open.
+        """
+        if self._master is None:
+            raise LinkLost(f"the interface {self.interface} is not open")
+        return self._master
+
+    def find(self) -> int:
+        """Reset the segment, give every slave its address and ask it for PREOP.
+
+        Returns the number of slaves; 0 when nobody answers.
+
+        Raises:
+            ProtocolError: more slaves than can be handled.
+        """
+        self.mapped = False
+        self.master.manual_state_change = 0
+        count = self.master.config_init(release_gil=True)
+        self.forget_errors()
+        if count == -2 or count > MAX_STATIONS:
+            raise ProtocolError(f"more than {MAX_STATIONS} slaves on one segment")
+        self.slaves = tuple(self.master.slaves) if count > 0 else ()
+        return len(self.slaves)
+
+    def read(self, station: int, register: int, size: int) -> bytes | None:
+        """Read a register of a slave, or None when it does not answer."""
+        try:
+            data: bytes = self.slaves[station - 1]._fprd(register, size, _FRAME_TIMEOUT_US)  # noqa: SLF001 - the only register access pysoem offers
+        except pysoem.WkcError:
+            return None
+        return data
+
+    def write(self, station: int, register: int, data: bytes) -> bool:
+        """Write a register of a slave; False when it does not answer."""
+        try:
+            self.slaves[station - 1]._fpwr(register, data, _FRAME_TIMEOUT_US)  # noqa: SLF001 - as above
+        except pysoem.WkcError:
+            return False
+        return True
+
+    def map(self, expected_bytes: int) -> None:
+        """Build the IO map from what the drives have mapped. States stay as they are.
+
+        ``expected_bytes`` is the sum of all process data, checked before SOEM writes past the
+        end of its buffer.
+
+        Raises:
+            NotAllowed: more process data than the IO map holds.
+            ProtocolError: a drive's mapping could not be read.
+        """
+        if expected_bytes > IO_MAP_BYTES:
+            raise NotAllowed(
+                f"the process data of all drives take {expected_bytes} bytes,"
+                f" {IO_MAP_BYTES} are possible",
+                limit=f"{IO_MAP_BYTES} bytes",
+                remedy="map fewer signals or use fewer drives at a time",
+            )
+        self.forget_errors()
+        self.master.manual_state_change = 1
+        try:
+            self.master.config_map()
+        except pysoem.ConfigMapError as error:
+            self.forget_errors()
+            told = "; ".join(sorted({_mapping_error(item) for item in error.error_list}))
+            raise ProtocolError(f"the process data could not be mapped: {told}") from error
+        self.mapped = True
+
+    def set_output(self, station: int, data: bytes) -> None:
+        """Set the outputs of a slave, with the length that it has."""
+        self._check_mapped()
+        slave = self.slaves[station - 1]
+        size = len(slave.output)
+        if len(data) != size:
+            raise ProtocolError(f"{len(data)} bytes of outputs for {size} of station {station}")
+        slave.output = data
+
+    def sizes(self, station: int) -> tuple[int, int]:
+        """Bytes of outputs and inputs of a slave, once mapped."""
+        self._check_mapped()
+        slave = self.slaves[station - 1]
+        return len(slave.output), len(slave.input)
+
+    def recover(self, station: int) -> bool:
+        """Give a slave that was switched off its address back; False when it is another one."""
+        back = bool(self.slaves[station - 1].recover(2000) > 0)
+        self.forget_errors()
+        return back
+
+    def forget_errors(self) -> None:
+        """Empty SOEM's queue of errors, so that nobody else is blamed for them."""
+        self.master._collect_mailbox_errors()  # noqa: SLF001 - pysoem's only way to empty it
+
+    def _check_mapped(self) -> None:
+        if not self.mapped:
+            raise NotAllowed("there are no process data before they are mapped")
+
+    def _check_interface(self) -> None:
+        if not 0 < len(self.interface.encode()) <= _NAME_LIMIT:
+            raise LinkLost(
+                f"{self.interface!r} cannot be an interface: names have 1 to {_NAME_LIMIT} letters"
+            )
+        report = permissions.check(self.interface)
+        if not report.exists or not report.up:
+            names = ", ".join(name for _, name in socket.if_nameindex())
+            raise LinkLost(
+                report.words(), remedy="; ".join(report.commands) or f"there are: {names}"
+            )
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+
+def _lock(interface: str) -> socket.socket:
+    """An abstract socket: per network namespace like the interface, and gone with its holder."""
+    lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        lock.bind(f"\0servodeck-ethercat-{interface}")
+    except OSError as error:
+        lock.close()
+        raise Busy(
+            f"another servodeck already uses the interface {interface}",
+            remedy="close it first: two masters on one segment disturb each other",
+        ) from error
+    return lock
+
+
+def _sockets() -> set[int]:
+    found = set()
+    for entry in Path("/proc/self/fd").iterdir():
+        try:
+            if str(entry.readlink()).startswith("socket:"):
+                found.add(int(entry.name))
+        except OSError:
+            continue
+    return found
+
+
+def _mapping_error(item: Exception) -> str:
+    if isinstance(item, pysoem.SdoError):
+        return (
+            f"station {item.slave_pos} aborted {item.index:04X}:{item.subindex:02X} ({item.desc})"
+        )
+    if isinstance(item, pysoem.MailboxError):
+        return f"station {item.slave_pos}: {item.desc}"
+    if isinstance(item, pysoem.PacketError):
+        return f"station {item.slave_pos}: {item.desc}"
+    return "an emergency or another unexpected mail came in between"

@@ -1,0 +1,375 @@
+"""`drivers.link.Cyclic` over the host process."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from drivers.cia402 import State
+from drivers.errors import LinkLost, NotAllowed, OutOfRange
+from drivers.ethercat.hostprocess import HostProcess
+from drivers.ethercat.mapping import TARGETS, Entry, Pdo, StationPlan, plan_station
+from drivers.ethercat.protocol import Message
+from drivers.ethercat.ring import VALID, RingReader
+from drivers.link import Address, CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
+from profiles.schema import INTEGER_RANGE, Profile
+
+_ANSWER_S, _CONFIGURE_S, _START_S, _STOP_S = 5.0, 60.0, 25.0, 15.0
+_DRAIN_S = 0.025
+_RENEW_S = 0.05
+WATCHDOG_MS = 50.0
+"""Process-data watchdog in the slaves: with braking well below the 200 ms that are allowed."""
+
+_NUMPY = {
+    "b": "<i1", "B": "<u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "q": "<i8",
+    "Q": "<u8", "f": "<f4",
+}  # fmt: skip
+_OFFSET_OF = {0x607A: 0x60B0, 0x60FF: 0x60B1, 0x6071: 0x60B2}
+
+
+@dataclass
+class _Consumer:
+    deliver: Callable[[ScopeBlock], None]
+    sequence: int = 0
+
+
+class EthercatCyclic:
+    """Synchronous process data of one segment. See `drivers.link.Cyclic`.
+
+    The loop owns the control word: enable and disable with `drive_to`. Setpoints live
+    ``renew_s`` from `play` and from every `renew`; `run` plays and renews while its task lives.
+    """
+
+    def __init__(self, host: HostProcess, profiles: Mapping[int, Profile]) -> None:
+        self._host = host
+        self._profiles = profiles
+        self._plans: tuple[StationPlan, ...] = ()
+        self._cycle_s = 0.001
+        self._watchdog_ms = WATCHDOG_MS
+        self._consumers: list[_Consumer] = []
+        self._draining: asyncio.Task[None] | None = None
+        self._status: Message = {}
+        self._fields: dict[str, tuple[str, int]] = {}
+        self.dc = False
+        self.left_over: tuple[tuple[CyclicSignal, str], ...] = ()
+        """Signals that did not fit, each with the reason in words; poll them."""
+
+    # Cyclic --------------------------------------------------------------------------------
+
+    async def configure(
+        self, inputs: Sequence[CyclicSignal], outputs: Sequence[CyclicSignal], cycle_s: float
+    ) -> tuple[CyclicSignal, ...]:
+        """Map signals and return those that fit; the others are in `left_over`.
+
+        Every drive is reset to PREOP for it, so the exchange must not run.
+
+        Raises:
+            NotAllowed: cycle time, an output that does not fit, or a drive that refuses.
+        """
+        self._check_names([*inputs, *outputs])
+        stations = sorted({signal.station for signal in [*inputs, *outputs]})
+        plans = tuple(
+            plan_station(
+                number,
+                [s for s in inputs if s.station == number],
+                [s for s in outputs if s.station == number],
+                self._profiles.get(number),
+            )
+            for number in stations
+        )
+        for plan in plans:
+            self._check_cycle(plan.station, cycle_s)
+        answer: Message = await self._host.call(
+            {
+                "op": "configure",
+                "cycle_ns": round(cycle_s * 1e9),
+                "dc": True,
+                "watchdog_ms": self._watchdog_ms,
+                "stations": {p.station: {"rx": _wire(p.rx), "tx": _wire(p.tx)} for p in plans},
+            },
+            _CONFIGURE_S,
+        )
+        self._plans, self._cycle_s, self.dc = plans, cycle_s, bool(answer["dc"])
+        self._fields = _fields(plans)
+        self.left_over = tuple(item for plan in plans for item in plan.left_over)
+        return tuple(signal for plan in plans for signal in plan.mapped)
+
+    async def start(self) -> None:
+        """Go to Operational and exchange process data.
+
+        Raises:
+            NotAllowed: a drive refuses; the reason is its AL status code in words.
+        """
+        await self._host.call({"op": "start"}, _START_S)
+        ring = self._host.ring
+        if ring is None:
+            raise LinkLost("the EtherCAT process ended")
+        reader = ring.reader(self._fields)
+        self._draining = asyncio.get_running_loop().create_task(self._drain(reader))
+
+    async def stop(self) -> None:
+        """Brake whatever moves, disable, leave Operational."""
+        try:
+            await self._host.call({"op": "stop"}, _STOP_S)
+        finally:
+            self.shut_down()
+
+    async def play(self, trajectories: Sequence[Trajectory]) -> int:
+        """Begin trajectories together; returns the cycle counter of their first value.
+
+        Raises:
+            OutOfRange: a value does not fit its object or the envelope; nothing moves.
+            NotAllowed: not enabled, not mapped, a limit that cannot be watched, or a jump.
+        """
+        messages = [self._message(trajectory) for trajectory in trajectories]
+        number: int = await self._host.call({"op": "play", "trajectories": messages}, _ANSWER_S)
+        return number
+
+    async def renew(self, station: int) -> None:
+        """Extend the life of the setpoints of ``station`` by its renewal time."""
+        await self._host.call({"op": "renew", "station": station}, _ANSWER_S)
+
+    async def halt(self, station: int | None = None) -> None:
+        """Brake now and leave Operation enabled; setpoints end."""
+        await self._host.call({"op": "halt", "station": station}, _ANSWER_S)
+
+    def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
+        """Deliver samples on the event loop's thread."""
+        entry = _Consumer(consumer)
+        self._consumers.append(entry)
+
+        def unsubscribe() -> None:
+            with contextlib.suppress(ValueError):
+                self._consumers.remove(entry)
+
+        return unsubscribe
+
+    # Beyond the protocol -------------------------------------------------------------------
+
+    @property
+    def running(self) -> bool:
+        """Whether process data are exchanged."""
+        return self._draining is not None and not self._draining.done()
+
+    async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
+        """Head for a power state; the axis brakes before it leaves Operation enabled.
+
+        Returns at once; `axis_state` tells when it is there.
+
+        Raises:
+            NotAllowed: the drive has a fault, or its control word is not mapped.
+        """
+        message = {"op": "drive_to", "station": station, "goal": goal.name, "mode": mode}
+        await self._host.call(message, _ANSWER_S)
+
+    async def reset_fault(self, station: int) -> None:
+        """Reset a fault once; the axis stays disabled."""
+        await self._host.call(
+            {"op": "drive_to", "station": station, "goal": "fault_reset", "mode": None}, _ANSWER_S
+        )
+
+    def axis_state(self, station: int) -> tuple[str, str, str]:
+        """Power state, phase of the setpoints, and why the last motion was ended by force."""
+        told = self._status.get("axes", {}).get(station)
+        return (told["state"], told["phase"], told["halted"]) if told else ("Unknown", "idle", "")
+
+    async def run(self, trajectories: Sequence[Trajectory]) -> int:
+        """Play and renew until all values are out; cancelling brakes the axes.
+
+        Raises:
+            NotAllowed: as `play`; or the loop ended the motion, with the reason.
+        """
+        number = await self.play(trajectories)
+        stations = {trajectory.station for trajectory in trajectories}
+        longest = max(len(trajectory.values) for trajectory in trajectories)
+        deadline = asyncio.get_running_loop().time() + longest * self._cycle_s
+        try:
+            while asyncio.get_running_loop().time() < deadline:
+                await asyncio.sleep(_RENEW_S)
+                for station in stations:
+                    await self.renew(station)
+                    if reason := self.axis_state(station)[2]:
+                        raise NotAllowed(f"station {station}: {reason}")
+        except BaseException:
+            for station in stations:
+                with contextlib.suppress(LinkLost):
+                    await asyncio.shield(self.halt(station))
+            raise
+        return number
+
+    def update(self, status: Message) -> None:
+        """Newest figures of the loop, from the host."""
+        self._status = status
+
+    def host_gone(self) -> None:
+        """The host ended: so did the exchange."""
+        self.shut_down()
+
+    def shut_down(self) -> None:
+        """Stop delivering samples."""
+        if self._draining is not None:
+            self._draining.cancel()
+            self._draining = None
+        self._status = {}
+
+    # Parts ---------------------------------------------------------------------------------
+
+    def _check_names(self, signals: Sequence[CyclicSignal]) -> None:
+        names = [signal.channel for signal in signals]
+        if len(set(names)) != len(names):
+            raise NotAllowed("two signals have the same channel name")
+
+    def _check_cycle(self, station: int, cycle_s: float) -> None:
+        profile = self._profiles.get(station)
+        spec = profile.pdo if profile is not None else None
+        cycle_us = cycle_s * 1e6
+        low = spec.cycle_min_us if spec is not None else None
+        high = spec.cycle_max_us if spec is not None else None
+        if (low is not None and cycle_us < low) or (high is not None and cycle_us > high):
+            raise NotAllowed(
+                f"station {station} takes cycles of {low} to {high} µs, not {cycle_us:g} µs",
+                value=cycle_us,
+                limit=f"{low}…{high} µs",
+                remedy="choose another cycle time",
+            )
+
+    def _message(self, trajectory: Trajectory) -> Message:
+        if trajectory.target.index not in TARGETS:
+            raise NotAllowed(f"{trajectory.target} is not a setpoint for cyclic motion")
+        _check_type(trajectory.target, trajectory.values)
+        limits = trajectory.envelope
+        _check_envelope(trajectory)
+        message: Message = {
+            "station": trajectory.station,
+            "target": trajectory.target.index,
+            "values": np.ascontiguousarray(trajectory.values, np.int64).tobytes(),
+            "limits": asdict(limits),
+            "renew_s": trajectory.renew_s,
+            "longest_step": int(np.max(np.abs(np.diff(trajectory.values)), initial=0)),
+            "offset": None,
+            "offset_values": None,
+        }
+        if trajectory.offset_target is not None and trajectory.offset_values is not None:
+            _check_type(trajectory.offset_target, trajectory.offset_values)
+            if len(trajectory.offset_values) != len(trajectory.values):
+                raise OutOfRange("offsets and values of a trajectory differ in number")
+            message["offset"] = trajectory.offset_target.index
+            message["offset_values"] = np.ascontiguousarray(
+                trajectory.offset_values, np.int64
+            ).tobytes()
+        return message
+
+    async def _drain(self, reader: RingReader) -> None:
+        names = tuple(self._fields)
+        dropped = 0
+        expected = -1
+        try:
+            while True:
+                await asyncio.sleep(_DRAIN_S)
+                taken, lost = reader.drain()
+                dropped += lost
+                for part in _contiguous(taken):
+                    first = int(part["cycle"][0])
+                    if expected >= 0 and not lost:
+                        dropped += max(first - expected, 0)
+                    self._deliver(names, part, dropped)
+                    expected, dropped, lost = int(part["cycle"][-1]) + 1, 0, 0
+        finally:
+            reader.release()
+
+    def _deliver(self, names: tuple[str, ...], part: npt.NDArray[np.void], dropped: int) -> None:
+        samples = np.empty((len(part), len(names)), np.float64)
+        for column, name in enumerate(names):
+            samples[:, column] = part[name]
+        valid = (part["flags"] & VALID).astype(bool)
+        for consumer in tuple(self._consumers):
+            consumer.deliver(
+                ScopeBlock(
+                    sequence=consumer.sequence,
+                    t0_s=float(part["time_ns"][0]) / 1e9,
+                    dt_s=self._cycle_s,
+                    channels=names,
+                    samples=samples,
+                    dropped=dropped,
+                    valid=valid,
+                )
+            )
+            consumer.sequence += 1
+
+
+def _contiguous(taken: npt.NDArray[np.void]) -> list[npt.NDArray[np.void]]:
+    """Runs without a gap in the cycle counter."""
+    if not len(taken):
+        return []
+    breaks = np.flatnonzero(np.diff(taken["cycle"].astype(np.int64)) != 1) + 1
+    return list(np.split(taken, breaks))
+
+
+def _wire(pdo: Pdo) -> Message:
+    entries = [[e.index, e.subindex, e.size, e.code] for e in pdo.entries]
+    return {"index": pdo.index, "entries": entries, "write": pdo.write}
+
+
+def _fields(plans: Sequence[StationPlan]) -> dict[str, tuple[str, int]]:
+    """Channel name to numpy type and offset in a sample: outputs, then inputs, per station."""
+    fields: dict[str, tuple[str, int]] = {}
+    start = 0
+    for plan in plans:
+        names = {(s.address.index, s.address.subindex): s.channel for s in plan.mapped}
+        for pdo in (plan.rx, plan.tx):
+            start = _add_fields(fields, names, pdo.entries, start)
+    return fields
+
+
+def _add_fields(
+    fields: dict[str, tuple[str, int]],
+    names: Mapping[tuple[int | None, int], str],
+    entries: Sequence[Entry],
+    start: int,
+) -> int:
+    for entry in entries:
+        name = names.get((entry.index, entry.subindex))
+        if name is not None and entry.code in _NUMPY:
+            fields[name] = (_NUMPY[entry.code], start)
+        start += entry.size
+    return start
+
+
+def _check_type(address: Address, values: npt.NDArray[np.int64]) -> None:
+    low, high = INTEGER_RANGE[address.type]
+    if len(values) and not (low <= int(values.min()) and int(values.max()) <= high):
+        raise OutOfRange(
+            f"the trajectory goes from {values.min()} to {values.max()}, {address} holds"
+            f" {low} to {high}",
+            parameter=str(address),
+            limit=f"{low}…{high}",
+        )
+
+
+def _check_envelope(trajectory: Trajectory) -> None:
+    """What can be known before anything moves: positions inside the travel, torques inside."""
+    kind = TARGETS[trajectory.target.index or 0]
+    values, limits = trajectory.values, trajectory.envelope
+    low: float | None = None
+    high: float | None = None
+    if kind == "position":
+        low, high = limits.position_min, limits.position_max
+    elif kind == "velocity" and limits.speed_max is not None:
+        low, high = -limits.speed_max, limits.speed_max
+    elif kind == "torque" and limits.torque_max is not None:
+        low, high = -limits.torque_max, limits.torque_max
+    if not len(values):
+        raise OutOfRange("a trajectory without values")
+    if (low is not None and values.min() < low) or (high is not None and values.max() > high):
+        raise OutOfRange(
+            f"the {kind} setpoints go from {values.min()} to {values.max()}, the envelope allows"
+            f" {low} to {high}",
+            parameter=str(trajectory.target),
+            limit=f"{low}…{high}",
+            remedy="shorten the move or widen the envelope",
+        )

@@ -1,0 +1,239 @@
+"""Bringing a slave from PREOP to process data, and back there after a power cycle.
+
+Transactions of steps; no I/O. Sources: ETG.1000.6 clause 5.6.7 (PDO assignment), ETG.1020
+clause 22 (sync parameters), ETG.1000.4 clauses 6.3 (watchdog), 6.7 (sync managers) and 6.8 (DC).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from drivers.errors import DriveError, NotAllowed, ProtocolError, Rejected
+from drivers.ethercat import coe
+from drivers.ethercat.al_status import AlState
+from drivers.ethercat.mailbox import Read, Steps, Write
+from drivers.ethercat.mapping import Entry, Pdo
+from drivers.ethercat.station import Station, change_state
+
+FMMU, SYNC_MANAGERS = 0x600, 0x800
+WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x400, 0x420
+_SM2_CONTROL, _SM2_ACTIVATE, _SM_WATCHDOG = 0x814, 0x816, 0x40
+_DC_SYSTEM_TIME, _DC_OFFSET, _DC_DELAY = 0x910, 0x920, 0x928
+_DC_ACTIVATE, _DC_START, _DC_CYCLE = 0x981, 0x990, 0x9A0
+_ASSIGN = {"rx": 0x1C12, "tx": 0x1C13}
+_SETPOINTS = {0x6040, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2}
+_SYNC_LEAD_NS = 100_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class StationSetup:
+    """Process data of one station as the server chose them."""
+
+    rx: Pdo
+    tx: Pdo
+    cycle_ns: int
+    dc: bool
+    watchdog_ms: float
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Registers of a slave that is set up, to set it up again after a power cycle."""
+
+    fmmu: bytes
+    sync_managers: bytes
+    dc_delay: bytes
+
+
+def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
+    """Write mapping, assignment, cycle time and synchronisation of a slave in PREOP.
+
+    Raises:
+        NotAllowed: the drive refuses the mapping; the message says which object and why.
+    """
+    for direction, pdo in (("rx", setup.rx), ("tx", setup.tx)):
+        try:
+            yield from _write_pdo(station, _ASSIGN[direction], pdo)
+        except Rejected as error:
+            raise NotAllowed(
+                f"station {station.number} does not take these process data: {error.message}",
+                parameter=error.parameter,
+                remedy=error.remedy,
+            ) from error
+    value, exponent = interpolation_period(setup.cycle_ns)
+    for index, sub, data in (
+        (0x60C2, 1, struct.pack("<B", value)),
+        (0x60C2, 2, struct.pack("<b", exponent)),
+        (0x1C32, 1, struct.pack("<H", 2 if setup.dc else 1)),
+        (0x1C33, 1, struct.pack("<H", 2 if setup.dc else 0x22)),
+        (0x1C32, 2, struct.pack("<I", setup.cycle_ns)),
+        (0x1C33, 2, struct.pack("<I", setup.cycle_ns)),
+    ):
+        try:
+            yield from coe.download(station.box, index, sub, data)
+        except Rejected:
+            # Many drives have these read-only or not at all and follow SYNC0 by themselves.
+            continue
+
+
+def _write_pdo(station: Station, assign: int, pdo: Pdo) -> Steps[None]:
+    box = station.box
+    yield from coe.download(box, assign, 0, b"\0")
+    if pdo.write and pdo.entries:
+        yield from coe.download(box, pdo.index, 0, b"\0")
+        for number, entry in enumerate(pdo.entries, start=1):
+            yield from coe.download(box, pdo.index, number, struct.pack("<I", entry.word))
+        yield from coe.download(box, pdo.index, 0, bytes([len(pdo.entries)]))
+    if pdo.entries:
+        yield from coe.download(box, assign, 1, struct.pack("<H", pdo.index))
+        yield from coe.download(box, assign, 0, b"\x01")
+
+
+def interpolation_period(cycle_ns: int) -> tuple[int, int]:
+    """Value and power of ten for 60C2h (CiA 402-2 clause 12.5): value × 10^exponent seconds."""
+    for exponent in (-3, -4, -5, -6):
+        unit_ns = 10 ** (9 + exponent)
+        if cycle_ns % unit_ns == 0 and cycle_ns // unit_ns <= 255:
+            return cycle_ns // unit_ns, exponent
+    raise NotAllowed(f"a cycle of {cycle_ns / 1000:g} µs cannot be told to the drive")
+
+
+def assigned_bytes(station: Station) -> Steps[int]:
+    """Bytes of all process data that a slave has mapped by itself."""
+    total = 0
+    for assign in _ASSIGN.values():
+        bits = 0
+        for pdo in (yield from _read_list(station, assign, 2)):
+            for word in (yield from _read_list(station, pdo, 4)):
+                bits += word & 0xFF
+        total += (bits + 7) // 8
+    return total
+
+
+def _read_list(station: Station, index: int, size: int) -> Steps[list[int]]:
+    try:
+        count = (yield from coe.upload(station.box, index, 0))[0]
+        found = []
+        for sub in range(1, count + 1):
+            data = yield from coe.upload(station.box, index, sub)
+            found.append(int.from_bytes(data[:size], "little"))
+    except Rejected:
+        return []
+    return found
+
+
+def initial_outputs(station: Station, entries: Sequence[Entry]) -> Steps[list[int]]:
+    """What the mapped objects hold now, so that the first cycle changes nothing.
+
+    A mapped torque limit or mode must not become zero because it entered the process data.
+    Setpoints start at zero; the loop lets the position follow the axis until it is enabled.
+    """
+    values = []
+    for entry in entries:
+        if entry.code == "x":
+            continue
+        value = 0
+        if entry.index not in _SETPOINTS:
+            try:
+                data = yield from coe.upload(station.box, entry.index, entry.subindex)
+                (value,) = struct.unpack("<" + entry.code, data)
+            except (Rejected, struct.error):
+                station.notes.append(
+                    f"{entry.index:04X}:{entry.subindex:02X} cannot be read and starts at 0"
+                )
+        values.append(value)
+    return values
+
+
+def arm_watchdog(station: Station, milliseconds: float) -> Steps[None]:
+    """Set the process-data watchdog of the slave, switch it on for SM2, and read both back.
+
+    Raises:
+        NotAllowed: the slave does not take it. No axis may then be moved over this bus, because
+            nothing would stop it when the computer dies.
+    """
+    divider = yield Read(WATCHDOG_DIVIDER, 2)
+    if divider is None:
+        raise ProtocolError(f"station {station.number} does not answer for its watchdog")
+    # ETG.1000.4 clause 6.3: unit is 40 ns times (divider + 2).
+    unit_ns = 40 * (int.from_bytes(divider, "little") + 2)
+    ticks = round(milliseconds * 1e6 / unit_ns)
+    if not 0 < ticks <= 0xFFFF:
+        raise NotAllowed(f"a watchdog of {milliseconds:g} ms does not fit station {station.number}")
+    yield Write(WATCHDOG_TIME, struct.pack("<H", ticks))
+    told = yield Read(WATCHDOG_TIME, 2)
+    control = yield Read(_SM2_CONTROL, 1)
+    if control is not None and not control[0] & _SM_WATCHDOG:
+        yield Write(_SM2_ACTIVATE, b"\0")
+        yield Write(_SM2_CONTROL, bytes([control[0] | _SM_WATCHDOG]))
+        yield Write(_SM2_ACTIVATE, b"\x01")
+        control = yield Read(_SM2_CONTROL, 1)
+    if told != struct.pack("<H", ticks) or control is None or not control[0] & _SM_WATCHDOG:
+        raise NotAllowed(
+            f"station {station.number} does not take its process-data watchdog",
+            remedy="cyclic motion is refused: nothing would stop the axis if the computer died",
+        )
+
+
+def take_snapshot() -> Steps[Snapshot]:
+    """Registers that a power cycle clears."""
+    fmmu = yield Read(FMMU, 48)
+    managers = yield Read(SYNC_MANAGERS, 32)
+    delay = yield Read(_DC_DELAY, 4)
+    if fmmu is None or managers is None:
+        raise ProtocolError("the slave stopped answering while it was being set up")
+    return Snapshot(fmmu, managers, delay or bytes(4))
+
+
+def restore_mailbox(station: Station, managers: bytes, clock: Callable[[], float]) -> Steps[None]:
+    """From INIT to PREOP with the mailboxes as before."""
+    yield from change_state(station, AlState.INIT, clock)
+    for number in (0, 1):
+        yield Write(SYNC_MANAGERS + 8 * number, managers[8 * number : 8 * number + 8])
+    yield from change_state(station, AlState.PREOP, clock)
+    station.box.repeat = 0
+    station.box.unsettled = False
+
+
+def restore(
+    station: Station,
+    setup: StationSetup,
+    snapshot: Snapshot,
+    dc_time: Callable[[], int],
+    clock: Callable[[], float],
+) -> Steps[None]:
+    """From whatever state back to SAFEOP with all that a power cycle cleared.
+
+    Raises:
+        DriveError: the slave does not follow; the reason in words.
+    """
+    yield from restore_mailbox(station, snapshot.sync_managers, clock)
+    yield from write_mapping(station, setup)
+    for number in (2, 3):
+        part = snapshot.sync_managers[8 * number : 8 * number + 8]
+        yield Write(SYNC_MANAGERS + 8 * number, part)
+    yield Write(FMMU, snapshot.fmmu)
+    yield from arm_watchdog(station, setup.watchdog_ms)
+    if setup.dc:
+        yield from _restore_clock(setup, snapshot, dc_time)
+    yield from change_state(station, AlState.SAFEOP, clock)
+
+
+def _restore_clock(
+    setup: StationSetup, snapshot: Snapshot, dc_time: Callable[[], int]
+) -> Steps[None]:
+    """Shift the restarted clock to the reference clock; the cyclic frames do the rest."""
+    yield Write(_DC_ACTIVATE, b"\0")
+    yield Write(_DC_DELAY, snapshot.dc_delay)
+    offset = yield Read(_DC_OFFSET, 8)
+    here = yield Read(_DC_SYSTEM_TIME, 8)
+    if offset is None or here is None:
+        raise DriveError("the slave stopped answering while its clock was set")
+    shifted = struct.unpack("<q", offset)[0] + dc_time() - struct.unpack("<q", here)[0]
+    yield Write(_DC_OFFSET, struct.pack("<q", shifted))
+    start = (dc_time() + _SYNC_LEAD_NS) // setup.cycle_ns * setup.cycle_ns
+    yield Write(_DC_CYCLE, struct.pack("<I", setup.cycle_ns))
+    yield Write(_DC_START, struct.pack("<q", start))
+    yield Write(_DC_ACTIVATE, b"\x03")

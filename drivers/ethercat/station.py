@@ -1,0 +1,280 @@
+"""What is known of one slave, and the transactions with it."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError, Rejected
+from drivers.ethercat import coe, esc
+from drivers.ethercat.al_status import ERROR_BIT, AlState, al_status_text, state_name
+from drivers.ethercat.mailbox import Mailbox, Pause, Read, Steps, Write
+
+AL_CONTROL, AL_STATUS = 0x120, 0x130
+_NO_COMPLETE_ACCESS = {0x05040001, 0x06010000, 0x06010004}
+
+#: ETG.1020 clause 5.3.7.2: how long a slave may take for each state.
+STATE_TIMEOUT_S = {
+    AlState.INIT: 5.0, AlState.PREOP: 3.0, AlState.BOOT: 3.0, AlState.SAFEOP: 10.0,
+    AlState.OP: 10.0,
+}  # fmt: skip
+
+Item = tuple[int, int, int | None]
+"""Index, subindex and length in bytes (None for text)."""
+
+
+@dataclass
+class Station:
+    """One slave, counted from 1 in the order of the cable."""
+
+    number: int
+    vendor_id: int = 0
+    product_code: int = 0
+    revision: int = 0
+    name: str = ""
+    serial: int | None = None
+    alias: int = 0
+    hardware: str = ""
+    firmware: str = ""
+    mailbox: Mailbox | None = None
+    distributed_clock: bool = False
+    al_state: int = 0
+    al_code: int = 0
+    lost: bool = False
+    complete_access: bool = True
+    single_only: set[int] = field(default_factory=set)
+    """Objects whose complete access was not certain."""
+    notes: list[str] = field(default_factory=list)
+    ports: esc.PortCounters | None = None
+
+    @property
+    def box(self) -> Mailbox:
+        """The mailbox.
+
+        Raises:
+            NotAllowed: a device without one.
+        """
+        if self.mailbox is None:
+            raise NotAllowed(f"station {self.number} ({self.name}) has no mailbox: no parameters")
+        return self.mailbox
+
+
+def al_status(station: Station) -> Steps[bool]:
+    """Read the AL state and code into ``station``; False when it does not answer."""
+    data = yield Read(AL_STATUS, 6)
+    if data is None:
+        return False
+    station.al_state = data[0] & 0x1F
+    station.al_code = int.from_bytes(data[4:6], "little")
+    return True
+
+
+def change_state(
+    station: Station, target: AlState, clock: Callable[[], float], timeout_s: float | None = None
+) -> Steps[None]:
+    """Drive the slave to ``target``, acknowledging an error first.
+
+    Raises:
+        NotAllowed: the slave refused; the reason is its AL status code in words.
+        LinkTimeout: it did not get there in the time of ETG.1020.
+        LinkLost: it does not answer.
+    """
+    limit_s = STATE_TIMEOUT_S[target] if timeout_s is None else timeout_s
+    deadline = clock() + limit_s
+    if not (yield from _answers(station)):
+        raise _gone(station)
+    if station.al_state & ERROR_BIT:
+        acknowledged = station.al_state & 0x0F | ERROR_BIT
+        yield Write(AL_CONTROL, struct.pack("<H", acknowledged))
+        while (yield from _answers(station)) and station.al_state & ERROR_BIT:
+            if clock() > deadline:
+                raise _refused(station, target)
+            yield Pause(0.001)
+    yield Write(AL_CONTROL, struct.pack("<H", target))
+    pause_s = 0.0005
+    silent = 0
+    while True:
+        silent = 0 if (yield from al_status(station)) else silent + 1
+        if silent >= 10:
+            raise _gone(station)
+        if not silent and station.al_state == target:
+            return
+        if not silent and station.al_state & ERROR_BIT:
+            raise _refused(station, target)
+        if clock() > deadline:
+            raise LinkTimeout(
+                f"station {station.number} is still in {state_name(station.al_state)} after"
+                f" {limit_s:g} s, {target.name} was requested",
+                remedy="the drive may still be starting: try again",
+            )
+        yield Pause(pause_s)
+        pause_s = min(pause_s * 2, 0.01)
+
+
+def _answers(station: Station) -> Steps[bool]:
+    for _ in range(5):
+        if (yield from al_status(station)):
+            return True
+    return False
+
+
+def _gone(station: Station) -> LinkLost:
+    return LinkLost(
+        f"station {station.number} does not answer",
+        remedy="check the drive's supply and the cable before it; it is taken up again by itself",
+    )
+
+
+def _refused(station: Station, target: AlState) -> NotAllowed:
+    known = al_status_text(station.al_code)
+    return NotAllowed(
+        f"station {station.number} refuses {target.name} and is in"
+        f" {state_name(station.al_state)}: {known.text} (AL status {station.al_code:#06x})",
+        limit=f"AL status {station.al_code:#06x}",
+        remedy=known.remedy or None,
+    )
+
+
+def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
+    """Wait for PREOP, then fill identity, alias, ports and mailbox-told names.
+
+    What a slave does not have stays empty; a slave that refuses PREOP keeps a note in words.
+    """
+    alias = yield Read(0x12, 2)
+    station.alias = int.from_bytes(alias or b"\0\0", "little")
+    features = yield Read(0x08, 2)
+    station.distributed_clock = bool(features and features[0] & 0x04)
+    yield from read_ports(station)
+    if station.mailbox is None:
+        yield from al_status(station)
+        station.notes.append("no mailbox: only process data")
+        return
+    try:
+        yield from change_state(station, AlState.PREOP, clock)
+        serial = yield from _try_read(station, 0x1018, 4)
+        if serial is not None and len(serial) == 4:
+            station.serial = int.from_bytes(serial, "little") or station.serial
+        for key, index in (("name", 0x1008), ("hardware", 0x1009), ("firmware", 0x100A)):
+            text = yield from _try_read(station, index, 0)
+            if text is not None:
+                told = text.split(b"\0", 1)[0].decode("utf-8", "replace").strip()
+                setattr(station, key, told or getattr(station, key))
+        yield from _compare_identity(station)
+    except DriveError as error:
+        station.notes.append(error.message)
+
+
+def _compare_identity(station: Station) -> Steps[None]:
+    """1018h and the SII should agree; where they do not, the user is told."""
+    for sub, label, ours in (
+        (1, "vendor", station.vendor_id),
+        (2, "product code", station.product_code),
+        (3, "revision", station.revision),
+    ):
+        data = yield from _try_read(station, 0x1018, sub)
+        told = None if data is None else int.from_bytes(data, "little")
+        if told is not None and told != ours:
+            station.notes.append(
+                f"{label} is {told:#x} in 1018h but {ours:#x} in the EEPROM: "
+                "the EEPROM may be of another firmware"
+            )
+
+
+def _try_read(station: Station, index: int, subindex: int) -> Steps[bytes | None]:
+    try:
+        return (yield from coe.upload(station.box, index, subindex))
+    except (Rejected, ProtocolError):
+        return None
+
+
+def read_ports(station: Station) -> Steps[None]:
+    """Read link state and error counters of the four ports."""
+    status = yield Read(esc.DL_STATUS, 2)
+    counters = yield Read(esc.ERROR_COUNTERS, esc.ERROR_COUNTERS_SIZE)
+    if status is not None:
+        station.ports = esc.decode_ports(station.number, status, counters)
+
+
+def read_items(
+    station: Station, items: Sequence[Item], on_progress: Callable[[int], None]
+) -> Steps[list[bytes | DriveError]]:
+    """Read many entries; whole objects at once where that is possible and certain.
+
+    One failure does not spoil the others, except that a drive which does not answer at all is
+    not asked for every single entry.
+    """
+    results: dict[Item, bytes | DriveError] = {}
+    groups: dict[int, list[Item]] = {}
+    for item in items:
+        groups.setdefault(item[0], []).append(item)
+    dead: DriveError | None = None
+    for index, members in groups.items():
+        if dead is None and (sizes := _sizes_of_whole(station, index, members)):
+            whole = yield from _read_whole(station, index, sizes)
+            results.update({item: whole[item[1]] for item in members if item[1] in whole})
+        for item in members:
+            if item in results:
+                continue
+            if dead is not None:
+                results[item] = dead
+                continue
+            try:
+                results[item] = yield from coe.upload(station.box, index, item[1])
+            except DriveError as error:
+                results[item] = error
+                if isinstance(error, LinkLost | LinkTimeout):
+                    dead = error
+        on_progress(len(results))
+    return [results[item] for item in items]
+
+
+def _sizes_of_whole(station: Station, index: int, members: Sequence[Item]) -> list[int]:
+    """Lengths of subindices 1…n if ``members`` are all of them and reading at once is worth it."""
+    if not station.complete_access or index in station.single_only:
+        return []
+    sizes = {sub: size for _, sub, size in members if sub}
+    if len(sizes) < 2 or set(sizes) != set(range(1, len(sizes) + 1)):
+        return []
+    found = [size for _, size in sorted(sizes.items()) if size is not None]
+    return found if len(found) == len(sizes) else []
+
+
+def _read_whole(station: Station, index: int, sizes: list[int]) -> Steps[dict[int, bytes]]:
+    """Subindex to bytes, or nothing where the drive or its layout do not allow it."""
+    try:
+        data = yield from coe.upload(station.box, index, 0, complete=True)
+    except Rejected as error:
+        station.single_only.add(index)
+        if error.code in _NO_COMPLETE_ACCESS and len(station.single_only) >= 3:
+            station.complete_access = False
+        return {}
+    except DriveError:
+        station.single_only.add(index)
+        return {}
+    parts = coe.split_complete(data, sizes)
+    if parts is None:
+        station.single_only.add(index)
+        return {}
+    return {0: data[:1]} | dict(enumerate(parts, start=1))
+
+
+def enumerate_objects(
+    station: Station, on_progress: Callable[[int, int], None]
+) -> Steps[list[coe.EntryDescription | coe.ObjectInfo]]:
+    """Every object and entry that the drive's own dictionary tells of."""
+    indices = yield from coe.list_objects(station.box)
+    found: list[coe.EntryDescription | coe.ObjectInfo] = []
+    for number, index in enumerate(indices):
+        on_progress(number, len(indices))
+        try:
+            info = yield from coe.describe_object(station.box, index)
+        except Rejected:
+            continue
+        found.append(info)
+        for sub in range(info.max_subindex + 1):
+            try:
+                found.append((yield from coe.describe_entry(station.box, index, sub)))
+            except Rejected:
+                continue
+    return found
