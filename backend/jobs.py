@@ -114,6 +114,7 @@ class JobRunner:
         )
         self._jobs[job.id] = job
         job.task = asyncio.create_task(self._run(job, work), name=job.id)
+        job.task.add_done_callback(lambda _task: self._settle(job))
         self._changed(job)
         self._drop_old()
         return job
@@ -142,6 +143,12 @@ class JobRunner:
             job.state, job.error = "failed", error
         finally:
             job.ended = time.time()
+            self._changed(job)
+
+    def _settle(self, job: Job) -> None:
+        """A task that was cancelled before its first step never came into `_run`."""
+        if _runs(job):
+            job.state, job.ended = "cancelled", time.time()
             self._changed(job)
 
     def _tell(self, job: Job) -> None:

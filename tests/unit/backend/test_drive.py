@@ -1,0 +1,116 @@
+"""Reads and writes of a drive: what is checked, what is sent, what is believed afterwards."""
+
+from __future__ import annotations
+
+import pytest
+
+from backend.drive import Drive
+from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, Rejected
+from tests.support.memory_link import MemoryLink
+
+
+async def test_value_is_in_engineering_units(drive: Drive) -> None:
+    reading = await drive.read("2005:03")
+    assert (reading.raw, reading.value) == (400, 40.0)
+
+
+async def test_write_returns_what_the_drive_has(drive: Drive, link: MemoryLink) -> None:
+    link.loses_writes = True  # a drive that takes the telegram and keeps its value
+    reading = await drive.write("2005:03", 500)
+    assert link.written == [((0x2005, 3), (500).to_bytes(2, "little"))]
+    assert reading.raw == 400
+
+
+async def test_write_in_engineering_units(drive: Drive, link: MemoryLink) -> None:
+    await drive.write("2005:03", 123.4, raw=False)
+    assert link.objects[0x2005, 3] == (1234).to_bytes(2, "little")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "error", "words"),
+    [
+        ("6041:00", 1, NotAllowed, ["X axis", "6041:00", "read-only"]),
+        ("2005:03", 9, OutOfRange, ["X axis", "2005:03", "0.9 Hz", "1.0 Hz", "500.0 Hz"]),
+        ("2005:03", 5001, OutOfRange, ["500.1 Hz"]),
+        ("2005:10", 2, OutOfRange, ["0 (manual), 1 (table)"]),
+        ("2005:10", 1.5, OutOfRange, ["whole number"]),
+        ("2005:10", "fast", OutOfRange, ["not a UINT16"]),
+        ("2100:00", 40000, OutOfRange, ["INT16"]),
+        ("PA_38", 1, NotAllowed, ["only over Modbus"]),
+        ("9999:00", 1, NotAllowed, ["no parameter 9999:00"]),
+    ],
+)
+async def test_bad_values_never_reach_the_bus(
+    drive: Drive, link: MemoryLink, key: str, value: float | str, error: type, words: list[str]
+) -> None:
+    with pytest.raises(error) as caught:
+        await drive.write(key, value)
+    assert not link.written
+    for word in words:
+        assert word in str(caught.value)
+
+
+async def test_set_at_stop_is_refused_while_enabled(drive: Drive, link: MemoryLink) -> None:
+    link.objects[0x6041, 0] = b"\x37\x02"  # Operation enabled
+    with pytest.raises(NotAllowed, match="while the motor is not enabled"):
+        await drive.write("2100:00", 5)
+    assert not link.written
+
+
+async def test_lost_answer_of_a_write_that_acted_is_no_error(
+    drive: Drive, link: MemoryLink
+) -> None:
+    link.write_errors = [LinkTimeout("no answer")]
+    reading = await drive.write("2005:03", 600)
+    assert reading.raw == 600
+    assert len(link.written) == 1, "a write is never repeated"
+
+
+async def test_lost_write_is_an_error_and_not_repeated(drive: Drive, link: MemoryLink) -> None:
+    link.loses_writes = True
+    link.write_errors = [LinkTimeout("no answer")]
+    with pytest.raises(LinkTimeout, match="X axis: 2005:03 Speed bandwidth"):
+        await drive.write("2005:03", 600)
+    assert len(link.written) == 1
+
+
+async def test_unsaved_and_pending_marks(drive: Drive) -> None:
+    await drive.write("2005:03", 500)
+    assert drive.unsaved == {"2005:03"}
+    assert drive.pending == {"2005:03": "write_settings"}
+    await drive.write("2005:03", 400)
+    assert drive.unsaved == frozenset(), "back at what the memory holds"
+    await drive.write("2005:03", 500)
+    drive.mark_saved()
+    drive.mark_applied("write_settings")
+    assert not drive.unsaved
+    assert not drive.pending
+
+
+async def test_commands_are_never_unsaved(drive: Drive) -> None:
+    await drive.write("6040:00", 6)
+    await drive.write("200D:01", 0x65766173)
+    assert not drive.unsaved
+
+
+async def test_one_failure_does_not_spoil_a_batch(drive: Drive, link: MemoryLink) -> None:
+    link.read_errors[0x2005, 0x10] = Rejected("refused", code=0x06010001)
+    readings = await drive.read_many(["2005:03", "2005:10", "PA_38", "2105:00"])
+    assert readings["2005:03"].raw == 400
+    assert readings["2005:10"].error == "refused"
+    assert "Modbus" in readings["PA_38"].error
+    assert readings["2105:00"].raw == 1
+
+
+async def test_wrong_length_from_newer_firmware_is_told(drive: Drive, link: MemoryLink) -> None:
+    link.objects[0x2005, 3] = b"\1\2\3\4"
+    readings = await drive.read_many(["2005:03"])
+    assert "4 bytes came for a UINT16" in readings["2005:03"].error
+
+
+async def test_forgetting_leaves_nothing_to_believe(drive: Drive) -> None:
+    await drive.write("2005:03", 500)
+    drive.forget()
+    assert not drive.readings
+    assert not drive.unsaved
+    assert not drive.pending

@@ -1,0 +1,88 @@
+"""Jobs and leases: one motion per axis, cancelling waits for cleanup, one holder per axis."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from backend.access import Leases
+from backend.axis import shielded
+from backend.jobs import JobRunner, Progress
+from drivers.errors import Busy, LinkTimeout, OutOfRange
+
+
+async def forever(_progress: Progress) -> None:
+    await asyncio.Event().wait()
+
+
+async def test_one_motion_per_axis() -> None:
+    runner = JobRunner()
+    first = runner.start("move", "Move X", forever, drive="x", motion=True)
+    with pytest.raises(Busy, match="Move X"):
+        runner.start("jog", "Jog X", forever, drive="x", motion=True)
+    runner.start("move", "Move Y", forever, drive="y", motion=True)
+    runner.start("read", "Read X", forever, drive="x")
+    await runner.cancel(first)
+    assert first.state == "cancelled"
+    runner.start("jog", "Jog X", forever, drive="x", motion=True)
+    await runner.close()
+
+
+async def test_failure_is_kept_in_words() -> None:
+    async def fails(_progress: Progress) -> None:
+        raise OutOfRange("too fast")
+
+    runner = JobRunner()
+    job = runner.start("move", "Move", fails)
+    await job.wait()
+    assert job.state == "failed"
+    assert str(job.error) == "too fast"
+
+
+async def test_cleanup_survives_a_second_cancel() -> None:
+    steps: list[str] = []
+
+    async def cleanup() -> None:
+        for number in range(5):
+            await asyncio.sleep(0)
+            steps.append(str(number))
+
+    async def work(_progress: Progress) -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            await shielded(cleanup, 1.0, "x")
+
+    runner = JobRunner()
+    job = runner.start("move", "Move", work)
+    await asyncio.sleep(0)
+    assert job.task is not None
+    job.task.cancel()
+    await asyncio.sleep(0)
+    job.task.cancel()
+    await job.wait()
+    assert len(steps) == 5
+    assert job.state == "cancelled"
+
+
+async def test_cleanup_has_a_deadline() -> None:
+    with pytest.raises(LinkTimeout, match="restoring took longer"):
+        await shielded(asyncio.Event().wait, 0.01, "x")  # type: ignore[arg-type]
+
+
+def test_leases() -> None:
+    told: list[str] = []
+    leases = Leases(told.append)
+    leases.require("x", None)
+    leases.take("x", "c1", "Anna")
+    leases.take("x", "c1", "Anna")
+    with pytest.raises(Busy, match="Anna has control"):
+        leases.take("x", "c2", "Ben")
+    with pytest.raises(Busy):
+        leases.require("x", None)
+    leases.give("x", "c2")
+    leases.require("x", "c1")
+    assert leases.drop("c1") == ["x"]
+    leases.require("x", "c2")
+    assert told == ["x", "x"]
