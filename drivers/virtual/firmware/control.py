@@ -34,6 +34,7 @@ class DeviceControl:
         self._halted = False
         self._reported = 0
         self._after_stop: Callable[[], None] | None = None
+        self._halt_done: Callable[[], None] | None = None
         self._retry_step: float | None = None
         self._axis.p[k.P_LIMIT_STOPS] = float(core.family.traits.limit_switch_faults)
         self._axis.listen(k.EV_ARRIVED)
@@ -71,9 +72,12 @@ class DeviceControl:
         new = next_state(self.state, command)
         if new is self.state:
             return
-        if self._after_stop is not None and command is not Command.DISABLE_VOLTAGE:
-            if self.state is not State.OPERATION_ENABLED or command is not Command.QUICK_STOP:
-                return
+        # A ramp under way ends before anything but "disable voltage" or a quick stop counts.
+        urgent = command is Command.DISABLE_VOLTAGE or (
+            command is Command.QUICK_STOP and self.state is State.OPERATION_ENABLED
+        )
+        if self._after_stop is not None and not urgent:
+            return
         if self.state is State.OPERATION_ENABLED:
             self._leave_operation(new, command)
         elif new is State.OPERATION_ENABLED:
@@ -171,8 +175,6 @@ class DeviceControl:
             # A halt leaves the drive free to take any further command at once.
             self._halt_done, self._after_stop = self._after_stop, None
 
-    _halt_done: Callable[[], None] | None = None
-
     # --- events ----------------------------------------------------------------------------
     def on_events(self, events: int) -> None:
         """React to what ended a run of the 50 µs loop."""
@@ -189,8 +191,7 @@ class DeviceControl:
         if events & k.EV_ALARM_CLOCK and self._retry_step is not None:
             self._retry()
         elif self.identification.active:
-            self.identification.on_events(events)
-            if not self.identification.active:
+            if self.identification.on_events(events):
                 self._end_identification()
         elif self.modes.running:
             self.modes.on_events(events, self.control_word)

@@ -189,7 +189,10 @@ class ObjectDictionary:
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
         """Write an object; its setter may still refuse, and then nothing changes."""
-        entry = self.find(index, subindex)
+        self.write_entry(self.find(index, subindex), data)
+
+    def write_entry(self, entry: Entry, data: bytes) -> None:
+        """The same for an entry that has been found."""
         if entry.parameter.access == "ro":
             raise SdoAbort(ABORT_READ_ONLY)
         try:

@@ -2,35 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from drivers.virtual.device import Device
 from drivers.virtual.firmware.families.base import Family
 from drivers.virtual.firmware.families.mms7 import Mms7
 from drivers.virtual.firmware.servo import VirtualServo
-from drivers.virtual.mechanics import MechanicsSpec
+from drivers.virtual.mechanics import MechanicsSpec, standard_mechanics
 from profiles.loader import load_profile
+from profiles.schema import Profile
 
 FAMILIES: dict[str, Family] = {"mms7": Mms7()}
 
 
 def make_device(
-    drive: str, mechanics: MechanicsSpec, nvm_dir: Path | None = None, station: int = 1
+    drive: str | Profile,
+    mechanics: MechanicsSpec | Mapping[str, object] | None = None,
+    nvm_dir: Path | None = None,
+    station: int = 1,
 ) -> Device:
     """A drive of this family with its own NVM file ``<drive>-<station>.json`` in ``nvm_dir``.
 
+    ``drive`` is a family's name or its loaded profile; ``mechanics`` a checked spec, the plain
+    table of a bench file, or nothing for the standard axis.
+
     Raises:
-        ValueError: no virtual drive of this family.
+        ValueError: no virtual drive of this family, or mechanics that are not valid.
         ProfileError: the profile is missing or wrong.
     """
-    family = FAMILIES.get(drive)
+    profile = load_profile(drive) if isinstance(drive, str) else drive
+    family = FAMILIES.get(profile.drive)
     if family is None:
-        raise ValueError(f"no virtual {drive!r}; there are: {', '.join(sorted(FAMILIES))}")
+        raise ValueError(f"no virtual {profile.drive!r}; there are: {', '.join(sorted(FAMILIES))}")
+    if mechanics is None:
+        mechanics = standard_mechanics()
+    elif not isinstance(mechanics, MechanicsSpec):
+        mechanics = MechanicsSpec.model_validate(dict(mechanics))
     return VirtualServo(
-        load_profile(drive),
+        profile,
         family,
         mechanics,
-        nvm_path=None if nvm_dir is None else nvm_dir / f"{drive}-{station}.json",
+        nvm_path=None if nvm_dir is None else nvm_dir / f"{profile.drive}-{station}.json",
         station=station,
         seed=station,
     )

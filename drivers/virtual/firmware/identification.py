@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Generator
 
+import numpy as np
+
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
 
@@ -52,10 +54,11 @@ class Identification:
             self._status(IDLE)
         self.started = False
 
-    def on_events(self, events: int) -> None:
-        """Resume after the awaited time."""
+    def on_events(self, events: int) -> bool:
+        """Resume after the awaited time; True when that was the end."""
         if events & k.EV_ALARM_CLOCK:
             self._resume()
+        return self._script is None
 
     def _resume(self) -> None:
         if self._script is None:
@@ -152,8 +155,6 @@ class Identification:
 
 def _regress(samples: list[tuple[float, float, float]]) -> tuple[float, float, float] | None:
     """Least squares of T = J·a + b·ω + Tc·sign(ω) + Tg; None when the data do not carry it."""
-    import numpy as np
-
     if len(samples) < 20:
         return None
     data = np.array(samples)

@@ -264,7 +264,7 @@ def _generate(p, s):  # type: ignore[no-untyped-def]
         _generate_velocity(p, s)
     elif kind == GEN_CYCLIC:
         _generate_cyclic(p, s)
-    elif kind == GEN_TORQUE or kind == GEN_TORQUE_STOP:
+    elif kind in (GEN_TORQUE, GEN_TORQUE_STOP):
         if kind == GEN_TORQUE:
             goal = 0.0 if p[P_STOPPING] > 0.0 else p[P_T_TARGET]
             slope = p[P_T_SLOPE] * STEP_S
@@ -283,7 +283,7 @@ def _generate(p, s):  # type: ignore[no-untyped-def]
         s[S_A_DEMAND] = 0.0
         s[S_T_DEMAND] = 0.0
     if p[P_STOPPING] > 0.0 and s[S_STOPPED] == 0.0:
-        ramped = kind == GEN_TORQUE_STOP or kind == GEN_TORQUE or s[S_V_DEMAND] == 0.0
+        ramped = kind in (GEN_TORQUE, GEN_TORQUE_STOP) or s[S_V_DEMAND] == 0.0
         if ramped and abs(s[S_OMEGA]) <= p[P_STOP_SPEED]:
             s[S_STOPPED] = 1.0
             _event(s, EV_STOPPED)
@@ -331,7 +331,7 @@ def _control(p, s):  # type: ignore[no-untyped-def]
         return
     increment = 0.0
     s[S_SPEED_LIMITED] = 0.0
-    if loop == LOOP_POSITION or loop == LOOP_SPEED:
+    if loop in (LOOP_POSITION, LOOP_SPEED):
         mix = s[S_GAIN_MIX]
         reference = s[S_V_DEMAND]
         if loop == LOOP_POSITION:
@@ -383,7 +383,20 @@ def _control(p, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-untyped-def]
+def _beyond(p, x, size):  # type: ignore[no-untyped-def]
+    """How far the last inertia is beyond an end stop, signed."""
+    behind = x[0]
+    for i in range(3, size, 2):
+        behind -= x[i]
+    if behind > p[P_STOP_MAX]:
+        return behind - p[P_STOP_MAX]
+    if behind < p[P_STOP_MIN]:
+        return behind - p[P_STOP_MIN]
+    return 0.0
+
+
+@njit(cache=True, nogil=True)
+def _step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-untyped-def] # noqa: PLR0917
     """One exact step of the linear chain, then friction and end stops on the velocity level."""
     size = x.shape[0]
     contact = 0
@@ -413,19 +426,14 @@ def _step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no
             if x[1] == 0.0:
                 scratch[0] = x[0]
     last = size - 1 if size > 3 else 1
-    behind = scratch[0]
-    for i in range(3, size, 2):
-        behind -= scratch[i]
-    beyond = 0.0
-    if behind > p[P_STOP_MAX] and scratch[last] > 0.0:
-        beyond = behind - p[P_STOP_MAX]
-    elif behind < p[P_STOP_MIN] and scratch[last] < 0.0:
-        beyond = behind - p[P_STOP_MIN]
-    if beyond != 0.0:
+    beyond = _beyond(p, scratch, size)
+    if beyond * scratch[last] > 0.0:
         push = -scratch[last] / bm[last, 2]
         for i in range(size):
             scratch[i] += bm[i, 2] * push
         scratch[last] = 0.0
+        # What the push over the step did not take back is taken back as an inelastic impact.
+        beyond = _beyond(p, scratch, size)
         if size > 3:
             scratch[size - 2] += beyond
         else:
@@ -484,7 +492,7 @@ def _protect(p, s):  # type: ignore[no-untyped-def]
     if s[S_OVERLOAD_T] > p[P_OVERLOAD_S]:
         faults |= F_OVERLOAD
     loop = int(p[P_LOOP])
-    closed = loop == LOOP_POSITION or loop == LOOP_SPEED
+    closed = loop in (LOOP_POSITION, LOOP_SPEED)
     away = closed and abs(s[S_SPEED_REFERENCE] - s[S_OMEGA]) > p[P_SPEED_ERROR]
     s[S_SPEED_ERROR_T] = s[S_SPEED_ERROR_T] + STEP_S if away else 0.0
     if s[S_SPEED_ERROR_T] > p[P_SPEED_ERROR_S]:
@@ -536,10 +544,13 @@ def _monitor(p, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def run(steps, p, s, x, a, b, gap_state, half_gap, scratch, random):  # type: ignore[no-untyped-def]
+def run(  # type: ignore[no-untyped-def] # noqa: PLR0917
+    steps, p, s, x, a, b, gap_state, half_gap, scratch, random
+):
     """Advance by up to ``steps``; ends early after a step that raised a masked event.
 
-    The caller clears S_EVENTS. Shapes: p [P_SIZE], s [S_SIZE], x and scratch [n], a [c, n, n], b [c, n, 3 + g],
+    The caller clears S_EVENTS. Shapes: p [P_SIZE], s [S_SIZE], x and scratch [n],
+    a [c, n, n], b [c, n, 3 + g],
     gap_state and half_gap [g], random [1] uint64 (never zero). Returns the steps done.
     """
     for k in range(steps):

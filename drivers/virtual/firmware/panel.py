@@ -115,10 +115,10 @@ class Panel:
             edge = 0 if level else 1
             done = 2 << edge << shift
             continuous = bool(function & 2)
-            if function & 1 and function & (0x10 << edge):
-                if continuous or not self._probe_status & done:
-                    self._latched[keys[edge]] = position
-                    self._probe_status |= done
+            wanted = function & 1 and function & (0x10 << edge)
+            if wanted and (continuous or not self._probe_status & done):
+                self._latched[keys[edge]] = position
+                self._probe_status |= done
 
     def probe_status(self) -> int:
         """60B9h."""

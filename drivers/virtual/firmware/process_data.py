@@ -11,6 +11,7 @@ from drivers.virtual.device import (
     SdoAbort,
 )
 from drivers.virtual.firmware.dictionary import Entry, Number, ObjectDictionary
+from profiles.schema import Raw
 
 _FORMAT = {
     "BOOL": "B", "INT8": "b", "UINT8": "B", "INT16": "h", "UINT16": "H",
@@ -65,21 +66,19 @@ class InputImage:
         """Current values."""
         return self._struct.pack(*[read() for read in self._readers])
 
-    def unpack(self, data: bytes) -> None:
+    def unpack(self, data: bytes) -> None:  # noqa: ARG002 - the seam's signature
         """Inputs cannot be written."""
         raise SdoAbort(ABORT_NOT_MAPPABLE)
 
 
-def _reader(entry: Entry) -> Callable[[], Number]:
-    getter = entry.getter
-    if getter is None:
-        return lambda: entry.value  # type: ignore[return-value, unused-ignore]
-    if entry.wrap is None:
-        return getter
+def _reader(entry: Entry) -> Callable[[], Raw]:
+    # The getter is looked up on every call: a restart of the firmware replaces it.
+    if entry.getter is None or entry.wrap is None:
+        return entry.current
     low, span = entry.wrap
 
     def read() -> int:
-        return (int(getter()) - low) % span + low
+        return (int(entry.getter()) - low) % span + low if entry.getter else 0
 
     return read
 

@@ -8,7 +8,6 @@ from typing import Final
 
 from drivers.virtual.device import (
     ABORT_DEVICE_STATE,
-    ABORT_NO_OBJECT,
     ABORT_NOT_MAPPABLE,
     ABORT_STORE,
     ABORT_UNSUPPORTED,
@@ -27,6 +26,7 @@ from drivers.virtual.firmware.live import live_values
 from drivers.virtual.firmware.nvm import Nvm
 from drivers.virtual.firmware.panel import Panel
 from drivers.virtual.firmware.process_data import InputImage, OutputImage, check_mapping
+from drivers.virtual.firmware.registers import RegisterTable
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
 
@@ -35,6 +35,9 @@ _VOLATILE: Final = frozenset(
     f"{index:04X}:00"
     for index in (0x6040, 0x6060, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2, 0x60B8, 0x200D)
 ) | {"60FE:01", "60FE:02"}
+_RESET_AFTER_STEPS: Final = 400
+"""20 ms from the reset command to the reset."""
+_BOOT_S: Final = 0.3
 _FAULT_NAMES: Final = {
     "over_current": k.F_OVER_CURRENT, "under_voltage": k.F_UNDER_VOLTAGE,
     "locked_rotor": k.F_LOCKED, "power_stage": k.F_POWER_STAGE, "overload": k.F_OVERLOAD,
@@ -68,8 +71,11 @@ class VirtualServo:
         self.nvm = Nvm(nvm_path)
         self.od = ObjectDictionary(profile, station)
         self._family = family
+        self._registers = RegisterTable(profile, self.od)
+        self._zero_rad = 0.0
         self._start_ns: int | None = None
         self._off_until_ns: int | None = None
+        self._reset_step: int | None = None
         self._power_on()
 
     # --- power -----------------------------------------------------------------------------
@@ -78,9 +84,8 @@ class VirtualServo:
         od.restore_defaults()
         od.load(self._family.factory_values(self.mechanics, axis.motor))
         od.load(self.nvm.load())
-        zero_rad = self.core.zero_rad if hasattr(self, "core") else 0.0
         self.core = Core(self.profile, self._family, od, axis)
-        self.core.zero_rad = zero_rad
+        self.core.zero_rad = self._zero_rad
         axis.power_off()
         axis.clear_faults()
         axis.set_alarm(None)
@@ -94,6 +99,7 @@ class VirtualServo:
     def power_cycle(self, off_s: float = 0.0) -> None:
         """Off for a time and on again; the shaft coasts meanwhile, the absolute zero stays."""
         self.axis.power_off()
+        self._zero_rad = self.core.zero_rad
         if off_s > 0 and self._start_ns is not None:
             self.powered = False
             self._off_until_ns = self._start_ns + round(
@@ -114,6 +120,14 @@ class VirtualServo:
             self._off_until_ns = None
             self.powered = True
             self._power_on()
+        if self._reset_step is not None:
+            reset_ns = self._start_ns + self._reset_step * k.STEP_NS
+            if t_ns >= reset_ns:
+                self._run_to(reset_ns)
+                self._reset_step = None
+                self.power_cycle(_BOOT_S)
+                self.advance(t_ns)
+                return
         self._run_to(t_ns)
 
     def _run_to(self, t_ns: int) -> None:
@@ -132,20 +146,22 @@ class VirtualServo:
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
         """Write an object. Raises SdoAbort with nothing changed."""
-        entry = self.od.find(index, subindex)
+        self._write_entry(self.od.find(index, subindex), data)
+
+    def _write_entry(self, entry: Entry, data: bytes) -> None:
         if entry.parameter.settable == "stopped" and self.axis.powered:
             raise SdoAbort(ABORT_DEVICE_STATE)
-        self.od.write(index, subindex, data)
+        self.od.write_entry(entry, data)
         if entry.parameter.pdo in ("rx", "rxtx") and entry.key not in ("6040:00", "6060:00"):
             self._arrived()
 
     def read_register(self, register: int, count: int) -> list[int]:
-        """This family's registers follow a rule of the wire, not a table."""
-        raise SdoAbort(ABORT_NO_OBJECT)
+        """Registers of the profile's table, 32-bit values in its word order."""
+        return self._registers.read(register, count)
 
     def write_registers(self, register: int, values: Sequence[int]) -> None:
-        """This family's registers follow a rule of the wire, not a table."""
-        raise SdoAbort(ABORT_NO_OBJECT)
+        """Write registers of the profile's table; all of a value's words at once."""
+        self._registers.write(register, values, self._write_entry)
 
     def indices(self) -> Sequence[int]:
         """All object indices, ascending."""
@@ -269,7 +285,7 @@ class VirtualServo:
             0x64616F6C: self.restore,
             0x686F6F6D: self.zero_position,
             0x11111120: self.control.history.clear,
-            0x626E6E74: self._power_on,
+            0x626E6E74: self._schedule_reset,
             0xAAB555AA: self.write_settings,
         }
         if int(value) == 0:
@@ -279,6 +295,10 @@ class VirtualServo:
             raise SdoAbort(ABORT_VALUE_RANGE)
         action()
         self.od.put("200D:00", 0)
+
+    def _schedule_reset(self) -> None:
+        """Reboot (004:2400), late enough that the wire can still answer the command."""
+        self._reset_step = int(self.axis.s[k.S_STEP]) + _RESET_AFTER_STEPS
 
     def write_settings(self) -> None:
         """Written parameters come into use."""
@@ -320,7 +340,7 @@ class VirtualServo:
         self.core.zero_rad = self.axis.angle_rad
 
     # --- trouble ---------------------------------------------------------------------------
-    def communication_lost(self, reason: str) -> None:
+    def communication_lost(self, reason: str) -> None:  # noqa: ARG002 - the seam's signature
         """The wire's watchdog fired or the network state fell."""
         self.control.communication_lost()
 

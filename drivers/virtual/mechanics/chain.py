@@ -101,12 +101,10 @@ def analytic_response(
     Coulomb friction, stops and backlash are not linear and are left out.
     """
     s = 2j * math.pi * np.asarray(f_hz, dtype=np.float64)
-    behind = np.zeros_like(s)
+    behind = np.zeros_like(s, dtype=np.complex128)
     for load in reversed(spec.load):
         coupling = load.stiffness_nm_per_rad / s + load.damping_nms_per_rad
         hanging = s * load.inertia_kgm2 + behind
         behind = coupling * hanging / (coupling + hanging)
-    response: npt.NDArray[np.complex128] = 1.0 / (
-        s * spec.motor.inertia_kgm2 + spec.friction.viscous_nms + behind
-    )
-    return response
+    impedance = s * spec.motor.inertia_kgm2 + spec.friction.viscous_nms + behind
+    return np.asarray(1.0 / impedance, dtype=np.complex128)
