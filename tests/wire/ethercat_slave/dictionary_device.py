@@ -6,6 +6,7 @@ It obeys the Device protocol and nothing else: the wire must work with any such 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from drivers.virtual.device import (
     ABORT_NO_OBJECT,
@@ -18,6 +19,7 @@ from drivers.virtual.device import (
     EntryInfo,
     SdoAbort,
 )
+from drivers.virtual.mechanics.spec import MechanicsSpec
 from profiles.schema import (
     DataType,
     Identity,
@@ -143,6 +145,7 @@ class DictionaryDevice:
         self.injected: list[tuple[str, float]] = []
         self.power_cycles: list[float] = []
         self.emergencies: list[tuple[int, int, bytes]] = []
+        self._on_again_ns = 0
         self.values = self._defaults()
 
     def _defaults(self) -> dict[tuple[int, int], bytes]:
@@ -171,6 +174,8 @@ class DictionaryDevice:
     def advance(self, t_ns: int) -> None:
         if t_ns > self.time_ns:
             self.time_ns = t_ns
+            if not self.powered and t_ns >= self._on_again_ns:
+                self._start_up()
             self.advances.append(t_ns)
             self.values[0x6064, 0] = self.values[0x607A, 0]
 
@@ -229,6 +234,12 @@ class DictionaryDevice:
 
     def power_cycle(self, off_s: float = 0.0) -> None:
         self.power_cycles.append(off_s)
+        self.powered = False
+        self._on_again_ns = self.time_ns + round(off_s * 1e9)
+        if off_s == 0:
+            self._start_up()
+
+    def _start_up(self) -> None:
         self.powered = True
         kept = self.values.get((0x2002, 0), b"")
         self.values = self._defaults()
@@ -242,7 +253,8 @@ class DictionaryDevice:
             raise ValueError(f"this drive has no trouble named {what!r}")
 
 
-def make_device(profile: object = None, mechanics: object = None) -> DictionaryDevice:
-    """Factory for the command line; both arguments are what a bench file would give."""
-    del profile, mechanics
+def make_device(
+    drive: str, mechanics: MechanicsSpec, nvm: Path | None = None, station: int = 1
+) -> DictionaryDevice:
+    """Factory for the command line."""
     return DictionaryDevice()

@@ -12,18 +12,14 @@ import sys
 from pathlib import Path
 
 from drivers.errors import DriveError
-from drivers.virtual.wires.ethercat.bench import (
-    BenchAxis,
-    load_bench,
-    load_factory,
-    make_devices,
-)
+from drivers.virtual.wires.ethercat.bench import axes_by_name, axes_of_bench, load_factory
 from drivers.virtual.wires.ethercat.clock import LockstepClock, RealClock
 from drivers.virtual.wires.ethercat.segment import Segment
 from drivers.virtual.wires.ethercat.server import SegmentServer
 from drivers.virtual.wires.ethercat.slave import Slave, SlaveIdentity
+from profiles.loader import ProfileError
 
-_FACTORY = "drivers.virtual.firmware:make_device"
+_FACTORY = "drivers.virtual.firmware.factory:make_device"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -32,6 +28,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--bench", type=Path, help="bench file (TOML)")
     parser.add_argument("--on", help="bus URL of the bench file that this segment is")
     parser.add_argument("--drive", action="append", default=[], help="a drive family, in order")
+    parser.add_argument("--nvm", type=Path, help="folder for the drives' memory; kept if given")
     parser.add_argument("--factory", default=_FACTORY, help="module:function that makes devices")
     parser.add_argument("--lockstep", action="store_true", help="time follows the frames")
     parser.add_argument("--cycle-us", type=int, default=1000, help="lockstep cycle without DC")
@@ -53,17 +50,19 @@ def _go_realtime(priority: int) -> None:
 
 def build(arguments: argparse.Namespace) -> Segment:
     """Segment with its devices, as the command line says."""
-    axes = load_bench(arguments.bench, arguments.on) if arguments.bench else []
-    for drive in arguments.drive:
-        station = len(axes) + 1
-        axes.append(BenchAxis(f"axis {station}", drive, station, serial=station))
+    axes = axes_of_bench(arguments.bench, arguments.on) if arguments.bench else []
+    axes += axes_by_name(arguments.drive, len(axes) + 1)
     if not axes:
         raise ValueError("no drives: give --drive or a --bench file with EtherCAT axes")
     clock = LockstepClock(arguments.cycle_us * 1000) if arguments.lockstep else RealClock()
-    devices = make_devices(axes, load_factory(arguments.factory))
+    factory = load_factory(arguments.factory)
     slaves = [
-        Slave(device, clock, SlaveIdentity(serial=axis.serial))
-        for device, axis in zip(devices, axes, strict=True)
+        Slave(
+            factory(axis.drive, axis.mechanics, arguments.nvm, station),
+            clock,
+            SlaveIdentity(serial=axis.serial or station),
+        )
+        for station, axis in enumerate(axes, 1)
     ]
     for slave in slaves:
         slave.al.delay_ns = int(arguments.al_ms * 1e6)
@@ -79,7 +78,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         segment = build(arguments)
         server = SegmentServer(arguments.iface, segment, sys.stdin.buffer, sys.stdout.buffer)
-    except (DriveError, ValueError, OSError, ImportError) as error:
+    except (DriveError, ValueError, OSError, ImportError, ProfileError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     _go_realtime(arguments.realtime)

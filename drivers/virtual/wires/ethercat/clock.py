@@ -51,22 +51,36 @@ class LockstepClock:
     """One cycle per process-data frame, however fast or slow they come; deterministic.
 
     Process-data frames arrive in the middle of cycles, on the grid (n + ½)·cycle. Every other
-    frame takes ``frame_ns``, so that polling for an answer makes time pass.
+    frame takes ``frame_ns``, so that there is room for mailbox work between two cycles; when
+    `IDLE_FRAMES` have come without process data, each takes ``idle_frame_ns``, so that polling
+    for an answer or a state makes time pass.
     """
 
-    def __init__(self, cycle_ns: int = 1_000_000, frame_ns: int = 5_000) -> None:
+    IDLE_FRAMES = 40
+
+    def __init__(
+        self,
+        cycle_ns: int = 1_000_000,
+        frame_ns: int = 5_000,
+        idle_frame_ns: int = 200_000,
+    ) -> None:
         self.cycle_ns = cycle_ns
         self.frame_ns = frame_ns
+        self.idle_frame_ns = idle_frame_ns
         self._now = 0
+        self._others = self.IDLE_FRAMES
 
     def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
         """Next half-cycle for process data, a little later for anything else."""
         del age_ns
-        if not process_data:
-            self._now += self.frame_ns
-        else:
+        if process_data:
             cycle = cycle_ns or self.cycle_ns
             self._now = ((self._now + cycle // 2) // cycle) * cycle + cycle // 2
+            self._others = 0
+        else:
+            self._others += 1
+            idle = self._others > self.IDLE_FRAMES
+            self._now += self.idle_frame_ns if idle else self.frame_ns
         return self._now
 
     def now(self) -> int:

@@ -156,17 +156,14 @@ class Control:
         self._segment.line.heal(cable)
 
     def _power_off(self, slave: int) -> None:
-        self._slave(slave)
-        self._segment.line.power_off(slave, self._segment.settle(), None)
+        self._segment.line.power_off(slave, self._segment.settle())
 
     def _power_on(self, slave: int) -> None:
-        self._slave(slave)
-        self._segment.line.power_on(slave, self._segment.settle())
+        self._segment.settle()
+        self._segment.line.power_on(slave)
 
     def _power_cycle(self, slave: int, off_s: float = 0.5) -> None:
-        self._slave(slave)
-        now = self._segment.settle()
-        self._segment.line.power_off(slave, now, now + int(off_s * _NS))
+        self._segment.line.power_off(slave, self._segment.settle(), off_s)
 
     def _timing(
         self,

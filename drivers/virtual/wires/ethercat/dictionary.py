@@ -24,7 +24,7 @@ from drivers.virtual.device import (
     SdoAbort,
 )
 from drivers.virtual.wires.ethercat.registers import AlState
-from profiles.schema import DataType, Parameter, PdoSet
+from profiles.schema import DataType, Parameter
 
 ABORT_COUNT_NOT_ZERO = 0x06010003
 """Subindex cannot be written, subindex 0 must be 0 for it (ETG.1000.6 table 40)."""
@@ -40,24 +40,53 @@ class SyncReport:
     """0 free run, 1 with the sync manager event, 2 with SYNC0 (ETG.1020 table 59)."""
     cycle_ns: int = 0
     missed: int = 0
-    too_short: int = 0
+    """SYNC0 events that found no new outputs, since Op."""
 
 
 class NetworkObject:
-    """One list object: subindex 0 counts, the others hold unsigned numbers of one type."""
+    """One list object: subindex 0 counts, the others hold unsigned numbers of one type.
+
+    Where the drive has the object in its own dictionary, the values live there, so that the
+    drive's save and restore cover them; otherwise they live here.
+    """
 
     def __init__(
-        self, name: str, kind: DataType, values: Sequence[int], count: int, count_type: DataType
+        self, device: Device, index: int, name: str, kind: DataType, defaults: Sequence[int]
     ) -> None:
         self.name = name
         self.kind: DataType = kind
-        self.values = list(values)
-        self.count = count
-        self.count_type: DataType = count_type
+        self._index = index
+        self._values = [sum(1 for v in defaults if v), *defaults]
+        self._device = device if index in device.indices() else None
+        self.count_type: DataType = "UINT8"
+        self.slots = len(defaults)
+        if self._device is not None:
+            self.count_type = device.entry(index, 0).type
+            self.slots = max(device.subindices(index))
+
+    def type_of(self, subindex: int) -> DataType:
+        """Type of an entry. Raises SdoAbort for one that does not exist."""
+        if subindex > self.slots:
+            raise SdoAbort(ABORT_NO_SUBINDEX)
+        return self.kind if subindex else self.count_type
+
+    def get(self, subindex: int) -> int:
+        """Value of an entry."""
+        if self._device is not None:
+            return int.from_bytes(self._device.read(self._index, subindex), "little")
+        return self._values[subindex]
+
+    def put(self, subindex: int, value: int) -> None:
+        """Store a checked value; the drive may still refuse."""
+        if self._device is not None:
+            size = _BITS[self.type_of(subindex)] // 8
+            self._device.write(self._index, subindex, value.to_bytes(size, "little"))
+        else:
+            self._values[subindex] = value
 
     def active(self) -> tuple[int, ...]:
         """Values within the count."""
-        return tuple(self.values[: self.count])
+        return tuple(self.get(n) for n in range(1, min(self.get(0), self.slots) + 1))
 
 
 class CoeDictionary:
@@ -70,57 +99,36 @@ class CoeDictionary:
         self._state = state
         self._report = report
         self._has_dc = has_dc
+        pdo = device.profile.pdo
+        sets = pdo.sets if pdo else ()
+        self._fixed = {s.index for s in sets if s.fixed or not (pdo and pdo.remappable)}
+        self._max_bytes = pdo.max_bytes if pdo else None
         self._objects: dict[int, NetworkObject] = {}
         self.reset()
 
     def reset(self) -> None:
-        """Power-on contents: the profile's default mapping and assignment."""
-        pdo = self._device.profile.pdo
-        sets = pdo.sets if pdo else ()
-        self._fixed = {s.index for s in sets if s.fixed or not (pdo and pdo.remappable)}
-        self._max_bytes = pdo.max_bytes if pdo else None
-        objects = {0x1C00: NetworkObject("Sync manager type", "UINT8", (1, 2, 3, 4), 4, "UINT8")}
-        for pdo_set in sets:
-            slots = max(pdo.max_entries if pdo else 0, len(pdo_set.entries))
+        """Power-on: what the drive does not keep itself is as the profile prints it."""
+        device = self._device
+        pdo = device.profile.pdo
+        objects = {0x1C00: NetworkObject(device, 0x1C00, _SM_TYPES, "UINT8", (1, 2, 3, 4))}
+        for pdo_set in pdo.sets if pdo else ():
             words = [self.mapping_word(key) for key in pdo_set.entries]
+            words += [0] * ((pdo.max_entries if pdo else 0) - len(words))
             name = ("RxPDO" if pdo_set.direction == "rx" else "TxPDO") + " mapping"
-            objects[pdo_set.index] = NetworkObject(
-                name, "UINT32", words + [0] * (slots - len(words)), len(words), "UINT8"
-            )
-        if pdo:
-            self._add_assignment(objects, 0x1C12, "rx", pdo.default_rx, sets)
-            self._add_assignment(objects, 0x1C13, "tx", pdo.default_tx, sets)
+            objects[pdo_set.index] = NetworkObject(device, pdo_set.index, name, "UINT32", words)
+        for index, direction in (0x1C12, "rx"), (0x1C13, "tx"):
+            if pdo is not None:
+                default = pdo.default_rx if direction == "rx" else pdo.default_tx
+                others = sum(1 for s in pdo.sets if s.direction == direction) - 1
+                name = f"PDO assignment of sync manager {index & 0xF}"
+                values = [default] + [0] * others
+                objects[index] = NetworkObject(device, index, name, "UINT16", values)
         self._objects = objects
-
-    def _add_assignment(
-        self,
-        objects: dict[int, NetworkObject],
-        index: int,
-        direction: str,
-        default: int,
-        sets: Sequence[PdoSet],
-    ) -> None:
-        count_parameter = self._device.profile.by_key.get(f"{index:04X}:00")
-        count_type: DataType = "UINT16" if _is_16_bit(count_parameter) else "UINT8"
-        printed = [p for p in self._device.profile.parameters if p.index == index and p.subindex]
-        slots = len(printed) or sum(1 for s in sets if s.direction == direction)
-        name = (
-            "Sync manager 2 PDO assignment"
-            if direction == "rx"
-            else ("Sync manager 3 PDO assignment")
-        )
-        values = [default] + [0] * (slots - 1)
-        objects[index] = NetworkObject(name, "UINT16", values, 1, count_type)
 
     def mapping_word(self, key: str) -> int:
         """Profile key to the 32-bit mapping entry."""
         index, subindex = int(key[:4], 16), int(key[5:], 16)
         return index << 16 | subindex << 8 | self._device.entry(index, subindex).bit_length
-
-    @property
-    def pdo_indices(self) -> tuple[int, ...]:
-        """Indices of all mapping objects."""
-        return tuple(i for i in self._objects if 0x1600 <= i < 0x1C00)
 
     def mapping(self, pdo_index: int) -> tuple[int, ...]:
         """Active entries of one mapping object."""
@@ -148,7 +156,7 @@ class CoeDictionary:
     def subindices(self, index: int) -> list[int]:
         """All subindices of one object, ascending."""
         if (found := self._objects.get(index)) is not None:
-            return list(range(len(found.values) + 1))
+            return list(range(found.slots + 1))
         if index in (0x1C32, 0x1C33) and self._has_sync():
             return [0, *_SYNC_ENTRIES]
         return sorted(self._device.subindices(index))
@@ -172,9 +180,7 @@ class CoeDictionary:
     def entry(self, index: int, subindex: int) -> EntryInfo:
         """Description of one entry."""
         if (found := self._objects.get(index)) is not None:
-            if subindex > len(found.values):
-                raise SdoAbort(ABORT_NO_SUBINDEX)
-            kind = found.kind if subindex else found.count_type
+            kind = found.type_of(subindex)
             writable = index != 0x1C00 and index not in self._fixed
             name = found.name if not subindex else f"Entry {subindex}"
             return EntryInfo(name, kind, _BITS[kind], True, writable, False, False)
@@ -190,11 +196,8 @@ class CoeDictionary:
     def read(self, index: int, subindex: int) -> bytes:
         """Value of one entry."""
         if (found := self._objects.get(index)) is not None:
-            if subindex > len(found.values):
-                raise SdoAbort(ABORT_NO_SUBINDEX)
-            kind = found.kind if subindex else found.count_type
-            value = found.values[subindex - 1] if subindex else found.count
-            return value.to_bytes(_BITS[kind] // 8, "little")
+            size = _BITS[found.type_of(subindex)] // 8
+            return found.get(subindex).to_bytes(size, "little")
         if index in (0x1C32, 0x1C33) and self._has_sync():
             info = self.entry(index, subindex)
             return self._sync_value(index, subindex).to_bytes(info.bit_length // 8, "little")
@@ -228,7 +231,6 @@ class CoeDictionary:
             4: 0x0002 | (0x0004 if self._has_dc else 0),
             5: minimum_ns,
             0x0B: self._report.missed & 0xFFFF,
-            0x0C: self._report.too_short & 0xFFFF,
         }
         return values.get(subindex, 0)
 
@@ -236,24 +238,23 @@ class CoeDictionary:
         found = self._objects[index]
         if index == 0x1C00 or index in self._fixed:
             raise SdoAbort(ABORT_READ_ONLY)
-        if subindex > len(found.values):
-            raise SdoAbort(ABORT_NO_SUBINDEX)
+        size = _BITS[found.type_of(subindex)] // 8
         if self._state() != AlState.PREOP:
             raise SdoAbort(ABORT_DEVICE_STATE)
-        size = _BITS[found.kind if subindex else found.count_type] // 8
         if len(data) > size:
             raise SdoAbort(ABORT_TOO_LONG)
+        # A count printed as UINT16 (004:1437) is also taken in the standard's 8 bits.
         if len(data) < size and subindex:
             raise SdoAbort(ABORT_TOO_SHORT)
         value = int.from_bytes(data, "little")
         if not subindex:
             self._write_count(index, found, value)
-        elif found.count:
+            return
+        if found.get(0):
             raise SdoAbort(ABORT_COUNT_NOT_ZERO)
-        else:
-            if value:
-                self._check_entry(index, value)
-            found.values[subindex - 1] = value
+        if value:
+            self._check_entry(index, value)
+        found.put(subindex, value)
 
     def _check_entry(self, index: int, value: int) -> None:
         if index in (0x1C12, 0x1C13):
@@ -264,21 +265,20 @@ class CoeDictionary:
         self._device.map_process_data([value], "rx" if index < 0x1800 else "tx")
 
     def _write_count(self, index: int, found: NetworkObject, count: int) -> None:
-        if count > len(found.values):
+        if count > found.slots:
             raise SdoAbort(ABORT_PDO_LENGTH)
-        if not all(found.values[:count]):
+        if not all(found.get(n) for n in range(1, count + 1)):
             raise SdoAbort(ABORT_NOT_MAPPABLE)
-        before, found.count = found.count, count
+        before = found.get(0)
+        found.put(0, count)
         direction = "rx" if index == 0x1C12 or 0x1600 <= index < 0x1800 else "tx"
         bits = sum(entry & 0xFF for entry in self.assigned(direction))
         if self._max_bytes is not None and bits > self._max_bytes * 8:
-            found.count = before
+            found.put(0, before)
             raise SdoAbort(ABORT_PDO_LENGTH)
 
 
-def _is_16_bit(parameter: Parameter | None) -> bool:
-    return parameter is not None and parameter.type == "UINT16"
-
+_SM_TYPES = "Sync manager communication types"
 
 _SYNC_ENTRIES: dict[int, tuple[str, DataType]] = {
     1: ("Synchronisation type", "UINT16"),
@@ -286,5 +286,4 @@ _SYNC_ENTRIES: dict[int, tuple[str, DataType]] = {
     4: ("Synchronisation types supported", "UINT16"),
     5: ("Minimum cycle time", "UINT32"),
     0x0B: ("SM event missed counter", "UINT16"),
-    0x0C: ("Cycle exceeded counter", "UINT16"),
 }

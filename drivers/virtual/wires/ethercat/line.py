@@ -12,6 +12,8 @@ LINK_UP_NS = 300_000_000
 """From power-on to a working link; auto-negotiation of a 100 Mbit/s port takes about this."""
 
 _FOREVER = 1 << 62
+_FOR_GOOD_S = 1e6
+_AT_ONCE_S = 1e-9
 
 
 class Line:
@@ -21,7 +23,7 @@ class Line:
         self._slaves = list(slaves)
         count = len(self._slaves)
         self._cut: set[int] = set()
-        self._off_until: dict[int, int] = {}
+        self._off: set[int] = set()
         self._up_from = [0] * count
         self._links = [True] * count
         self._reach: list[Slave] = []
@@ -42,40 +44,44 @@ class Line:
             self._cut.discard(cable)
         self._next_ns = 0
 
-    def power_off(self, position: int, now_ns: int, until_ns: int | None = None) -> None:
-        """Switch one slave off, until a time or for good. The drive coasts."""
+    def power_off(self, position: int, now_ns: int, for_s: float | None = None) -> None:
+        """Switch one slave off, for a time or until `power_on`. The drive coasts."""
         self._check(position)
-        slave = self._slaves[position]
-        slave.device.advance(now_ns)
-        if until_ns is None:
-            slave.device.powered = False
-        else:
-            slave.device.power_cycle((until_ns - now_ns) / 1e9)
-        slave.restart(now_ns)
-        self._off_until[position] = _FOREVER if until_ns is None else until_ns
-        self._next_ns = 0
+        device = self._slaves[position].device
+        device.advance(now_ns)
+        device.power_cycle(_FOR_GOOD_S if for_s is None else for_s)
 
-    def power_on(self, position: int, now_ns: int) -> None:
+    def power_on(self, position: int) -> None:
         """Switch it on again; its link comes up after `LINK_UP_NS`."""
         self._check(position)
-        if position in self._off_until:
-            self._off_until[position] = now_ns
-            if not self._slaves[position].device.powered:
-                self._slaves[position].device.power_cycle(0.0)
-            self._next_ns = 0
+        device = self._slaves[position].device
+        if not device.powered:
+            device.power_cycle(_AT_ONCE_S)
 
     def update(self, now_ns: int) -> list[Slave]:
-        """Follow what time has brought; returns the slaves that a frame reaches now."""
-        if now_ns < self._next_ns:
-            return self._reach
-        for position, until in list(self._off_until.items()):
-            if until <= now_ns:
-                del self._off_until[position]
-                self._slaves[position].device.advance(until)
-                self._slaves[position].power_on(until)
-                self._up_from[position] = until + LINK_UP_NS
-        self._relink(now_ns)
+        """Follow what time has brought; returns the slaves that a frame reaches now.
+
+        A drive may also go off and on by itself, as after its own reset.
+        """
+        for position, slave in enumerate(self._slaves):
+            if position in self._off:
+                slave.device.advance(now_ns)
+            if slave.device.powered == (position in self._off):
+                self._power_changed(position, now_ns)
+        if now_ns >= self._next_ns:
+            self._relink(now_ns)
         return self._reach
+
+    def _power_changed(self, position: int, now_ns: int) -> None:
+        slave = self._slaves[position]
+        if slave.device.powered:
+            self._off.discard(position)
+            self._up_from[position] = now_ns + LINK_UP_NS
+            slave.power_on(now_ns)
+        else:
+            self._off.add(position)
+            slave.restart(now_ns)
+        self._next_ns = 0
 
     def count_crc_error(self, position: int, port: int) -> None:
         """A frame arrives damaged at a port: counted there, and as forwarded further on."""
@@ -90,7 +96,7 @@ class Line:
             raise IndexError(f"there is no slave {position}; there are {len(self._slaves)}")
 
     def _alive(self, position: int, now_ns: int) -> bool:
-        return position not in self._off_until and now_ns >= self._up_from[position]
+        return position not in self._off and now_ns >= self._up_from[position]
 
     def _relink(self, now_ns: int) -> None:
         count = len(self._slaves)
@@ -111,11 +117,11 @@ class Line:
             _show_ports(slave, links[position], following)
             behind = reach - position - 1 if position < reach else 0
             slave.controller.neighbours = (position, behind)
-        waiting = [t for t in (*self._off_until.values(), *self._up_from) if t > now_ns]
+        waiting = [t for t in self._up_from if t > now_ns]
         self._next_ns = min(waiting, default=_FOREVER)
 
     def _lose(self, position: int, port: int) -> None:
-        if position not in self._off_until:
+        if position not in self._off:
             self._slaves[position].controller.count(reg.LOST_LINK + port)
 
 

@@ -95,6 +95,8 @@ class ProcessData:
         self._ticked_ns = now_ns
         self._running = True
         self.written_ns = None
+        self._report.mode = _SYNC0 if self._clock.sync0_requested else _SYNC_MANAGER
+        self._report.cycle_ns = self._clock.sync0_cycle_ns
         self._device.advance(now_ns)
         self._latch()
 
@@ -109,8 +111,6 @@ class ProcessData:
         """In Op the outputs act; in Safe-Op they are received and ignored."""
         self._operational = on
         if on:
-            self._report.mode = _SYNC0 if self._clock.sync0_requested else _SYNC_MANAGER
-            self._report.cycle_ns = self._clock.sync0_cycle_ns
             self._report.missed = 0
 
     @property
