@@ -18,7 +18,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from typing import Literal
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl
 
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.link import Link
@@ -63,19 +63,19 @@ def parse_url(text: str) -> BusUrl:
     Raises:
         OutOfRange: no such scheme, no adapter named, or an option given twice.
     """
-    parts = urlsplit(text.strip())
-    scheme = next((known for known in SCHEMES if known == parts.scheme), None)
-    if scheme is None:
+    match = re.fullmatch(r"([a-z]+)://([^?]*)(?:\?(.*))?", text.strip())
+    scheme = next((known for known in SCHEMES if match and known == match[1]), None)
+    if match is None or scheme is None or not text.strip().isprintable():
         raise OutOfRange(
             f"{text!r} is no bus URL: it must start with "
             + ", ".join(f"{known}://" for known in SCHEMES),
             value=text,
             remedy=_EXAMPLE,
         )
-    place = parts.netloc + parts.path
+    place = match[2]
     if not place.strip("/"):
         raise OutOfRange(f"{text!r} names no adapter", value=text, remedy=_EXAMPLE)
-    options = parse_qsl(parts.query, keep_blank_values=True)
+    options = parse_qsl(match[3] or "", keep_blank_values=True)
     if len(dict(options)) != len(options):
         raise OutOfRange(f"{text!r} gives an option twice", value=text, remedy=_EXAMPLE)
     return BusUrl(scheme, place, tuple(options))

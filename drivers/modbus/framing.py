@@ -241,20 +241,22 @@ class RequestParser:
 
     def _cut(self, *, silent: bool) -> list[Request]:
         found: list[Request] = []
-        start = 0
+        start = done = 0
         while len(self._buffer) - start >= 8:
-            length = self._request_length(start)
-            complete = length is not None and start + length <= len(self._buffer)
-            if length is not None and not complete and not silent:
+            length = self._request_length(start) or 0
+            if start + length > len(self._buffer) and not silent:
                 break
-            frame = bytes(self._buffer[start : start + length]) if length and complete else b""
-            if frame and is_sealed(frame):
+            frame = bytes(self._buffer[start : start + length])
+            if length and len(frame) == length and is_sealed(frame):
                 found.append(_parse_request(frame))
-                start += len(frame)
+                self.skipped_bytes += start - done
+                start = done = start + length
             else:
-                self.skipped_bytes += 1
                 start += 1
-        del self._buffer[:start]
+        # Bytes in front of nothing known stay until silence: they may be a function not known.
+        keep = max(done, len(self._buffer) - MAX_FRAME_BYTES)
+        self.skipped_bytes += keep - done
+        del self._buffer[:keep]
         return found
 
     def _request_length(self, start: int) -> int | None:

@@ -21,7 +21,15 @@ from drivers.virtual.device import (
 )
 from drivers.virtual.wires.modbus import ModbusSlave, ObjectRegisters, Registers, TableRegisters
 from drivers.virtual.wires.pty import PtyWire, WireTime
-from profiles.schema import DataType
+from profiles.schema import (
+    DataType,
+    Identity,
+    LinkSpec,
+    Parameter,
+    Profile,
+    UnitSpec,
+    Watchdog,
+)
 
 #: Types of the few objects used here; sizes as in manual 004.
 TYPES: dict[tuple[int, int], DataType] = {
@@ -128,3 +136,20 @@ def serving(
         yield slave
     finally:
         slave.stop()
+
+
+def small_profile(
+    *parameters: tuple[str, DataType], kind: str = "mlink", **spec: object
+) -> Profile:
+    link = LinkSpec.model_validate(
+        {"kind": kind, "watchdog": Watchdog(present=False), "source": "test", **spec}
+    )
+    return Profile(
+        drive="small", title="small", manual="000",
+        identity=Identity(maker="m", model="m"), links=(link,), units=UnitSpec(),
+        supported_modes=(1,),
+        parameters=tuple(
+            Parameter(key=key, name=key, group="g", type=kind_, source="000:1")
+            for key, kind_ in parameters
+        ),
+    )  # fmt: skip

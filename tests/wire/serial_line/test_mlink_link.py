@@ -15,41 +15,16 @@ from drivers.mlink.link import MlinkLayout, ambiguous_objects, register_of
 from drivers.modbus.link import RegisterLink
 from drivers.urls import line_settings, parse_url
 from drivers.virtual.wires.modbus import Trouble
-from profiles.schema import (
-    DataType,
-    Identity,
-    LinkSpec,
-    Parameter,
-    Profile,
-    UnitSpec,
-    Watchdog,
-)
+from profiles.schema import DataType
 
 from .conftest import OpenLink
-from .shelf import ShelfDevice, serving
+from .shelf import ShelfDevice, serving, small_profile
 
 STATUS = Address(0x6041, 0, "UINT16")
 MODE = Address(0x6060, 0, "INT8")
 TARGET = Address(0x607A, 0, "INT32")
 POSITION = Address(0x6064, 0, "INT32")
 CONTROL = Address(0x6040, 0, "UINT16")
-
-
-def small_profile(
-    *parameters: tuple[str, DataType], kind: str = "mlink", **spec: object
-) -> Profile:
-    link = LinkSpec.model_validate(
-        {"kind": kind, "watchdog": Watchdog(present=False), "source": "test", **spec}
-    )
-    return Profile(
-        drive="small", title="small", manual="000",
-        identity=Identity(maker="m", model="m"), links=(link,), units=UnitSpec(),
-        supported_modes=(1,),
-        parameters=tuple(
-            Parameter(key=key, name=key, group="g", type=kind_, source="000:1")
-            for key, kind_ in parameters
-        ),
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
