@@ -1,0 +1,262 @@
+"""Motion through the interface: the axis moves as told, and stops in every way it must."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from tests.support.station import Live, Station, until
+
+JOG = {"speed": 300.0, "acceleration": 3000.0, "travel_limit": 20.0, "torque_limit": 150.0}
+#: v·T + v²/2a of JOG in revolutions, with T = 0.2 s.
+LEAD_REV = 5.0 * 0.2 + 5.0**2 / (2 * 50.0)
+
+
+def position(station: Station, drive: str) -> float:
+    return float(station.state(drive)["position"])
+
+
+def hold(page: Live, drive: str, seconds: float) -> None:
+    """Renew as a held button does."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        page.send(type="jog_renew", drive=drive)
+        time.sleep(0.02)
+
+
+def moving(station: Station, drive: str) -> bool:
+    return abs(float(station.state(drive)["velocity"])) > 100
+
+
+def at_rest(station: Station, drive: str) -> bool:
+    return abs(float(station.state(drive)["velocity"])) < 2
+
+
+@pytest.fixture
+def page(station: Station, x: str) -> Iterator[Live]:
+    with station.live() as live:
+        yield live
+
+
+def start_jog(page: Live, x: str, **changes: object) -> None:
+    page.send(type="jog_start", drive=x, direction=1, **(JOG | changes))
+
+
+def jog_until_fast(station: Station, page: Live, x: str) -> None:
+    start_jog(page, x)
+    end = time.monotonic() + 5
+    while not moving(station, x):
+        page.send(type="jog_renew", drive=x)
+        assert time.monotonic() < end, "the axis does not move"
+
+
+def test_jog_moves_at_speed_and_stops_on_release(station: Station, x: str, page: Live) -> None:
+    jog_until_fast(station, page, x)
+    hold(page, x, 0.5)
+    assert float(station.state(x)["velocity"]) == pytest.approx(300, rel=0.05)
+    page.send(type="jog_stop", drive=x)
+    ended = page.wait("jog_ended", drive=x)
+    assert ended["problem"] is None
+    assert ended["reason"] == "released"
+    now = station.state(x)
+    assert abs(now["velocity"]) < 2
+    assert now["state"] == "Switch on disabled", "the power state is as it was"
+
+
+def test_jog_stops_when_the_renewals_stop(station: Station, x: str, page: Live) -> None:
+    jog_until_fast(station, page, x)
+    hold(page, x, 0.3)
+    began = time.monotonic()
+    ended = page.wait("jog_ended", drive=x)
+    # 200 ms without a sign of life, then 300 rpm at 3000 rpm/s: 100 ms to stand still.
+    assert time.monotonic() - began < 1.0
+    assert "200 ms" in ended["reason"]
+    assert at_rest(station, x)
+
+
+def test_jog_stops_when_the_page_is_gone(station: Station, x: str) -> None:
+    with station.live() as page:
+        jog_until_fast(station, page, x)
+        hold(page, x, 0.2)
+    until(lambda: at_rest(station, x), 1.0, "the axis stands")
+    lease = station.ok(station.http.get(f"/drives/{x}"))["lease"]
+    assert lease["holder"] is None
+
+
+def test_stop_works_for_everyone_and_nothing_enables_again(
+    station: Station, x: str, page: Live
+) -> None:
+    jog_until_fast(station, page, x)
+    answer = station.ok(station.http.post("/stop", json={}))  # another client, no lease
+    assert x in answer["stopped"]
+    end = time.monotonic() + 0.5
+    while time.monotonic() < end:  # the button is still held
+        page.send(type="jog_renew", drive=x)
+        time.sleep(0.02)
+    page.wait("jog_ended", drive=x)
+    now = station.state(x)
+    assert abs(now["velocity"]) < 2
+    assert now["state"] != "Operation enabled"
+
+
+def test_jog_keeps_the_travel_limit(station: Station, x: str, page: Live) -> None:
+    before = position(station, x)
+    start_jog(page, x, travel_limit=0.5)
+    hold(page, x, 1.0)
+    assert position(station, x) - before == pytest.approx(0.5, abs=0.02)
+    page.send(type="jog_stop", drive=x)
+    page.wait("jog_ended", drive=x)
+
+
+def test_jog_restores_what_it_changed(station: Station, x: str, page: Live) -> None:
+    keys = ["6060:00", "6081:00", "6083:00", "6084:00"]
+    read = lambda: [
+        station.ok(station.http.get(f"/drives/{x}/parameters/{k}"))["raw"] for k in keys
+    ]  # noqa: E731, E501
+    before = read()
+    jog_until_fast(station, page, x)
+    page.send(type="jog_stop", drive=x)
+    page.wait("jog_ended", drive=x)
+    assert read() == before
+
+
+def test_pulled_cable_ends_within_the_lead(station: Station, x: str, page: Live) -> None:
+    """No watchdog in the drive: its own profile generator must brake (architecture)."""
+    jog_until_fast(station, page, x)
+    hold(page, x, 0.2)
+    near = position(station, x)
+    station.drives.command(do="pull", wire="mlink://virtual0")
+    hold(page, x, 1.0)
+    station.drives.command(do="heal", wire="mlink://virtual0")
+    until(lambda: station.state(x)["fresh"], 15, "the drive answers again")
+    until(lambda: at_rest(station, x), 3)
+    # Between the reading and the cut the axis went on for some ten milliseconds.
+    assert position(station, x) - near < LEAD_REV + 5.0 * 0.15
+
+
+def test_somebody_else_cannot_move_a_held_axis(station: Station, x: str, page: Live) -> None:
+    page.send(type="lease", drive=x, take=True)
+    until(lambda: station.ok(station.http.get(f"/drives/{x}"))["lease"]["holder"], 5)
+    answer = station.http.put(f"/drives/{x}/parameters/6081:00", json={"raw": 1})
+    assert answer.status_code == 409
+    assert "has control" in answer.json()["detail"]
+    with station.live() as other:
+        start_jog(other, x)
+        refused = other.wait("refused", request="jog_start")
+        assert "has control" in refused["problem"]["detail"]
+    mine = {"X-Servodeck-Connection": page.connection}
+    station.ok(
+        station.http.put(f"/drives/{x}/parameters/6081:00", json={"raw": 1000}, headers=mine)
+    )
+
+
+def test_position_move_arrives(station: Station, x: str) -> None:
+    before = position(station, x)
+    body = {"mode": "PP", "target": 2.0, "relative": True, "speed": 600, "acceleration": 6000,
+            "deceleration": 6000, "travel_limit": 3, "torque_limit": 200}  # fmt: skip
+    station.done(station.http.post(f"/drives/{x}/jobs/move", json=body))
+    assert position(station, x) - before == pytest.approx(2.0, abs=0.01)
+    assert station.state(x)["state"] == "Switch on disabled"
+
+
+def test_move_outside_the_envelope_does_not_start(station: Station, x: str) -> None:
+    before = position(station, x)
+    body = {"mode": "PP", "target": 5.0, "relative": True, "travel_limit": 1, "torque_limit": 100}
+    job = station.job(station.http.post(f"/drives/{x}/jobs/move", json=body))
+    assert job["state"] == "failed"
+    assert "travel limit" in job["problem"]["detail"]
+    assert position(station, x) == pytest.approx(before, abs=0.001)
+
+
+def test_velocity_needs_consent_where_the_drive_has_no_watchdog(station: Station, x: str) -> None:
+    body = {"mode": "PV", "target": 300, "acceleration": 5000, "deceleration": 5000,
+            "travel_limit": 10, "torque_limit": 200, "timeout_s": 0.5}  # fmt: skip
+    job = station.job(station.http.post(f"/drives/{x}/jobs/move", json=body))
+    assert job["state"] == "failed"
+    assert "no watchdog" in job["problem"]["detail"]
+    result = station.done(
+        station.http.post(f"/drives/{x}/jobs/move", json=body | {"consent": True})
+    )
+    # 300 rpm for 0.5 s with 60 ms ramps: 2.5 rev less half a ramp, plus the stop.
+    assert result["end_rev"] - result["start_rev"] == pytest.approx(2.5, abs=0.6)
+    assert at_rest(station, x)
+
+
+def test_homing_to_the_present_position(station: Station, x: str) -> None:
+    methods = station.ok(station.http.get(f"/drives/{x}/homing-methods"))
+    assert {33, 34} <= {method["method"] for method in methods}
+    body = {"method": 33, "speed_switch": 120, "speed_zero": 60, "acceleration": 3000,
+            "travel_limit": 5, "torque_limit": 150}  # fmt: skip
+    result = station.done(station.http.post(f"/drives/{x}/jobs/home", json=body))
+    assert result["method"] == 33
+    answer = station.http.post(f"/drives/{x}/jobs/home", json=body | {"method": 99})
+    assert answer.status_code == 409
+
+
+def test_back_and_forth(station: Station, x: str) -> None:
+    start = position(station, x)
+    body = {"first": start, "second": start + 0.5, "speed": 600, "acceleration": 10000,
+            "dwell_s": 0.05, "count": 2, "travel_limit": 1, "torque_limit": 200}  # fmt: skip
+    result = station.done(station.http.post(f"/drives/{x}/jobs/sequence", json=body))
+    assert result["cycles"] == 2
+    assert position(station, x) == pytest.approx(start + 0.5, abs=0.01)
+
+
+def test_cancelled_move_stops_and_restores(station: Station, x: str) -> None:
+    body = {"mode": "PP", "target": 15.0, "relative": True, "speed": 120, "acceleration": 3000,
+            "deceleration": 3000, "travel_limit": 20, "torque_limit": 200}  # fmt: skip
+    job = station.ok(station.http.post(f"/drives/{x}/jobs/move", json=body))
+    until(lambda: moving(station, x), 5)
+    ended = station.ok(station.http.delete(f"/jobs/{job['id']}"))
+    assert ended["state"] == "cancelled"
+    now = station.state(x)
+    assert abs(now["velocity"]) < 2
+    assert now["state"] == "Switch on disabled"
+
+
+def test_two_motions_at_once_are_refused(station: Station, x: str) -> None:
+    body = {"mode": "PP", "target": 5.0, "relative": True, "speed": 120, "acceleration": 3000,
+            "travel_limit": 20, "torque_limit": 200}  # fmt: skip
+    first = station.ok(station.http.post(f"/drives/{x}/jobs/move", json=body))
+    second = station.http.post(f"/drives/{x}/jobs/move", json=body)
+    assert second.status_code == 409
+    assert "already moved" in second.json()["detail"]
+    station.ok(station.http.delete(f"/jobs/{first['id']}"))
+
+
+def test_enabling_while_a_fault_is_present_gives_the_cause(station: Station, x: str) -> None:
+    station.drives.command(do="inject", axis="Feed screw", what="over_temperature")
+    until(lambda: station.state(x)["faults"], 5, "the fault shows")
+    now = station.state(x)
+    assert now["state"] == "Fault"
+    assert now["faults"][0]["causes"]
+    assert now["faults"][0]["remedies"]
+    assert any("fault present" in cause for cause in now["blocked_by"])
+    station.drives.command(do="inject", axis="Feed screw", what="over_temperature", value=0)
+    state = station.ok(station.http.post(f"/drives/{x}/fault-reset", json={}))
+    assert state["state"] == "Switch on disabled"
+
+
+def test_scope_delivers_samples_with_their_times(station: Station, x: str, page: Live) -> None:
+    channels = [{"drive": x, "key": "6064:00"}, {"drive": x, "key": "606C:00"}]
+    page.send(type="scope_start", subscription=5, channels=channels)
+    info = page.wait("scope_info", subscription=5)
+    assert [c["synchronous"] for c in info["channels"]] == [False, False]
+    until(lambda: page.receive() and len(page.binary) >= 5, 10)
+    page.send(type="scope_stop", subscription=5)
+    import struct
+
+    sequences = []
+    for block in page.binary:
+        magic, subscription, sequence, dropped, rows, count, flags, _t0, dt = struct.unpack_from(
+            "<IIIIHHIdd", block
+        )
+        assert (magic, subscription, dropped, count, flags) == (0x424B4353, 5, 0, 2, 1)
+        assert len(block) == 40 + 8 * rows + 4 * rows * count
+        times = struct.unpack_from(f"<{rows}d", block, 40)
+        assert list(times) == sorted(times)
+        assert dt >= 0
+        sequences.append(sequence)
+    assert sequences == list(range(1, len(sequences) + 1))

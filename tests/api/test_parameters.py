@@ -1,0 +1,149 @@
+"""Parameters through the interface, down to the bytes on the wire and back."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.support.station import Station
+
+
+def test_scan_finds_both_drives(station: Station) -> None:
+    result = station.done(station.http.post("/scan", json={"url": "mlink://virtual0",
+                                                           "stations": [1, 2, 3]}))  # fmt: skip
+    found = {drive["station"]: drive for drive in result["found"]}
+    assert set(found) == {1, 2}
+    assert "mms7" in [match["profile"] for match in found[1]["matches"]]
+
+
+def test_read_all(station: Station, x: str) -> None:
+    result = station.done(station.http.post(f"/drives/{x}/jobs/read_all", json={}))
+    rows = station.ok(station.http.get(f"/drives/{x}/parameters"))
+    readable = [row for row in rows if row["access"] != "wo"]
+    assert result["failed"] == {}
+    assert result["read"] == len(readable) > 100
+    assert all(row["reading"]["raw"] is not None for row in readable)
+
+
+def test_write_is_read_back_and_told_to_everybody(station: Station, x: str) -> None:
+    with station.live() as page:
+        answer = station.ok(
+            station.http.put(f"/drives/{x}/parameters/6081:00", json={"raw": 123456})
+        )
+        assert answer["raw"] == 123456
+        told = page.wait("values", drive=x)
+        while all(value["key"] != "6081:00" for value in told["values"]):
+            told = page.wait("values", drive=x)
+        (value,) = [v for v in told["values"] if v["key"] == "6081:00"]
+        assert value["raw"] == 123456
+    assert station.ok(station.http.get(f"/drives/{x}/parameters/6081:00"))["raw"] == 123456
+
+
+@pytest.mark.parametrize(
+    ("key", "body", "status", "words"),
+    [
+        ("6041:00", {"raw": 1}, 409, "read-only"),
+        ("6081:00", {"raw": -1}, 422, "6081:00"),
+        ("6081:00", {"raw": "fast"}, 422, "not a UINT32"),
+        ("6081:00", {"raw": 1.5}, 422, "whole number"),
+        ("6081:00", {}, 422, "either raw or value"),
+        ("6081:00", {"raw": 1, "value": 1}, 422, "either raw or value"),
+        ("6081:00", {"raw": 1, "speed": 2}, 422, "speed"),
+        ("5555:00", {"raw": 1}, 404, "no parameter 5555:00"),
+    ],
+)
+def test_bad_writes_are_problems(
+    station: Station, x: str, key: str, body: dict[str, object], status: int, words: str
+) -> None:
+    answer = station.http.put(f"/drives/{x}/parameters/{key}", json=body)
+    assert answer.status_code == status
+    assert answer.headers["content-type"] == "application/problem+json"
+    problem = answer.json()
+    assert words in problem["detail"]
+    assert problem["status"] == status
+
+
+def test_unknown_drive_is_404(station: Station) -> None:
+    answer = station.http.get("/drives/nobody/state")
+    assert answer.status_code == 404
+    assert "nobody" in answer.json()["detail"]
+
+
+def test_foreign_host_and_origin_are_refused(station: Station) -> None:
+    for headers in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}):
+        answer = station.http.get("/drives", headers=headers)
+        assert answer.status_code == 403
+
+
+def test_saved_values_survive_a_power_cut_and_others_do_not(station: Station, x: str) -> None:
+    before = station.ok(station.http.get(f"/drives/{x}/parameters/6083:00"))["raw"]
+    wanted = before + 1000
+    station.ok(station.http.put(f"/drives/{x}/parameters/6083:00", json={"raw": wanted}))
+    assert station.ok(station.http.get(f"/drives/{x}"))["unsaved"] == 1
+    station.done(station.http.post(f"/drives/{x}/procedures/save", json={"confirmed": True}))
+    assert station.ok(station.http.get(f"/drives/{x}"))["unsaved"] == 0
+    station.ok(station.http.put(f"/drives/{x}/parameters/6083:00", json={"raw": wanted + 5}))
+    station.drives.command(do="power_cycle", axis="Feed screw")
+    again = station.ok(station.http.get(f"/drives/{x}/parameters/6083:00"))["raw"]
+    assert again == wanted
+
+
+def test_set_file_from_save_to_load(station: Station, x: str) -> None:
+    info = station.ok(
+        station.http.post(f"/drives/{x}/sets", json={"file": "as found", "author": "Anna"})
+    )
+    assert info["count"] > 50
+    key = "6083:00"
+    old = station.ok(station.http.get(f"/drives/{x}/parameters/{key}"))["raw"]
+    station.ok(station.http.put(f"/drives/{x}/parameters/{key}", json={"raw": old + 7}))
+    diff = station.ok(station.http.get(f"/drives/{x}/diff", params={"file": "as found.sdset"}))
+    changed = [row for row in diff["rows"] if row["selected"]]
+    assert [row["key"] for row in changed] == [key]
+    body = {"file": "as found.sdset", "keys": [key]}
+    report = station.done(station.http.post(f"/drives/{x}/jobs/load_set", json=body))
+    assert (report["written"], report["failed"]) == (1, 0)
+    assert station.ok(station.http.get(f"/drives/{x}/parameters/{key}"))["raw"] == old
+    text = station.http.get("/sets/as found.sdset").text
+    cut = station.http.put("/sets/cut", content=text[: len(text) // 2])
+    assert cut.status_code == 409
+    assert "truncated" in cut.json()["detail"] or "damaged" in cut.json()["detail"]
+    names = [file["file"] for file in station.ok(station.http.get("/sets"))]
+    assert "cut.sdset" not in names
+
+
+def test_compare_with_defaults_and_with_another_axis(station: Station, x: str) -> None:
+    y = station.add(2, name="Y")
+    try:
+        station.ok(station.http.put(f"/drives/{y}/parameters/6084:00", json={"raw": 4242}))
+        diff = station.ok(station.http.get(f"/drives/{x}/diff", params={"against": f"drive:{y}"}))
+        assert "6084:00" in [r["key"] for r in diff["rows"] if r["status"] == "differs"]
+        diff = station.ok(station.http.get(f"/drives/{y}/diff", params={"against": "defaults"}))
+        assert "6084:00" in [r["key"] for r in diff["rows"] if r["status"] == "differs"]
+    finally:
+        station.ok(station.http.delete(f"/drives/{y}"))
+
+
+def test_pulled_cable_is_told_and_recovers(station: Station, x: str) -> None:
+    with station.live() as page:
+        page.send(type="watch_state", drives=[x])
+        page.wait("state")
+        station.drives.command(do="pull", wire="mlink://virtual0")
+        try:
+            message = page.wait("state")
+            while message["state"]["fresh"]:
+                message = page.wait("state")
+            assert message["state"]["problem"]
+            answer = station.http.get(f"/drives/{x}/parameters/6041:00")
+            assert answer.status_code in (503, 504)
+            assert answer.json()["drive"] == "X"
+        finally:
+            station.drives.command(do="heal", wire="mlink://virtual0")
+        while not message["state"]["fresh"]:
+            message = page.wait("state", timeout_s=15)
+
+
+def test_drives_are_back_after_a_restart_of_the_server(station: Station, x: str) -> None:
+    station.ok(station.http.patch(f"/drives/{x}", json={"notes": "belt side"}))
+    station.stop_server()
+    station.start_server()
+    (drive,) = station.ok(station.http.get("/drives"))
+    assert (drive["id"], drive["name"], drive["notes"]) == (x, "X", "belt side")

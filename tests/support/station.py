@@ -1,0 +1,162 @@
+"""A whole station for tests: virtual drives in their process, the server in a thread."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import uvicorn
+from websockets.sync.client import ClientConnection, connect
+
+from backend.api.app import make_app
+from backend.bench import Bench
+from backend.commands.serve import LOOPBACK, _listen
+from backend.demo import DemoBench
+
+
+def until(condition: Callable[[], object], timeout_s: float = 10.0, what: str = "") -> Any:
+    """Poll until the condition is true; the value is returned. Fails with ``what`` in time."""
+    deadline = time.monotonic() + timeout_s
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > deadline:
+            raise AssertionError(f"not within {timeout_s} s: {what or condition}")
+        time.sleep(0.01)
+
+
+class Station:
+    """Server and virtual drives. ``http`` talks to the interface, ``drives`` causes trouble."""
+
+    def __init__(self, folder: Path, bench_file: Path | None = None) -> None:
+        self.folder = folder
+        self.drives = DemoBench(bench_file, folder / "wires", folder / "nvm")
+        self._server: uvicorn.Server | None = None
+        self._thread: threading.Thread | None = None
+        self.http = httpx.Client()
+        self.port = 0
+
+    def start(self) -> None:
+        self.drives.start()
+        self.start_server()
+
+    def start_server(self) -> None:
+        listening = _listen("127.0.0.1", 0)
+        self.port = listening.getsockname()[1]
+        started = threading.Event()
+
+        def run() -> None:
+            async def main() -> None:
+                bench = Bench(self.folder / "state", self.drives.aliases)
+                config = uvicorn.Config(
+                    make_app(bench, hosts=LOOPBACK),
+                    log_level="warning",
+                    ws_per_message_deflate=False,
+                    timeout_graceful_shutdown=2,
+                )
+                self._server = uvicorn.Server(config)
+                serving = asyncio.create_task(self._server.serve(sockets=[listening]))
+                while not self._server.started:
+                    await asyncio.sleep(0.01)
+                started.set()
+                await serving
+
+            asyncio.run(main())
+
+        self._thread = threading.Thread(target=run, name="server", daemon=True)
+        self._thread.start()
+        assert started.wait(20)
+        self.http = httpx.Client(base_url=f"{self.url}/api/v1", timeout=20)
+
+    def stop_server(self) -> None:
+        self.http.close()
+        if self._server is not None and self._thread is not None:
+            self._server.should_exit = True
+            self._thread.join(15)
+            assert not self._thread.is_alive(), "the server does not shut down"
+
+    def stop(self) -> None:
+        self.stop_server()
+        self.drives.stop()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    # --- shortcuts --------------------------------------------------------------------
+
+    def ok(self, answer: httpx.Response) -> Any:
+        assert answer.is_success, answer.text
+        return answer.json() if answer.content else None
+
+    def add(self, station: int = 1, url: str = "mlink://virtual0", profile: str = "mms7",
+            name: str = "") -> str:  # fmt: skip
+        body = {"url": url, "station": station, "profile": profile, "name": name}
+        drive = self.ok(self.http.post("/drives", json=body))
+        return str(drive["id"])
+
+    def job(self, answer: httpx.Response, timeout_s: float = 30.0) -> Any:
+        """Wait for a job's end; returns the job."""
+        job = self.ok(answer)
+
+        def ended() -> Any:
+            now = self.ok(self.http.get(f"/jobs/{job['id']}"))
+            return now if now["state"] != "running" else None
+
+        return until(ended, timeout_s, f"job {job['title']}")
+
+    def done(self, answer: httpx.Response, timeout_s: float = 30.0) -> Any:
+        job = self.job(answer, timeout_s)
+        assert job["state"] == "done", job
+        return job["result"]
+
+    def state(self, drive: str) -> Any:
+        return self.ok(self.http.get(f"/drives/{drive}/state"))
+
+    def live(self) -> Live:
+        return Live(f"ws://127.0.0.1:{self.port}/api/v1/live")
+
+
+class Live:
+    """A page's websocket."""
+
+    def __init__(self, url: str) -> None:
+        self.socket: ClientConnection = connect(url, max_size=None)
+        self.binary: list[bytes] = []
+        hello = self.wait("hello")
+        self.connection = hello["connection"]
+
+    def send(self, **message: object) -> None:
+        self.socket.send(json.dumps(message))
+
+    def receive(self, timeout_s: float = 10.0) -> Any:
+        message = self.socket.recv(timeout=timeout_s)
+        if isinstance(message, bytes):
+            self.binary.append(message)
+            return {"type": "binary"}
+        return json.loads(message)
+
+    def wait(self, kind: str, timeout_s: float = 10.0, **fields: object) -> Any:
+        """The next message of this kind whose fields agree."""
+        deadline = time.monotonic() + timeout_s
+        while time.monotonic() < deadline:
+            message = self.receive(deadline - time.monotonic())
+            if message["type"] == kind and all(message.get(k) == v for k, v in fields.items()):
+                return message
+        raise AssertionError(f"no {kind} message within {timeout_s} s")
+
+    def close(self) -> None:
+        self.socket.close()
+
+    def __enter__(self) -> Live:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self.close()
