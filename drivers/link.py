@@ -89,7 +89,10 @@ class Link(Protocol):
 
     kind: LinkKind
     url: str
-    cyclic: Cyclic | None
+
+    @property
+    def cyclic(self) -> Cyclic | None:
+        """Synchronous process data, where the bus has them."""
 
     async def open(self) -> None:
         """Open the adapter.
