@@ -21,12 +21,23 @@ from backend.analysis.frf import (
     loop_spectra,
     valid_band_hz,
 )
-from backend.analysis.sampled_model import LoopModel, SampledFit, fit_loop, fit_sampled_model
+from backend.analysis.sampled_model import (
+    SampledFit,
+    fit_loop,
+    fit_sampled_model,
+    loop_image_factor,
+)
 from backend.analysis.sampling import SignalPath, delay_response
 
 #: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
 SYSTEMATIC_DB = 0.03
 SYSTEMATIC_DEG = 0.15
+
+#: A model whose median relative misfit is larger corrects nothing.
+TRUSTED_ERROR = 0.03
+
+#: At most this many rounds of refining loop and mechanics against each other.
+LOOP_PASSES = 3
 
 
 @dataclass(frozen=True)
@@ -35,12 +46,14 @@ class Identification:
 
     ``direct`` is the estimate with only hold, current loop and delay divided out and its honest
     band (0.25 of the sample rate); ``corrected`` has the folded images removed as well and holds
-    to 0.4; ``fit`` is the model that did it.
+    to 0.4; ``fit`` is the model that did it. When no model fits (``trusted`` False), both are the
+    plain estimate with a band of 0.1 of the sample rate.
     """
 
     direct: Frf
     corrected: Frf
     fit: SampledFit
+    trusted: bool = True
 
 
 def identify_mechanics(
@@ -60,11 +73,15 @@ def identify_mechanics(
     if quantity == "closed_loop":
         raise ValueError("mechanics are identified from torque, not from a loop's reference")
     raw = estimate_periodic(records, path, quantity, coulomb_nm=coulomb_nm, jitter_s=jitter_s)
-    loop = LoopModel()
-    if quantity == "torque_injection":
-        own, velocity = loop_spectra(records, path)
-        loop = fit_loop(raw.frequency_hz, own, velocity, path)
-    fit = fit_sampled_model(raw, path, loop=loop, max_modes=max_modes)
+    if quantity == "torque_mode":
+        fit = fit_sampled_model(raw, path, max_modes=max_modes)
+    else:
+        fit = _fit_with_loop(raw, records, path, max_modes)
+    if fit.error > TRUSTED_ERROR:
+        # No model explains what was sampled, so neither delay nor images are known.
+        low, high = raw.valid_band_hz
+        plain = replace(raw, valid_band_hz=(low, min(high, 0.1 * raw.sample_rate_hz)))
+        return Identification(plain, plain, fit, trusted=False)
     late = delay_response(raw.frequency_hz, fit.delay_s)
     delay_deg = 360.0 * raw.frequency_hz * fit.delay_std_s
     direct = replace(
@@ -77,6 +94,24 @@ def identify_mechanics(
     return Identification(
         _widened(direct, factor, 1.0), _without_images(direct, factor, jitter_s), fit
     )
+
+
+def _fit_with_loop(
+    raw: Frf, records: tuple[Record, ...], path: SignalPath, max_modes: int
+) -> SampledFit:
+    """Loop and mechanics in turn: each is needed to take the images out of the other."""
+    own, velocity = loop_spectra(records, path)
+    fit = fit_sampled_model(
+        raw, path, loop=fit_loop(raw.frequency_hz, own, velocity, path), max_modes=max_modes
+    )
+    for _ in range(LOOP_PASSES):
+        clean = own / loop_image_factor(raw.frequency_hz, fit)
+        loop = fit_loop(raw.frequency_hz, clean, velocity, path)
+        change = abs(loop.c0 / fit.loop.c0 - 1.0)
+        if change < 0.003:
+            break
+        fit = fit_sampled_model(raw, path, loop=loop, max_modes=max_modes)
+    return fit
 
 
 def _widened(frf: Frf, factor: ComplexArray, share: float) -> Frf:

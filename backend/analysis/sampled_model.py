@@ -161,7 +161,7 @@ def seen_response(
     lag = lag_response(all_f, path.current_bandwidth_hz)
     command = delay_response(all_f, path.command_delay_s)
     plant = model.response(all_f) * delay_response(all_f, delay_s + path.response_delay_s)
-    controller = lag * loop.response(all_f)
+    controller = lag * loop.response(all_f) * delay_response(all_f, path.loop_delay_s)
     torque = hold * lag * command / (1.0 + controller * plant)
     measured = np.sum(plant * torque, axis=0)
     own = -np.sum(controller * plant * torque, axis=0)
@@ -246,7 +246,9 @@ def _coarse_delay(frf: Frf, use: BoolArray, longest_s: float, count: int) -> flo
     """Delay, on a grid, with which a few modes explain the response best."""
     top = float(frf.frequency_hz[use][-1])
     grid = np.arange(0.0, longest_s + 1e-9, 0.05 / top)
-    f, g = frf.frequency_hz[use], frf.response[use]
+    # A coarse answer needs no more than about 80 lines.
+    thin = slice(None, None, max(1, np.count_nonzero(use) // 80))
+    f, g = frf.frequency_hz[use][thin], frf.response[use][thin]
     errors = [_greedy(f, g * np.conj(delay_response(f, d)), count)[1] for d in grid]
     return float(grid[np.argmin(errors)])
 
@@ -314,6 +316,21 @@ class _Problem:
         return np.concatenate(keep)
 
 
+def loop_image_factor(frequency_hz: FloatArray, fit: SampledFit) -> ComplexArray:
+    """Ratio of the loop's own torque to the velocity as sampled, relative to the true ratio."""
+    f = np.asarray(frequency_hz, dtype=np.float64)
+    path = fit.path
+    images = int(np.clip(np.ceil(6000.0 / path.sample_rate_hz), 2, 6))
+    all_f = f[None, :] + np.arange(-images, images + 1)[:, None] * path.sample_rate_hz
+    lag = lag_response(all_f, path.current_bandwidth_hz)
+    plant = fit.model.response(all_f) * delay_response(all_f, fit.delay_s + path.response_delay_s)
+    controller = lag * fit.loop.response(all_f) * delay_response(all_f, path.loop_delay_s)
+    hold = hold_response(all_f, path.sample_rate_hz, path.hold)
+    torque = hold * lag * delay_response(all_f, path.command_delay_s) / (1.0 + controller * plant)
+    seen = np.sum(controller * plant * torque, axis=0) / np.sum(plant * torque, axis=0)
+    return np.asarray(seen / controller[images], dtype=np.complex128)
+
+
 def _steps(size: int) -> FloatArray:
     """Typical sizes of parameter changes, see :func:`_unpack`."""
     return np.array([0.3, 1.0, 0.05, *[0.03, 0.5, 0.5, 0.05] * ((size - 3) // 4)])
@@ -361,7 +378,8 @@ def fit_sampled_model(
 
     ``frf`` is a direct estimate made with ``path``; lines up to 0.4 of the sample rate with
     enough coherence take part. Modes are added one by one as long as the Bayesian information
-    criterion gains. ``longest_delay_s`` defaults to three bus cycles.
+    criterion gains. ``longest_delay_s`` defaults to three bus cycles in torque
+    mode and a quarter of one in a closed loop.
     """
     band = valid_band_hz(float(frf.frequency_hz[0]), path.sample_rate_hz, model=True)
     use = (frf.frequency_hz <= band[1]) & (frf.coherence >= minimum_coherence)
@@ -371,17 +389,13 @@ def fit_sampled_model(
     f, g = frf.frequency_hz[use], frf.response[use]
     weight = _weights(frf, floor)[use]
     period_s = 1.0 / path.sample_rate_hz
-    longest = 3 * period_s if longest_delay_s is None else longest_delay_s
-    coarse = _coarse_delay(frf, use, longest, min(3, max_modes))
+    if longest_delay_s is None:
+        # Torque and velocity are reported together: only injection itself can be cycles late.
+        longest_delay_s = 3 * period_s if loop == LoopModel() else 0.25 * period_s
+    coarse = _coarse_delay(frf, use, longest_delay_s, min(3, max_modes))
 
     problem = _Problem(f, g, weight, path, loop, period_s, coarse / period_s)
     x, jacobian = _grow(problem, max_modes)
-    if coarse > 0.25 * period_s and problem.error(x) > 0.03:
-        # Strong images can mislead the coarse search; most drives answer within a cycle.
-        prompt = replace(problem, coarse_delay=0.25)
-        other, other_jacobian = _grow(prompt, max_modes)
-        if prompt.error(other) < problem.error(x):
-            problem, x, jacobian = prompt, other, other_jacobian
     model, delay = _unpack(x, period_s)
     residuals = problem.misfit(x)
     freedom = max(residuals.size - x.size, 1)
@@ -410,7 +424,8 @@ def fit_loop(
         raise ValueError("fewer than 6 lines below 0.15 of the sample rate")
     f = frequency_hz[use]
     s = 1j * TURN * f
-    reference = -own_torque[use] / velocity[use] / lag_response(f, path.current_bandwidth_hz)
+    known = lag_response(f, path.current_bandwidth_hz) * delay_response(f, path.loop_delay_s)
+    reference = -own_torque[use] / velocity[use] / known
     a = np.column_stack([np.ones(f.size), 1.0 / s, 1.0 / s**2]) / np.abs(reference)[:, None]
     b = reference / np.abs(reference)
     matrix, target = np.vstack([a.real, a.imag]), np.concatenate([b.real, b.imag])

@@ -30,7 +30,8 @@ class SignalPath:
     ``current_bandwidth_hz`` is the current loop's corner (None: fast enough to ignore).
     ``command_delay_s`` lies between the sent value and the torque, ``response_delay_s`` between
     the true and the reported velocity. ``direct_gain`` is the torque that one unit of injection
-    causes at once: 1 for torque offsets, the speed gain for velocity offsets.
+    causes at once: 1 for torque offsets, the speed gain for velocity offsets. ``loop_delay_s``
+    is what the drive's own loop adds by computing in steps (half of its 50 µs period).
     """
 
     sample_rate_hz: float
@@ -39,6 +40,7 @@ class SignalPath:
     command_delay_s: float = 0.0
     response_delay_s: float = 0.0
     direct_gain: float = 1.0
+    loop_delay_s: float = 25e-6
 
 
 def hold_response(frequency_hz: FloatArray, sample_rate_hz: float, hold: Hold) -> ComplexArray:
