@@ -164,8 +164,15 @@ class HostProcess:
             if not data:
                 self._gone("the EtherCAT process ended")
                 return
-            for message in unpacker.feed(data):
-                self._take(message)
+            try:
+                for message in unpacker.feed(data):
+                    self._take(message)
+            except (DriveError, ValueError, KeyError) as error:
+                # Not our language any more: the child is replaced.
+                self._gone(f"the EtherCAT process sent nonsense ({error})")
+                if self._process is not None and self._process.returncode is None:
+                    self._process.kill()
+                return
 
     def _take(self, message: Message) -> None:
         number = message.get("id")

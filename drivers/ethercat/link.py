@@ -20,11 +20,15 @@ from drivers.ethercat.segmentcyclic import EthercatCyclic
 from drivers.link import Address, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
 from profiles.schema import LinkKind, Profile
 
-_OPEN_S, _ANSWER_S, _SCAN_S, _CONFIGURE_S, _FOE_S = 8.0, 15.0, 60.0, 60.0, 1800.0
+_SCHEME = "ethercat://"
+_OPEN_S, _ANSWER_S, _SCAN_S, _FOE_S = 8.0, 15.0, 60.0, 1800.0
 
 
 class EthercatLink:
-    """One segment. ``launcher`` is put before the host's command line, as to enter a namespace.
+    """One segment, by bus URL or by interface name.
+
+    ``launcher`` is put before the host's command line, as to enter the private network of a
+    virtual segment; ``url`` is then the name that the user knows it by.
 
     Stations count from 1 in the order of the cable. All methods of `drivers.link.Link`, and what
     only EtherCAT has.
@@ -35,8 +39,9 @@ class EthercatLink:
     def __init__(
         self, interface: str, *, url: str | None = None, launcher: Sequence[str] = ()
     ) -> None:
+        interface = interface.removeprefix(_SCHEME)
         self.interface = interface
-        self.url = url or f"ethercat://{interface}"
+        self.url = url or f"{_SCHEME}{interface}"
         self._profiles: dict[int, Profile] = {}
         self._listeners: list[Callable[[LinkEvent], None]] = []
         self._status: Message = {}

@@ -420,7 +420,7 @@ class Operations:
         alias = int(message["alias"])
         if not 0 <= alias <= 0xFFFF:
             raise OutOfRange(f"{alias} is no alias", value=alias, limit="0…65535")
-        if self.loop is not None or self.lanes.pending():
+        if self.loop is not None:
             raise Busy("the segment is busy", remedy="stop the cyclic exchange first")
         slave = self.segment.slaves[station.number - 1]
         self._ring.host_lives_until(time.monotonic_ns() + 10_000_000_000, "writing the alias")

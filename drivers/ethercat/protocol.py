@@ -65,7 +65,8 @@ class Unpacker:
                 raise errors.ProtocolError(f"a message of {length} bytes between our processes")
             if len(self._buffer) < 4 + length:
                 break
-            found.append(msgpack.unpackb(bytes(self._buffer[4 : 4 + length]), raw=False))
+            body = bytes(self._buffer[4 : 4 + length])
+            found.append(msgpack.unpackb(body, raw=False, strict_map_key=False))
             del self._buffer[: 4 + length]
         return found
 

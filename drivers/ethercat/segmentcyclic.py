@@ -193,8 +193,7 @@ class EthercatCyclic:
                 await asyncio.sleep(_RENEW_S)
                 for station in stations:
                     await self.renew(station)
-                    if reason := self.axis_state(station)[2]:
-                        raise NotAllowed(f"station {station}: {reason}")
+                    self._raise_if_halted(station)
         except BaseException:
             for station in stations:
                 with contextlib.suppress(LinkLost):
@@ -218,6 +217,10 @@ class EthercatCyclic:
         self._status = {}
 
     # Parts ---------------------------------------------------------------------------------
+
+    def _raise_if_halted(self, station: int) -> None:
+        if reason := self.axis_state(station)[2]:
+            raise NotAllowed(f"station {station}: {reason}")
 
     def _check_names(self, signals: Sequence[CyclicSignal]) -> None:
         names = [signal.channel for signal in signals]
