@@ -103,7 +103,7 @@ class AlStateMachine:
             return
         if not self._application.ready(target):
             if now_ns < self._give_up_ns:
-                self._due_ns = now_ns + 1
+                self._due_ns = self._give_up_ns
                 return
             self._target = None
             self._fail(AlCode.WATCHDOG)
@@ -111,6 +111,12 @@ class AlStateMachine:
         self._target = None
         self.error, self.code = False, 0
         self._enter(target, 0)
+
+    def retry(self, now_ns: int) -> None:
+        """Something a pending step may be waiting for has happened."""
+        if self._target is not None and self._due_ns == self._give_up_ns:
+            self._due_ns = now_ns
+            self.run(now_ns)
 
     def fall(self, state: AlState, code: int) -> None:
         """An error of the running slave: down to ``state`` with the error flag."""

@@ -129,9 +129,8 @@ class Slave:
     def after_frame(self, now_ns: int) -> None:
         """Called once a frame has left."""
         self.process.after_frame(now_ns)
-        state = self.al.due_ns
-        if state is not None and state <= now_ns + 1:
-            self.al.run(now_ns + 1)
+        if self.al.due_ns is not None:
+            self.al.retry(now_ns)
             self._show()
 
     def _keep_house(self, now_ns: int) -> None:
