@@ -199,7 +199,9 @@ class Homing:
         self._axis.watch_stall(
             0.95 * torque, core.number("2070:02", 500) * 1e-3, float(self._axis.p[k.P_STOP_SPEED])
         )
-        self._drive(direction, slow=False)
+        # In the speed loop: a position demand would run away from the stalled axis.
+        speed, ramp = self._speed("6099:01", 655360), self._acceleration()
+        self._axis.run_velocity(math.copysign(speed, direction), ramp, ramp)
         yield Until(k.EV_STALL)
         return self._axis.angle_rad
 
