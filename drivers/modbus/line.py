@@ -31,6 +31,7 @@ from drivers.modbus.framing import (
     write_one_query,
 )
 from drivers.modbus.port import LineSettings, Port, open_port
+from drivers.modbus.timing import sleep_precisely
 
 #: A line that talks longer than this without a pause is no Modbus line at these settings.
 _BABBLE_S = 1.0
@@ -63,7 +64,7 @@ class Line:
         *,
         on_change: Callable[[bool, str], None] = lambda _up, _text: None,
         clock: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], None] = time.sleep,
+        sleep: Callable[[float], None] = sleep_precisely,
         opener: Callable[[LineSettings], Port] = open_port,
     ) -> None:
         self.settings = settings

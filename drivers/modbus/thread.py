@@ -8,6 +8,8 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
+from drivers.modbus.timing import fine_timers
+
 T = TypeVar("T")
 
 
@@ -19,7 +21,9 @@ class BusThread:
     """
 
     def __init__(self, name: str) -> None:
-        self._executor = ThreadPoolExecutor(max_workers=1, thread_name_prefix=name)
+        self._executor = ThreadPoolExecutor(
+            max_workers=1, thread_name_prefix=name, initializer=fine_timers
+        )
         self._urgent: deque[Callable[[], None]] = deque()
         self._normal: deque[Callable[[], None]] = deque()
 

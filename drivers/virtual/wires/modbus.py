@@ -24,6 +24,7 @@ from drivers.modbus.framing import (
     write_response,
 )
 from drivers.modbus.registers import Place, to_bytes, to_words
+from drivers.modbus.timing import fine_timers
 from drivers.virtual.device import (
     ABORT_LENGTH,
     ABORT_NO_OBJECT,
@@ -194,12 +195,14 @@ class ModbusSlave:
         self._troubles: deque[Trouble] = deque()
         self._parser = RequestParser()
         self._stop = threading.Event()
+        self._serving = threading.Event()
         self._thread = threading.Thread(target=self._serve, name=f"slave {wire.path}", daemon=True)
 
     def start(self) -> None:
-        """Make the wire and answer on it."""
+        """Make the wire and answer on it; returns when the first request would be answered."""
         self.wire.open()
         self._thread.start()
+        self._serving.wait()
 
     def stop(self) -> None:
         """End the thread and remove the wire."""
@@ -213,7 +216,9 @@ class ModbusSlave:
         self._troubles.extend(troubles)
 
     def _serve(self) -> None:
-        self.wire.settle_clock()
+        fine_timers()
+        self._advance(self._now_ns())
+        self._serving.set()
         ticked_s = started_s = time.monotonic()
         while not self._stop.is_set():
             data = self.wire.read(_TICK_S)

@@ -7,10 +7,8 @@ its last bit would have been.
 
 from __future__ import annotations
 
-import ctypes
 import os
 import select
-import sys
 import termios
 import threading
 import time
@@ -19,9 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.errors import LinkLost
+from drivers.modbus.timing import sleep_precisely
 
-_PR_SET_TIMERSLACK = 29
-_WAKE_SAMPLES = 15
 #: termios speed codes of this system, for asking which rate the client has set.
 _SPEEDS: dict[int, int] = {
     getattr(termios, name): int(name[1:])
@@ -64,7 +61,6 @@ class PtyWire:
         self._lock = threading.Lock()
         self._closing = False
         self._busy_until_s = 0.0
-        self._wake_late_s = 0.0
 
     def open(self) -> None:
         """Create the pty and the link to it.
@@ -122,19 +118,6 @@ class PtyWire:
         except termios.error:
             return None
 
-    def settle_clock(self) -> None:
-        """Call once on the thread that reads and writes: fine timers, and how late they wake."""
-        if self.wire_time is None:
-            return
-        if sys.platform == "linux":
-            ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
-        late = []
-        for _ in range(_WAKE_SAMPLES):
-            due = time.monotonic() + 200e-6
-            time.sleep(200e-6)
-            late.append(time.monotonic() - due)
-        self._wake_late_s = sorted(late)[_WAKE_SAMPLES // 2]
-
     def read(self, timeout_s: float) -> bytes:
         """Bytes from the client, at once; empty after ``timeout_s`` without any.
 
@@ -167,9 +150,7 @@ class PtyWire:
         if self.wire_time is not None:
             start = max(time.monotonic(), self._busy_until_s + self.wire_time.turnaround_s)
             self._busy_until_s = start + len(data) * self.wire_time.char_s
-            pause = self._busy_until_s - self._wake_late_s - time.monotonic()
-            if pause > 0:
-                time.sleep(pause)
+            sleep_precisely(self._busy_until_s - time.monotonic())
         with self._lock:
             try:
                 while data and self._master >= 0:
