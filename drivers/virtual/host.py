@@ -16,6 +16,7 @@ import argparse
 import json
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -59,6 +60,10 @@ class Wires:
         device = self.devices.get(axis.name)
         if device is None:
             device = make_device(axis.drive, axis.mechanics, self._nvm, station)
+            # Compiles the physics on a machine's first start, before anybody asks the drive.
+            now_ns = time.monotonic_ns()
+            device.advance(now_ns)
+            device.advance(now_ns + 10_000_000)
             self.devices[axis.name] = device
         return device
 

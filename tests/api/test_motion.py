@@ -112,9 +112,11 @@ def test_jog_keeps_the_travel_limit(station: Station, x: str, page: Live) -> Non
 
 def test_jog_restores_what_it_changed(station: Station, x: str, page: Live) -> None:
     keys = ["6060:00", "6081:00", "6083:00", "6084:00"]
-    read = lambda: [
-        station.ok(station.http.get(f"/drives/{x}/parameters/{k}"))["raw"] for k in keys
-    ]  # noqa: E731, E501
+
+    def read() -> list[int]:
+        rows = [station.ok(station.http.get(f"/drives/{x}/parameters/{k}")) for k in keys]
+        return [row["raw"] for row in rows]
+
     before = read()
     jog_until_fast(station, page, x)
     page.send(type="jog_stop", drive=x)

@@ -19,9 +19,11 @@ def test_read_all(station: Station, x: str) -> None:
     result = station.done(station.http.post(f"/drives/{x}/jobs/read_all", json={}))
     rows = station.ok(station.http.get(f"/drives/{x}/parameters"))
     readable = [row for row in rows if row["access"] != "wo"]
-    assert result["failed"] == {}
-    assert result["read"] == len(readable) > 100
-    assert all(row["reading"]["raw"] is not None for row in readable)
+    # MLink has one register for subindex 0 and 1: nobody can tell them apart there.
+    assert all("cannot tell" in why for why in result["failed"].values())
+    assert result["read"] + len(result["failed"]) == len(readable) > 100
+    good = [row for row in readable if row["key"] not in result["failed"]]
+    assert all(row["reading"]["raw"] is not None for row in good)
 
 
 def test_write_is_read_back_and_told_to_everybody(station: Station, x: str) -> None:

@@ -1,0 +1,78 @@
+"""Checks of a profile beyond its schema, and how much of each manual chapter it covers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from profiles.schema import INTEGER_RANGE, Parameter, Profile
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something a reviewer must look at."""
+
+    key: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.text}"
+
+
+def check(profile: Profile) -> list[Finding]:
+    """What is wrong or unlikely; empty for a sound profile.
+
+    A default outside its range is allowed where a note or a second printing says so.
+    """
+    findings: list[Finding] = []
+    for parameter in profile.parameters:
+        findings += _check_parameter(profile, parameter)
+    codes = Counter(fault.code for fault in profile.faults)
+    findings += [Finding(code, "fault code given twice") for code, n in codes.items() if n > 1]
+    methods = Counter(method.method for method in profile.homing_methods)
+    findings += [Finding(f"homing {m}", "given twice") for m, n in methods.items() if n > 1]
+    return findings
+
+
+def _check_parameter(profile: Profile, p: Parameter) -> list[Finding]:
+    findings: list[Finding] = []
+    low, high = p.raw_limits
+    explained = bool(p.notes or p.also_printed)
+    if isinstance(p.default_raw, (int, float)) and not explained:
+        if (low is not None and p.default_raw < low) or (high is not None and p.default_raw > high):
+            findings.append(Finding(p.key, f"default {p.default_raw} outside {low}…{high}"))
+    bounds = INTEGER_RANGE.get(p.type)
+    if bounds is not None:
+        for name, value in (("min_raw", p.min_raw), ("max_raw", p.max_raw)):
+            if value is not None and not bounds[0] <= value <= bounds[1]:
+                findings.append(Finding(p.key, f"{name} {value} does not fit {p.type}"))
+    outside = [
+        code
+        for code in p.enum
+        if (low is not None and code < low) or (high is not None and code > high)
+    ]
+    if outside and not explained:
+        findings.append(Finding(p.key, f"enumerated values {outside} outside {low}…{high}"))
+    if not p.source.startswith(f"{profile.manual}:"):
+        findings.append(Finding(p.key, f"source {p.source!r} is not of manual {profile.manual}"))
+    findings += _check_number(p)
+    return findings
+
+
+def _check_number(p: Parameter) -> list[Finding]:
+    """Pgg.nn is object 2000h + gg, subindex nn + 1 (002 and 000, chapters on parameters)."""
+    if p.number is None or not p.number.startswith("P") or "." not in p.number:
+        return []
+    group, _, number = p.number[1:].partition(".")
+    expected = f"{0x2000 + int(group):04X}:{int(number) + 1:02X}"
+    if p.key == expected:
+        return []
+    return [Finding(p.key, f"{p.number} should be {expected}")]
+
+
+def coverage(profile: Profile) -> list[str]:
+    """A line per chapter of the manual: what of it is in the profile."""
+    lines = [f"{chapter}: {text}" for chapter, text in profile.chapters.items()]
+    groups = Counter(p.group for p in profile.parameters)
+    lines += [f"group {group}: {count} parameters" for group, count in groups.items()]
+    return lines

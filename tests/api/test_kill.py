@@ -1,0 +1,134 @@
+"""Processes killed in the middle of motion: the axis stops by itself, and a restart goes on."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from backend.demo import DemoBench
+from drivers.link import Address
+from drivers.urls import link_for
+from tests.support.station import Live, until
+
+SPEED_RPM, RAMP_RPM_S = 300.0, 3000.0
+#: v·T + v²/2a with T = 0.2 s, in increments of 65536 to the revolution (004: default).
+LEAD_INC = 65536 * (SPEED_RPM / 60 * 0.2 + (SPEED_RPM / 60) ** 2 / (2 * RAMP_RPM_S / 60))
+
+
+@pytest.fixture
+def drives(tmp_path: Path) -> Iterator[DemoBench]:
+    with DemoBench(None, tmp_path / "wires", tmp_path / "nvm") as running:
+        yield running
+
+
+class ServerProcess:
+    """`servodeck serve` as a user starts it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "backend", "serve", "--port", "0", "--config", str(folder)],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        found = re.search(r"http://localhost:(\d+)/", line)
+        assert found, line
+        self.port = int(found[1])
+        self.http = httpx.Client(base_url=f"http://127.0.0.1:{self.port}/api/v1", timeout=20)
+
+    def live(self) -> Live:
+        return Live(f"ws://127.0.0.1:{self.port}/api/v1/live")
+
+    def kill(self) -> None:
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+        self.http.close()
+
+    def end(self) -> None:
+        self.process.send_signal(signal.SIGINT)
+        assert self.process.wait(15) == 0
+        self.http.close()
+
+
+async def positions(url: str, seconds: float) -> list[tuple[float, int]]:
+    """Time and position, read from the wire by another client."""
+    link = link_for(url)
+    await link.open()
+    result = []
+    end = time.monotonic() + seconds
+    try:
+        while time.monotonic() < end:
+            data = await link.read(1, Address(0x6064, 0, "INT32"))
+            result.append((time.monotonic(), int.from_bytes(data, "little", signed=True)))
+    finally:
+        await link.close()
+    return result
+
+
+def add_drive(server: ServerProcess, url: str) -> str:
+    body = {"url": url, "station": 1, "profile": "mms7", "name": "X"}
+    answer = server.http.post("/drives", json=body)
+    assert answer.status_code == 201, answer.text
+    return str(answer.json()["id"])
+
+
+async def test_killed_server_leaves_an_axis_that_stops_by_itself(
+    drives: DemoBench, tmp_path: Path
+) -> None:
+    url = drives.aliases["mlink://virtual0"]
+    server = ServerProcess(tmp_path / "state")
+    x = add_drive(server, url)
+    page = server.live()
+    page.send(type="jog_start", drive=x, direction=1, speed=SPEED_RPM, acceleration=RAMP_RPM_S,
+              travel_limit=30, torque_limit=150)  # fmt: skip
+    end = time.monotonic() + 1.5
+    while time.monotonic() < end:
+        page.send(type="jog_renew", drive=x)
+        time.sleep(0.02)
+    state = server.http.get(f"/drives/{x}/state").json()
+    assert abs(state["velocity"] - SPEED_RPM) < 30
+    os.kill(server.process.pid, signal.SIGKILL)
+    seen = await positions(url, 1.5)
+    server.kill()
+    (_, first), (_, last) = seen[0], seen[-1]
+    still = [t for t, p in seen if abs(p - last) > 65536 * 0.002]
+    assert last - first <= LEAD_INC * 1.02, "no further than v·T + v²/2a"
+    assert (max(still, default=seen[0][0]) - seen[0][0]) < 0.6, "and it stands soon"
+
+
+async def test_server_finds_its_drives_again_after_a_kill(
+    drives: DemoBench, tmp_path: Path
+) -> None:
+    url = drives.aliases["mlink://virtual0"]
+    server = ServerProcess(tmp_path / "state")
+    x = add_drive(server, url)
+    server.kill()
+    again = ServerProcess(tmp_path / "state")
+    try:
+        assert [drive["id"] for drive in again.http.get("/drives").json()] == [x]
+        until(lambda: again.http.get(f"/drives/{x}/state").json()["fresh"], 5)
+    finally:
+        again.end()
+
+
+async def test_ended_server_stops_the_axis_first(drives: DemoBench, tmp_path: Path) -> None:
+    url = drives.aliases["mlink://virtual0"]
+    server = ServerProcess(tmp_path / "state")
+    x = add_drive(server, url)
+    body = {"mode": "PV", "target": 200, "acceleration": 3000, "deceleration": 3000,
+            "travel_limit": 30, "torque_limit": 150, "timeout_s": 60, "consent": True}  # fmt: skip
+    server.http.post(f"/drives/{x}/jobs/move", json=body).raise_for_status()
+    until(lambda: server.http.get(f"/drives/{x}/state").json()["velocity"] > 100, 5)
+    server.end()
+    seen = await positions(url, 0.3)
+    assert abs(seen[-1][1] - seen[0][1]) < 65536 * 0.002
