@@ -39,7 +39,8 @@ def _check_parameter(profile: Profile, p: Parameter) -> list[Finding]:
     low, high = p.raw_limits
     explained = bool(p.notes or p.also_printed)
     if isinstance(p.default_raw, (int, float)) and not explained:
-        if (low is not None and p.default_raw < low) or (high is not None and p.default_raw > high):
+        below = low is not None and p.default_raw < low
+        if below or (high is not None and p.default_raw > high):
             findings.append(Finding(p.key, f"default {p.default_raw} outside {low}…{high}"))
     bounds = INTEGER_RANGE.get(p.type)
     if bounds is not None:

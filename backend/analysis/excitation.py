@@ -198,12 +198,12 @@ def _play_periodic(
     n = period.size
     if ramp_samples == 0:
         return np.tile(period, periods)
-    lead = period[np.arange(-ramp_samples, 0) % n] * _cosine_ramp(ramp_samples)
-    tail = period[np.arange(ramp_samples) % n] * _cosine_ramp(ramp_samples)[::-1]
+    lead: FloatArray = period[np.arange(-ramp_samples, 0) % n] * _cosine_ramp(ramp_samples)
+    tail: FloatArray = period[np.arange(ramp_samples) % n] * _cosine_ramp(ramp_samples)[::-1]
     # The steady state the ramp must lead into: zero-mean velocity and position.
-    velocity = np.cumsum(period)
+    velocity: FloatArray = np.cumsum(period)
     velocity -= np.mean(velocity)
-    position = np.cumsum(velocity)
+    position: FloatArray = np.cumsum(velocity)
     position -= np.mean(position)
     if integrations == 1:
         lead = _settle(lead, 1, (float(velocity[-1]), 0.0))

@@ -38,7 +38,7 @@ class RationalFit:
         """Zeros, from the numerator polynomial built at the scale of the largest pole."""
         scale = float(np.max(np.abs(self.poles)))
         poles, residues = self.poles / scale, self.residues / scale
-        total = np.array([self.direct], dtype=np.complex128)
+        total: ComplexArray = np.array([self.direct], dtype=np.complex128)
         total = np.polymul(total, np.poly(poles))
         for i in range(poles.size):
             total = np.polyadd(total, residues[i] * np.poly(np.delete(poles, i)))

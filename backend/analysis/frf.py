@@ -228,7 +228,7 @@ def _continuous_input(
         return [r * whole for r in s.sent]
     late = delay_response(f, path.response_delay_s)
     direct = command_response(f, path)
-    inputs = [r * direct * late for r in s.sent]
+    inputs: list[ComplexArray] = [r * direct * late for r in s.sent]
     if quantity == "torque_injection":
         inputs = [u + own * late for u, own in zip(inputs, s.torque, strict=True)]
     if coulomb_nm:
@@ -381,7 +381,9 @@ def estimate_aperiodic(
     keep = (f >= f_min_hz) & (f <= f_max_hz) & (f > 0)
     if not np.any(keep):
         raise ValueError("no frequency of the segments lies in the wanted band")
-    sent, response, torque = [], [], []
+    sent: list[ComplexArray] = []
+    response: list[ComplexArray] = []
+    torque: list[ComplexArray] = []
     dropped = 0
     for record in records:
         own = np.zeros_like(record.response)

@@ -200,7 +200,6 @@ def _next_mode(
     s = 1j * TURN * f
     grid_f = np.geomspace(f[0] * 1.5, f[-1], 120)
     ff, dd = (a.ravel() for a in np.meshgrid(grid_f, [0.01, 0.03, 0.1]))
-    ww = TURN * ff
 
     def columns(frequency: FloatArray, damping: FloatArray) -> FloatArray:
         w = TURN * frequency
@@ -288,7 +287,7 @@ class _Problem:
         )  # fmt: skip
         points = 2 * self.f.size
         score = points * np.log(2 * fit.cost / points) + start.size * np.log(points)
-        return fit.x, fit.jac, float(score)
+        return fit.x, np.asarray(fit.jac), float(score)
 
     def _bounds(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Where a physical answer must lie; keeps a poor start from running away."""
@@ -430,8 +429,8 @@ def fit_loop(
     b = reference / np.abs(reference)
     matrix, target = np.vstack([a.real, a.imag]), np.concatenate([b.real, b.imag])
     # A robust pass: single lines spoilt by friction must not bend the gains.
-    row = np.ones(target.size)
-    c = np.zeros(3)
+    row: FloatArray = np.ones(target.size)
+    c: FloatArray = np.zeros(3)
     for _ in range(4):
         c = np.linalg.lstsq(matrix * row[:, None], target * row, rcond=None)[0]
         error = np.abs(target - matrix @ c)

@@ -6,11 +6,11 @@ import json
 from typing import Annotated
 
 import typer
+
+from profiles import drive_names, load_profile
 from profiles.check import check as check_profile
 from profiles.check import coverage
 from profiles.export import show as shown
-
-from profiles import drive_names, load_profile
 from profiles.loader import ProfileError
 
 app = typer.Typer(help="Drive profiles: show, check, import.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import re
 import signal
@@ -52,12 +53,17 @@ class ServerProcess:
     def kill(self) -> None:
         self.process.send_signal(signal.SIGKILL)
         self.process.wait()
+        self._close()
+
+    def _close(self) -> None:
+        assert self.process.stdout is not None
+        self.process.stdout.close()
         self.http.close()
 
     def end(self) -> None:
         self.process.send_signal(signal.SIGINT)
         assert self.process.wait(15) == 0
-        self.http.close()
+        self._close()
 
 
 async def positions(url: str, seconds: float) -> list[tuple[float, int]]:
@@ -82,7 +88,7 @@ def add_drive(server: ServerProcess, url: str) -> str:
     return str(answer.json()["id"])
 
 
-async def test_killed_server_leaves_an_axis_that_stops_by_itself(
+def test_killed_server_leaves_an_axis_that_stops_by_itself(
     drives: DemoBench, tmp_path: Path
 ) -> None:
     url = drives.aliases["mlink://virtual0"]
@@ -97,8 +103,9 @@ async def test_killed_server_leaves_an_axis_that_stops_by_itself(
         time.sleep(0.02)
     state = server.http.get(f"/drives/{x}/state").json()
     assert abs(state["velocity"] - SPEED_RPM) < 30
+    page.socket.socket.close()
     os.kill(server.process.pid, signal.SIGKILL)
-    seen = await positions(url, 1.5)
+    seen = asyncio.run(positions(url, 1.5))
     server.kill()
     (_, first), (_, last) = seen[0], seen[-1]
     still = [t for t, p in seen if abs(p - last) > 65536 * 0.002]
@@ -106,9 +113,7 @@ async def test_killed_server_leaves_an_axis_that_stops_by_itself(
     assert (max(still, default=seen[0][0]) - seen[0][0]) < 0.6, "and it stands soon"
 
 
-async def test_server_finds_its_drives_again_after_a_kill(
-    drives: DemoBench, tmp_path: Path
-) -> None:
+def test_server_finds_its_drives_again_after_a_kill(drives: DemoBench, tmp_path: Path) -> None:
     url = drives.aliases["mlink://virtual0"]
     server = ServerProcess(tmp_path / "state")
     x = add_drive(server, url)
@@ -121,7 +126,7 @@ async def test_server_finds_its_drives_again_after_a_kill(
         again.end()
 
 
-async def test_ended_server_stops_the_axis_first(drives: DemoBench, tmp_path: Path) -> None:
+def test_ended_server_stops_the_axis_first(drives: DemoBench, tmp_path: Path) -> None:
     url = drives.aliases["mlink://virtual0"]
     server = ServerProcess(tmp_path / "state")
     x = add_drive(server, url)
@@ -130,5 +135,5 @@ async def test_ended_server_stops_the_axis_first(drives: DemoBench, tmp_path: Pa
     server.http.post(f"/drives/{x}/jobs/move", json=body).raise_for_status()
     until(lambda: server.http.get(f"/drives/{x}/state").json()["velocity"] > 100, 5)
     server.end()
-    seen = await positions(url, 0.3)
+    seen = asyncio.run(positions(url, 0.3))
     assert abs(seen[-1][1] - seen[0][1]) < 65536 * 0.002

@@ -1,0 +1,302 @@
+"""Inertia and friction from bidirectional moves.
+
+torque = J·a + b·ω + Tc·sign(ω) + Tg, every signal through the *same* zero-phase filter (so that
+the filter drops out of the equation), samples near standstill left out, outliers weighted down
+(Huber 1964), and intervals that know how few independent samples a filtered signal holds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import convolve1d
+from scipy.stats import t as student_t
+
+from backend.analysis.arrays import BoolArray, FloatArray
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class InertiaResult:
+    """SI units at the motor shaft. ``verdict`` is "ok" or the plain reasons, one per line.
+
+    ``identifiable`` is False when the data do not support an answer; the numbers are then what
+    the regression said and must not be used.
+    """
+
+    inertia_kgm2: Interval
+    viscous_nms: Interval
+    coulomb_nm: Interval
+    gravity_nm: Interval
+    load_ratio: float | None
+    r2: float
+    samples_used: int
+    identifiable: bool
+    verdict: str
+
+
+@dataclass(frozen=True)
+class MoveLimits:
+    """Envelope of the identification moves, at the motor: rad, rad/s, Nm."""
+
+    travel_rad: float
+    speed_rad_s: float
+    torque_nm: float
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Position, velocity and acceleration [n] of a move that ends where it began."""
+
+    position_rad: FloatArray
+    velocity_rad_s: FloatArray
+    acceleration_rad_s2: FloatArray
+    sample_rate_hz: float
+
+
+def _there_and_back(
+    travel: float, speed: float, acceleration: float, dwell_s: float, rate: float
+) -> FloatArray:
+    """Velocity of one trapezoid forward, a dwell, and one back."""
+    peak = min(speed, float(np.sqrt(travel * acceleration)))
+    ramp = max(2, int(np.ceil(peak / acceleration * rate)))
+    cruise = max(0, round((travel / peak - peak / acceleration) * rate))
+    up = (np.arange(ramp) + 0.5) / ramp
+    one = np.concatenate([up, np.ones(cruise), up[::-1]]) * peak
+    rest = np.zeros(round(dwell_s * rate))
+    return np.concatenate([one, rest, -one, rest])
+
+
+def design_moves(
+    limits: MoveLimits,
+    estimated_inertia_kgm2: float,
+    sample_rate_hz: float,
+    *,
+    friction_nm: float = 0.0,
+    repetitions: int = 3,
+    smoothing_s: float = 0.01,
+    dwell_s: float = 0.05,
+) -> Trajectory:
+    """Bidirectional trapezoids inside travel, speed and torque.
+
+    The acceleration uses 70 % of the torque left after friction; every second repetition runs at
+    half speed and 60 % of the acceleration, so that viscous and Coulomb friction can be told
+    apart. ``smoothing_s`` bounds the jerk.
+    """
+    torque = 0.7 * (limits.torque_nm - friction_nm)
+    if torque <= 0:
+        raise ValueError(
+            f"{limits.torque_nm} Nm do not exceed the friction of {friction_nm} Nm; raise the limit"
+        )
+    acceleration = torque / estimated_inertia_kgm2
+    parts: list[FloatArray] = []
+    for i in range(repetitions):
+        share = 1.0 if i % 2 == 0 else 0.5
+        parts.append(
+            _there_and_back(
+                0.95 * limits.travel_rad, share * limits.speed_rad_s,
+                acceleration * (1.0 if i % 2 == 0 else 0.6), dwell_s, sample_rate_hz,
+            )
+        )  # fmt: skip
+    velocity: FloatArray = np.concatenate(parts)
+    width = max(1, round(smoothing_s * sample_rate_hz))
+    velocity = np.convolve(velocity, np.ones(width) / width)
+    velocity -= np.sum(velocity) / velocity.size * (velocity != 0)
+    position = np.cumsum(velocity) / sample_rate_hz
+    return Trajectory(position, velocity, np.gradient(velocity) * sample_rate_hz, sample_rate_hz)
+
+
+def _smoothing_kernel(sample_rate_hz: float, cutoff_hz: float) -> FloatArray:
+    """Symmetric (zero-phase) Gaussian with its -3 dB point at the cut-off."""
+    sigma = np.sqrt(np.log(2.0) / 2.0) / np.pi / cutoff_hz * sample_rate_hz
+    reach = max(1, int(np.ceil(4 * sigma)))
+    n = np.arange(-reach, reach + 1)
+    kernel = np.exp(-0.5 * (n / max(sigma, 1e-6)) ** 2)
+    return np.asarray(kernel / np.sum(kernel))
+
+
+def _slope_kernel(kernel: FloatArray) -> FloatArray:
+    """Kernel that smooths as ``kernel`` does and differentiates (per sample): t·k(t), so scaled
+    that a ramp of slope 1 gives exactly 1.
+    """
+    n = np.arange(kernel.size) - kernel.size // 2
+    slope = n * kernel
+    return np.asarray(-slope / np.sum(n * slope))
+
+
+def _huber(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Robust solution of a·x = b by reweighting; solution and weights."""
+    weight = np.ones(b.size)
+    x = np.zeros(a.shape[1])
+    for _ in range(15):
+        root = np.sqrt(weight)
+        x = np.linalg.lstsq(a * root[:, None], b * root, rcond=None)[0]
+        residual = np.abs(b - a @ x)
+        scale = 1.4826 * float(np.median(residual))
+        if scale <= 0:
+            break
+        weight = np.minimum(1.0, 1.345 * scale / np.maximum(residual, 1e-300))
+    return x, weight
+
+
+def _independent_share(residual: FloatArray, keep: BoolArray) -> float:
+    """Share of samples that are independent, from the residual's autocorrelation."""
+    whole = np.zeros(keep.size)
+    whole[keep] = residual
+    n = 1 << int(np.ceil(np.log2(2 * keep.size)))
+    power = np.abs(np.fft.rfft(whole, n)) ** 2
+    correlation = np.fft.irfft(power, n)[: keep.size // 2]
+    if correlation[0] <= 0:
+        return 1.0
+    rho = correlation / correlation[0]
+    negative = np.flatnonzero(rho <= 0.05)
+    length = int(negative[0]) if negative.size else rho.size
+    return float(1.0 / (1.0 + 2.0 * np.sum(rho[1:length])))
+
+
+def estimate_inertia(
+    torque_nm: FloatArray,
+    velocity_rad_s: FloatArray,
+    sample_rate_hz: float,
+    *,
+    cutoff_hz: float = 40.0,
+    minimum_speed_rad_s: float | None = None,
+    torque_limit_nm: float | None = None,
+    motor_inertia_kgm2: float | None = None,
+    valid: BoolArray | None = None,
+) -> InertiaResult:
+    """Regression over whole recordings of moves in both directions.
+
+    ``torque_nm`` is the motor's torque. ``minimum_speed_rad_s`` defaults to 5 % of the peak
+    speed. The motion must be smooth between bus cycles (interpolated, or made by the drive's own
+    profile): with a reference that steps every cycle T, the torque sampled beside each step is
+    off by half a step, about ω_speed·T/2 of the acceleration torque. Samples at the torque limit, in gaps (``valid`` False) and within the filter's reach of
+    either are left out.
+    """
+    n = torque_nm.size
+    if velocity_rad_s.size != n:
+        raise ValueError(f"torque has {n} samples and velocity {velocity_rad_s.size}")
+    kernel = _smoothing_kernel(sample_rate_hz, cutoff_hz)
+    if n < 8 * kernel.size:
+        raise ValueError(f"{n} samples are too few for a filter of {kernel.size}")
+    peak = float(np.max(np.abs(velocity_rad_s)))
+    slowest = 0.05 * peak if minimum_speed_rad_s is None else minimum_speed_rad_s
+
+    def smooth(x: FloatArray) -> FloatArray:
+        return np.asarray(convolve1d(np.asarray(x, dtype=np.float64), kernel, mode="nearest"))
+
+    velocity = smooth(velocity_rad_s)
+    # The derivative of the smoothing kernel itself: a difference of samples would smooth more
+    # than the other signals are smoothed, and J would come out small.
+    acceleration = np.asarray(
+        convolve1d(
+            np.asarray(velocity_rad_s, dtype=np.float64), _slope_kernel(kernel), mode="nearest"
+        )
+        * sample_rate_hz
+    )
+    direction = smooth(np.clip(velocity_rad_s / max(0.2 * slowest, 1e-12), -1.0, 1.0))
+    torque = smooth(torque_nm)
+    saturated = np.zeros(n, dtype=np.bool_)
+    if torque_limit_nm is not None:
+        saturated = np.abs(torque_nm) >= 0.98 * torque_limit_nm
+    spoilt = saturated if valid is None else saturated | ~valid
+    reach = np.ones(kernel.size // 2 * 2 + 1)
+    near_spoilt = np.convolve(spoilt.astype(np.float64), reach, "same") > 0.5
+    keep = (np.abs(velocity) > slowest) & ~near_spoilt
+    keep[: kernel.size] = keep[-kernel.size :] = False
+    matrix = np.column_stack([acceleration, velocity, direction, np.ones(n)])
+    return _regress(matrix[keep], torque[keep], keep, float(np.mean(saturated)), motor_inertia_kgm2)
+
+
+def _regress(
+    a: FloatArray,
+    b: FloatArray,
+    keep: BoolArray,
+    saturated_share: float,
+    motor_inertia_kgm2: float | None,
+) -> InertiaResult:
+    """Solve, judge and report."""
+    if b.size < 20:
+        nothing = Interval(float("nan"), float("nan"), float("nan"))
+        reason = "too few samples in motion: raise travel or speed"
+        if saturated_share > 0.05:
+            reason += "\nthe torque was at its limit: raise the limit or lower the acceleration"
+        return InertiaResult(nothing, nothing, nothing, nothing, None, 0.0, b.size, False, reason)
+    scale = np.maximum(np.max(np.abs(a), axis=0), 1e-12)
+    x, weight = _huber(a / scale, b)
+    residual = b - (a / scale) @ x
+    share = _independent_share(residual * np.sqrt(weight), keep)
+    freedom = max(float(np.sum(weight)) * share - a.shape[1], 1.0)
+    root = np.sqrt(weight)[:, None]
+    normal = np.linalg.pinv((a / scale * root).T @ (a / scale * root))
+    # Sum of squares over the independent share of samples, variance inflated accordingly.
+    variance = float(np.sum(weight * residual**2)) / max(float(np.sum(weight)) - 4.0, 1.0) / share
+    std = np.sqrt(np.maximum(np.diag(normal) * variance, 0.0)) / scale
+    value = x / scale
+    t = float(student_t.ppf(0.975, freedom))
+    parts = [
+        Interval(float(v), float(v - t * s), float(v + t * s))
+        for v, s in zip(value, std, strict=True)
+    ]
+    total = float(np.sum(weight * (b - np.average(b, weights=weight)) ** 2))
+    r2 = 1.0 - float(np.sum(weight * residual**2)) / total if total > 0 else 0.0
+    reasons = _reasons(a, b, residual, weight, parts, r2, saturated_share)
+    ratio = None
+    if motor_inertia_kgm2 is not None:
+        ratio = parts[0].value / motor_inertia_kgm2 - 1.0
+        if ratio < -0.1:
+            reasons.append("the result is below the motor's own inertia: check the motor data")
+    return InertiaResult(
+        parts[0], parts[1], parts[2], parts[3], ratio, r2, b.size,
+        not reasons, "\n".join(reasons) or "ok",
+    )  # fmt: skip
+
+
+def _reasons(
+    a: FloatArray,
+    b: FloatArray,
+    residual: FloatArray,
+    weight: FloatArray,
+    parts: list[Interval],
+    r2: float,
+    saturated_share: float,
+) -> list[str]:
+    """Why the data do not support an answer."""
+    reasons = []
+    inertia = parts[0]
+    if saturated_share > 0.05:
+        reasons.append("the torque was at its limit: raise the limit or lower the acceleration")
+    if np.min(a[:, 1]) >= 0 or np.max(a[:, 1]) <= 0:
+        reasons.append("motion in one direction only: friction and gravity cannot be told apart")
+    accelerating = float(np.std(a[:, 0])) * abs(inertia.value)
+    noise = float(np.sqrt(np.average(residual**2, weights=weight)))
+    if accelerating < 3 * noise or inertia.high - inertia.low > 0.3 * abs(inertia.value):
+        reasons.append(
+            "too little acceleration for the noise: raise acceleration, torque or travel"
+        )
+    if inertia.value <= 0:
+        reasons.append("the torque opposes the acceleration: wrong sign of torque or velocity")
+    if r2 < 0.8 and accelerating >= 3 * noise:
+        reasons.append("the moves do not follow inertia and friction (R² below 0.8)")
+    if _looks_like_backlash(a, b, residual):
+        reasons.append("knocks after each change of the torque's sign: backlash in the drive train")
+    return reasons
+
+
+def _looks_like_backlash(a: FloatArray, b: FloatArray, residual: FloatArray) -> bool:
+    """Few samples with residuals far above all others, as knocks make (excess of the tails)."""
+    scale = 1.4826 * float(np.median(np.abs(residual)))
+    span = float(np.std(b))
+    if scale <= 0 or span <= 0 or float(np.std(a[:, 0])) <= 0:
+        return False
+    knocks = np.abs(residual) > max(8 * scale, 0.25 * span)
+    return bool(np.mean(knocks) > 0.002)

@@ -1,0 +1,294 @@
+"""Notch filters: one vendor-neutral form, and what each drive makes of it.
+
+A notch is its centre, its -3 dB bandwidth and its depth, H(s) = (s² + d·g·s + w²)/(s² + g·s + w²)
+with w = 2π·f_c, g = 2π·f_b, d = 10^(depth/20). Encodings follow tuning.md section 4; MMS7's
+formulas are equations (15) to (18) of its manual (004:3495), read as explained there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.fit import Resonance
+
+TURN = 2.0 * np.pi
+
+#: Stored value of a coefficient c is round(c * COEFFICIENT_SCALE) + COEFFICIENT_OFFSET (UINT16).
+COEFFICIENT_SCALE = 10_000
+COEFFICIENT_OFFSET = 32_768
+
+
+@dataclass(frozen=True)
+class Notch:
+    """Centre (Hz), -3 dB bandwidth (Hz) and depth (dB, negative: gain at the centre)."""
+
+    center_hz: float
+    width_hz: float
+    depth_db: float
+
+    def __post_init__(self) -> None:
+        if self.center_hz <= 0 or self.width_hz <= 0:
+            raise ValueError(f"notch at {self.center_hz} Hz, {self.width_hz} Hz wide: not positive")
+        if self.depth_db > 0:
+            raise ValueError(f"notch depth {self.depth_db} dB would amplify; use 0 or less")
+
+    def response(self, frequency_hz: FloatArray) -> ComplexArray:
+        """Continuous-time response."""
+        s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
+        w, g = TURN * self.center_hz, TURN * self.width_hz
+        d = 10.0 ** (self.depth_db / 20.0)
+        return np.asarray((s * s + d * g * s + w * w) / (s * s + g * s + w * w))
+
+
+@dataclass(frozen=True)
+class NotchCoefficients:
+    """Raw UINT16 values of H(z) = (z² + a1·z + a2)/(z² + b1·z + b2)."""
+
+    a1: int
+    a2: int
+    b1: int
+    b2: int
+
+
+@dataclass(frozen=True)
+class RealisedNotch:
+    """What a drive will really do: where its gain is least, how deep, and what it adds.
+
+    ``dc_gain_db`` is the gain at 0 Hz, which rounding can move; ``stable`` is False when the
+    rounded filter has a pole on or outside the unit circle and must not be written.
+    """
+
+    center_hz: float
+    width_hz: float
+    depth_db: float
+    dc_gain_db: float
+    stable: bool
+
+
+def _stored(coefficient: float) -> int:
+    # Python rounds halves to even; the formula means the nearest step, halves upwards.
+    value = int(np.floor(coefficient * COEFFICIENT_SCALE + 0.5)) + COEFFICIENT_OFFSET
+    if not 0 <= value <= 0xFFFF:
+        raise ValueError(f"notch coefficient {coefficient:.4f} does not fit into 16 bits")
+    return value
+
+
+def encode_coefficients(notch: Notch, sample_time_s: float) -> NotchCoefficients:
+    """MMS7 2008h: a1 = w² + d·g - 2, a2 = 1 - d·g, b1 = w² + g - 2, b2 = 1 - g, w and g times ts.
+
+    Raises ValueError where a coefficient leaves the 16 bits or the rounded filter is not stable.
+    """
+    w, g = TURN * notch.center_hz * sample_time_s, TURN * notch.width_hz * sample_time_s
+    d = 10.0 ** (notch.depth_db / 20.0)
+    raw = NotchCoefficients(
+        a1=_stored(w * w + d * g - 2.0),
+        a2=_stored(1.0 - d * g),
+        b1=_stored(w * w + g - 2.0),
+        b2=_stored(1.0 - g),
+    )
+    if not is_stable(raw):
+        raise ValueError(
+            f"a notch at {notch.center_hz:g} Hz, {notch.width_hz:g} Hz wide is not stable with "
+            f"coefficient steps of 1/{COEFFICIENT_SCALE}; raise the centre or narrow the width"
+        )
+    return raw
+
+
+def coefficient_values(raw: NotchCoefficients) -> tuple[float, float, float, float]:
+    """(a1, a2, b1, b2) as numbers."""
+    a1, a2, b1, b2 = (
+        (value - COEFFICIENT_OFFSET) / COEFFICIENT_SCALE
+        for value in (raw.a1, raw.a2, raw.b1, raw.b2)
+    )
+    return a1, a2, b1, b2
+
+
+def is_stable(raw: NotchCoefficients) -> bool:
+    """Jury's conditions on z² + b1·z + b2, in whole steps so that rounding cannot hide a pole."""
+    b1, b2 = raw.b1 - COEFFICIENT_OFFSET, raw.b2 - COEFFICIENT_OFFSET
+    one = COEFFICIENT_SCALE
+    return abs(b2) < one and one + b1 + b2 > 0 and one - b1 + b2 > 0
+
+
+def coefficients_response(
+    raw: NotchCoefficients, frequency_hz: FloatArray, sample_time_s: float
+) -> ComplexArray:
+    """Exact discrete response of the rounded filter."""
+    a1, a2, b1, b2 = coefficient_values(raw)
+    z = np.exp(1j * TURN * np.asarray(frequency_hz, dtype=np.float64) * sample_time_s)
+    return np.asarray((z * z + a1 * z + a2) / (z * z + b1 * z + b2), dtype=np.complex128)
+
+
+def decode_coefficients(raw: NotchCoefficients, sample_time_s: float) -> Notch:
+    """The formulas backwards: f_c, f_b and depth that these coefficients mean.
+
+    Raises ValueError for coefficients that are no notch (w² or g not positive).
+    """
+    _, a2, b1, b2 = coefficient_values(raw)
+    w2, g = 1.0 + b1 + b2, 1.0 - b2
+    if round(w2 * COEFFICIENT_SCALE) <= 0 or round(g * COEFFICIENT_SCALE) <= 0:
+        raise ValueError(f"coefficients {raw} describe no notch")
+    depth = max((1.0 - a2) / g, 1e-6)
+    return Notch(
+        center_hz=float(np.sqrt(w2)) / (TURN * sample_time_s),
+        width_hz=g / (TURN * sample_time_s),
+        depth_db=min(0.0, 20.0 * float(np.log10(depth))),
+    )
+
+
+def realised(raw: NotchCoefficients, sample_time_s: float) -> RealisedNotch:
+    """Read the rounded filter's response as one would on a plot."""
+    a1, a2, b1, b2 = coefficient_values(raw)
+    stable = is_stable(raw)
+    f = np.geomspace(1.0, 0.499 / sample_time_s, 20_000)
+    db = 20 * np.log10(np.maximum(np.abs(coefficients_response(raw, f, sample_time_s)), 1e-12))
+    lowest = int(np.argmin(db))
+    dc = 20 * np.log10(abs(1 + a1 + a2) / abs(1 + b1 + b2)) if stable and 1 + a1 + a2 else -np.inf
+    level = dc - 3.0103
+    width = float("nan")
+    left = np.flatnonzero(db[:lowest] > level)
+    right = np.flatnonzero(db[lowest:] > level)
+    if db[lowest] < level and left.size and right.size:
+        width = float(f[lowest + right[0]] - f[left[-1]])
+    return RealisedNotch(float(f[lowest]), width, float(db[lowest]), float(dc), stable)
+
+
+@dataclass(frozen=True)
+class IntegerRange:
+    """Limits of a raw parameter, inclusive, from the drive's profile."""
+
+    low: int
+    high: int
+
+    def nearest(self, value: float) -> int:
+        """Nearest allowed step."""
+        return int(min(max(np.floor(value + 0.5), self.low), self.high))
+
+
+def encode_hz_width(notch: Notch, frequency: IntegerRange, width: IntegerRange) -> tuple[int, int]:
+    """M6-L: frequency and width in whole Hz; depth cannot be chosen.
+
+    A centre outside the range raises ValueError; the width is moved to the nearest allowed one.
+    """
+    return _frequency(notch, frequency), width.nearest(notch.width_hz)
+
+
+def decode_hz_width(frequency_raw: int, width_raw: int, depth_db: float) -> Notch:
+    """Notch of whole Hz values. The manual prints no depth: the caller must state (measure) it."""
+    return Notch(float(frequency_raw), float(width_raw), depth_db)
+
+
+def encode_hz_width_db(
+    notch: Notch, frequency: IntegerRange, width: IntegerRange, depth: IntegerRange
+) -> tuple[int, int, int]:
+    """DS_C: frequency and width in Hz, depth in positive dB."""
+    return (
+        _frequency(notch, frequency),
+        width.nearest(notch.width_hz),
+        depth.nearest(-notch.depth_db),
+    )
+
+
+def decode_hz_width_db(frequency_raw: int, width_raw: int, depth_raw: int) -> Notch:
+    """Back from Hz, Hz, positive dB."""
+    return Notch(float(frequency_raw), float(width_raw), -float(depth_raw))
+
+
+@dataclass(frozen=True)
+class LevelCalibration:
+    """Measured meaning of width and depth levels: the manual prints no formula (R6L).
+
+    ``width_ratio`` maps a level to f_b/f_c, ``depth_db`` a level to depth; both from
+    :func:`fit_notch` on responses with and without the notch. Levels in between are interpolated.
+    """
+
+    width_ratio: tuple[tuple[int, float], ...]
+    depth_db: tuple[tuple[int, float], ...]
+
+
+def encode_hz_levels(
+    notch: Notch,
+    frequency: IntegerRange,
+    width: IntegerRange,
+    depth: IntegerRange,
+    calibration: LevelCalibration,
+) -> tuple[int, int, int]:
+    """R6L: frequency in Hz and the levels whose measured effect is nearest to what is asked."""
+    centre = _frequency(notch, frequency)
+    ratio = _nearest_level(calibration.width_ratio, notch.width_hz / centre, width)
+    return centre, ratio, _nearest_level(calibration.depth_db, notch.depth_db, depth)
+
+
+def decode_hz_levels(
+    frequency_raw: int, width_level: int, depth_level: int, calibration: LevelCalibration
+) -> Notch:
+    """Notch that these levels were measured to make."""
+    ratio = _interpolated(calibration.width_ratio, width_level)
+    depth = min(0.0, _interpolated(calibration.depth_db, depth_level))
+    return Notch(float(frequency_raw), ratio * frequency_raw, depth)
+
+
+def _frequency(notch: Notch, allowed: IntegerRange) -> int:
+    value = int(np.floor(notch.center_hz + 0.5))
+    if not allowed.low <= value <= allowed.high:
+        raise ValueError(f"{notch.center_hz:g} Hz is outside {allowed.low} to {allowed.high} Hz")
+    return value
+
+
+def _interpolated(points: tuple[tuple[int, float], ...], level: float) -> float:
+    if not points:
+        raise ValueError("the levels have not been measured on this drive yet")
+    ordered = sorted(points)
+    return float(np.interp(level, [p[0] for p in ordered], [p[1] for p in ordered]))
+
+
+def _nearest_level(
+    points: tuple[tuple[int, float], ...], wanted: float, allowed: IntegerRange
+) -> int:
+    levels = range(allowed.low, allowed.high + 1)
+    return min(levels, key=lambda level: abs(_interpolated(points, level) - wanted))
+
+
+def fit_notch(frequency_hz: FloatArray, ratio: ComplexArray) -> Notch:
+    """Notch that explains a measured ratio of two responses, with and without it.
+
+    A starting grid of centres and widths; the depth follows. Magnitudes only, since a change of
+    delay must not count as a notch.
+    """
+    from scipy.optimize import least_squares
+
+    f = np.asarray(frequency_hz, dtype=np.float64)
+    db = 20 * np.log10(np.maximum(np.abs(ratio), 1e-6))
+    centre = float(f[int(np.argmin(db))])
+    depth = float(np.min(db))
+
+    def error(x: FloatArray) -> FloatArray:
+        shape = Notch(float(np.exp(x[0])), float(np.exp(x[1])), -float(np.exp(x[2])))
+        return np.asarray(20 * np.log10(np.abs(shape.response(f))) - db)
+
+    starts = [[np.log(centre), np.log(centre * q), np.log(max(-depth, 0.5))] for q in (0.1, 0.4, 1)]
+    fits = [least_squares(error, x0, loss="soft_l1") for x0 in starts]
+    best = min(fits, key=lambda fit: float(fit.cost))
+    return Notch(float(np.exp(best.x[0])), float(np.exp(best.x[1])), -float(np.exp(best.x[2])))
+
+
+def place_notches(
+    table: tuple[Resonance, ...], slots: int, *, width_factor: float = 1.0, headroom_db: float = 3.0
+) -> tuple[Notch, ...]:
+    """Notches on the highest resonances of a table, at most one per slot, in order of frequency.
+
+    The depth takes the peak down to ``headroom_db`` above its surroundings; the width covers the
+    pair of resonance and its damping, at least a tenth of the centre for robustness against
+    shifts of ±5 %.
+    """
+    peaks = [r for r in table if r.kind == "resonance" and r.height_db > headroom_db]
+    chosen = sorted(peaks, key=lambda r: -r.height_db)[:slots]
+    notches = []
+    for r in sorted(chosen, key=lambda r: r.frequency_hz):
+        depth = -min(max(r.height_db - headroom_db, 3.0), 30.0)
+        ratio = max(0.1, 2 * r.damping * 10 ** (-depth / 20)) * width_factor
+        notches.append(Notch(r.frequency_hz, min(ratio, 1.5) * r.frequency_hz, depth))
+    return tuple(notches)
