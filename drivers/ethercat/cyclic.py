@@ -84,6 +84,7 @@ class CyclicLoop:
         self.number = 0
         self.next_ns = 0
         self.expected_wkc = sum(image.wkc for image in images)
+        self._left_out_wkc = 0
         self._segment = segment
         self._master = segment.master
         self._ring = ring
@@ -115,7 +116,8 @@ class CyclicLoop:
         self._wait_for_grid()
         counters = self.counters
         wkc = self._exchange()
-        valid = wkc == self.expected_wkc
+        # A slave that fell back to SAFEOP still counts, so one left out may or may not add.
+        valid = self.expected_wkc <= wkc <= self.expected_wkc + self._left_out_wkc
         counters.cycles += 1
         counters.last_wkc = wkc
         for image, slave in zip(self.images, self._slaves, strict=True):
@@ -150,7 +152,9 @@ class CyclicLoop:
         for image in self.images:
             if image.station == station and image.lost is not lost:
                 image.lost = lost
-                self.expected_wkc += -image.wkc if lost else image.wkc
+                change = image.wkc if lost else -image.wkc
+                self.expected_wkc -= change
+                self._left_out_wkc += change
                 self._invalid_run = 0
 
     # Parts ---------------------------------------------------------------------------------

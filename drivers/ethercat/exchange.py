@@ -326,6 +326,10 @@ class Exchange:
             self.loop.stop_axes("the drive no longer answers", station)
             self.loop.leave_out(station, lost=True)
 
+    def healing(self, station: int) -> bool:
+        """Whether a station is on its way back to OP."""
+        return station in self._healing
+
     def heal(self, station: Station, *, restarted: bool) -> None:
         """Bring a station that answers again back to OP; its axis stays disabled."""
         number = station.number
@@ -336,6 +340,8 @@ class Exchange:
         def done(_result: object, error: DriveError | None) -> None:
             self._healing.discard(number)
             if error is not None:
+                if self.loop is not None:
+                    self.loop.leave_out(number, lost=True)
                 self._report("state", number, error.message)
             elif self.loop is not None:
                 self._report("back", number, f"station {number} is in OP again")

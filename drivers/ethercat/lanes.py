@@ -79,7 +79,8 @@ class Lanes:
     def step(self) -> bool:
         """Do one frame of the next lane that is due. False when none is."""
         now = self._clock()
-        for _ in range(len(self._order)):
+        # Twice round: a lane that ends without a frame may have the next one waiting.
+        for _ in range(2 * len(self._order)):
             lane = self._order[0]
             self._order.rotate(-1)
             if lane.steps is None:

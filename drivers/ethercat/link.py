@@ -7,6 +7,7 @@ event. Nothing here blocks: the wire belongs to the other process.
 from __future__ import annotations
 
 import contextlib
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -17,9 +18,11 @@ from drivers.ethercat.al_status import AlState
 from drivers.ethercat.hostprocess import HostProcess
 from drivers.ethercat.protocol import Message, error_from_wire
 from drivers.ethercat.segmentcyclic import EthercatCyclic
-from drivers.link import Address, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
+from drivers.link import Address, Cyclic, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
 from profiles.schema import LinkKind, Profile
 
+_Item = tuple[int, int, int | None]
+_CHUNK = 32
 _SCHEME = "ethercat://"
 _OPEN_S, _ANSWER_S, _SCAN_S, _FOE_S = 8.0, 15.0, 60.0, 1800.0
 
@@ -47,7 +50,8 @@ class EthercatLink:
         self._status: Message = {}
         self._counts = {"transactions": 0, "timeouts": 0}
         self._host = HostProcess(interface, launcher, self._received, self._restarted)
-        self.cyclic: EthercatCyclic | None = EthercatCyclic(self._host, self._profiles)
+        self.process_data = EthercatCyclic(self._host, self._profiles)
+        self.cyclic: Cyclic | None = self.process_data
 
     # Link ----------------------------------------------------------------------------------
 
@@ -62,8 +66,7 @@ class EthercatLink:
 
     async def close(self) -> None:
         """Brake, leave OP, end the host. Calling again does nothing."""
-        if self.cyclic is not None:
-            self.cyclic.shut_down()
+        self.process_data.shut_down()
         await self._host.stop()
 
     async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
@@ -90,16 +93,19 @@ class EthercatLink:
         self, station: int, addresses: Sequence[Address]
     ) -> list[bytes | DriveError]:
         """Read several; objects of which all subindices are wanted are read at once."""
-        items = [[*_object(address), size_of(address.type)] for address in addresses]
-        answers: list[bytes | Message] = await self._call(
-            {"op": "read_many", "station": station, "items": items},
-            _ANSWER_S + 1.5 * len(items),
-        )
+        items = [(*_object(address), size_of(address.type)) for address in addresses]
+        told: dict[_Item, bytes | Message] = {}
+        for chunk in _chunks(items):
+            answers: list[bytes | Message] = await self._call(
+                {"op": "read_many", "station": station, "items": chunk},
+                _ANSWER_S + 1.5 * len(chunk),
+            )
+            told.update(zip(chunk, answers, strict=True))
         self._counts["transactions"] += len(items)
         results: list[bytes | DriveError] = []
-        for address, answer in zip(addresses, answers, strict=True):
+        for address, item in zip(addresses, items, strict=True):
             try:
-                results.append(_fitted(address, _value(answer)))
+                results.append(_fitted(address, _value(told[item])))
             except DriveError as error:
                 results.append(error.at(parameter=str(address)))
         return results
@@ -225,8 +231,7 @@ class EthercatLink:
     def _received(self, message: Message) -> None:
         if message["event"] == "status":
             self._status = message
-            if self.cyclic is not None:
-                self.cyclic.update(message["cyclic"])
+            self.process_data.update(message["cyclic"])
         elif message["event"] == "link":
             self._tell(
                 LinkEvent(message["kind"], message["station"], message["text"], message["code"])
@@ -234,13 +239,22 @@ class EthercatLink:
 
     def _restarted(self, why: str) -> None:
         self._status = {}
-        if self.cyclic is not None:
-            self.cyclic.host_gone()
+        self.process_data.host_gone()
         self._tell(LinkEvent("lost", None, why))
 
     def _tell(self, event: LinkEvent) -> None:
         for listener in tuple(self._listeners):
             listener(event)
+
+
+def _chunks(items: Sequence[_Item]) -> list[list[_Item]]:
+    """Parts of some dozens, an object never cut, so that other requests come in between."""
+    chunks: list[list[_Item]] = [[]]
+    for _, members in itertools.groupby(sorted(set(items), key=lambda i: i[:2]), lambda i: i[0]):
+        if len(chunks[-1]) >= _CHUNK:
+            chunks.append([])
+        chunks[-1].extend(members)
+    return [chunk for chunk in chunks if chunk]
 
 
 def _object(address: Address) -> tuple[int, int]:

@@ -170,6 +170,8 @@ class Operations:
             self._event("state", station.number, self._al_words(station))
 
     def _fell_back(self, station: Station, before: int) -> None:
+        if self.exchange.healing(station.number):
+            return
         if station.al_state != before:
             self._event("state", station.number, self._al_words(station))
         self.exchange.station_lost(station.number)

@@ -88,6 +88,7 @@ class AxisLoop:
         self._out = outputs
         self._report = report
         self._stop_cycles = max(round(STOP_S / cycle_s), 1)
+        self._mode: int | None = None
         self._motion: Motion | None = None
         self._place = 0
         self._life = 0
@@ -117,7 +118,14 @@ class AxisLoop:
                     f"station {self.station} has a fault and cannot be enabled",
                     remedy="read its active faults, remove the cause and reset the fault",
                 )
+            if self.phase is Phase.BRAKING:
+                raise NotAllowed(
+                    f"station {self.station} is braking: {self.halted}",
+                    remedy="wait until it stands",
+                )
             self.halted = ""
+        if mode is not None and self.phase is not Phase.IDLE:
+            raise NotAllowed(f"station {self.station} moves: its mode cannot be changed now")
         if mode is not None and _MODE in self._out:
             self.outputs[self._out[_MODE]] = mode
         if (
@@ -182,6 +190,9 @@ class AxisLoop:
 
     def step(self, values: Sequence[int]) -> None:
         """Outputs of the next cycle from the inputs of this one, which must be valid."""
+        place = self._in.get(_MODE_SHOWN)
+        if place is not None:
+            self._mode = values[place]
         place = self._in.get(_STATUS)
         if place is not None:
             self.state = cia402.decode_state(values[place])
@@ -310,6 +321,7 @@ class AxisLoop:
             self.outputs[place] = word
         elif self.state is self.goal:
             self._reset = False
+            self.outputs[place] &= ~cia402.FAULT_RESET
 
     # Parts ---------------------------------------------------------------------------------
 
@@ -330,6 +342,13 @@ class AxisLoop:
             raise NotAllowed(
                 f"{where} is in {self.state.value!r}, a motion needs 'Operation enabled'",
                 remedy=self.halted or "enable the axis first",
+            )
+        wanted = _MODE_OF[motion.target]
+        if self._mode is not None and self._mode != wanted:
+            raise NotAllowed(
+                f"{where} is in mode {self._mode}, this setpoint needs mode {int(wanted)}"
+                f" ({cia402.MODE_NAMES[wanted]})",
+                remedy="choose the mode when enabling the axis",
             )
         for name, index, limit in (
             ("travel", _ACTUAL_POSITION, motion.limits.position_min),

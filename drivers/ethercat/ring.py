@@ -7,6 +7,7 @@ carries the signs of life of both sides.
 
 from __future__ import annotations
 
+import contextlib
 import mmap
 import os
 import struct
@@ -55,7 +56,9 @@ class Ring:
     def close(self) -> None:
         """Give the memory back."""
         self._view.release()
-        self._map.close()
+        # A reader that is being cancelled may still look at it: then it goes with the reader.
+        with contextlib.suppress(BufferError):
+            self._map.close()
 
     # Signs of life -------------------------------------------------------------------------
 

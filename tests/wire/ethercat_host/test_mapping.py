@@ -1,0 +1,80 @@
+"""Choosing process data: entries of ETG.1000.6, limits of the drive, fixed sets."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.errors import NotAllowed
+from drivers.ethercat.mapping import plan_station
+from drivers.link import Address, CyclicSignal
+from profiles.schema import DataType, PdoSpec, Profile
+from tests.wire.ethercat_host.servo_device import servo_profile
+
+
+def signal(index: int, kind: DataType = "INT32", sub: int = 0) -> CyclicSignal:
+    return CyclicSignal(1, Address(index, sub, kind), f"{index:04X}")
+
+
+def with_limits(profile: Profile, **limits: int) -> Profile:
+    assert profile.pdo is not None
+    spec = PdoSpec(**(profile.pdo.model_dump() | limits))
+    return Profile(**({n: getattr(profile, n) for n in Profile.model_fields} | {"pdo": spec}))
+
+
+def test_a_target_brings_what_the_loop_needs_to_stop_the_axis() -> None:
+    plan = plan_station(1, [signal(0x606C)], [signal(0x607A)], servo_profile())
+    assert [e.word for e in plan.rx.entries] == [0x60400010, 0x607A0020]
+    assert [e.word for e in plan.tx.entries] == [0x60410010, 0x60640020, 0x606C0020]
+    assert [s.channel for s in plan.mapped] == ["606C", "607A"], "only what was asked for"
+    assert (plan.rx.index, plan.tx.index, plan.rx.write) == (0x1600, 0x1A00, True)
+
+
+def test_what_does_not_fit_is_left_for_polling_with_the_reason() -> None:
+    profile = with_limits(servo_profile(), max_entries=3)
+    wish = [signal(0x606C), signal(0x6077, "INT16"), signal(0x60F4)]
+    plan = plan_station(1, wish, [signal(0x607A)], profile)
+    assert [s.channel for s in plan.mapped] == ["606C", "607A"]
+    assert [s.channel for s, _ in plan.left_over] == ["6077", "60F4"]
+    assert "maps 3 objects" in plan.left_over[0][1]
+
+
+def test_bytes_are_limited_too() -> None:
+    profile = with_limits(servo_profile(), max_bytes=8)
+    plan = plan_station(1, [signal(0x606C), signal(0x6077, "INT16")], [signal(0x607A)], profile)
+    assert [e.index for e in plan.tx.entries] == [0x6041, 0x6064, 0x6077], "6 + 2 bytes fit"
+    assert "8 bytes" in plan.left_over[0][1]
+
+
+def test_outputs_that_do_not_fit_are_refused_by_name() -> None:
+    profile = with_limits(servo_profile(), max_entries=2)
+    with pytest.raises(NotAllowed, match=r"60B2:00 cannot be in the cyclic data.*maps 2 objects"):
+        plan_station(1, [], [signal(0x607A), signal(0x60B2, "INT16")], profile)
+
+
+def test_objects_that_the_drive_does_not_map_are_polled() -> None:
+    plan = plan_station(1, [signal(0x2001, "UINT16", 1)], [signal(0x607A)], servo_profile())
+    assert plan.left_over[0][1] == "the drive does not map it in this direction"
+
+
+def test_a_drive_that_forbids_remapping_gets_the_fixed_set_with_most_of_the_wish() -> None:
+    profile = servo_profile(remappable=False)
+    plan = plan_station(
+        1, [signal(0x606C), signal(0x6077, "INT16")], [signal(0x607A), signal(0x60FF)], profile
+    )
+    assert plan.rx.index == 0x1600
+    assert plan.rx.write is False
+    assert plan.rx.size == 2 + 1 + 4 + 4 + 2
+    assert [s.channel for s in plan.mapped] == ["606C", "607A", "60FF"]
+    assert plan.left_over[0][1] == "not in the drive's fixed process data"
+
+
+def test_a_wish_that_no_fixed_set_carries_is_refused() -> None:
+    with pytest.raises(NotAllowed, match=r"none of the drive's fixed process data carries"):
+        plan_station(1, [], [signal(0x60B1)], servo_profile(remappable=False))
+
+
+def test_a_drive_without_a_profile_gets_a_modest_mapping() -> None:
+    wish = [signal(0x6064 + n) for n in range(1, 10)]
+    plan = plan_station(1, wish, [signal(0x607A)], None)
+    assert len(plan.tx.entries) == 8
+    assert len(plan.left_over) == 3

@@ -1,0 +1,234 @@
+"""Ring, messages, lanes, registers, EEPROM and permissions."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+
+from drivers import errors
+from drivers.errors import DriveError, LinkLost, Rejected
+from drivers.ethercat import esc, permissions, protocol, sii
+from drivers.ethercat.al_status import al_status_text, state_name
+from drivers.ethercat.cyclic import percentile_us
+from drivers.ethercat.lanes import Lanes
+from drivers.ethercat.mailbox import Pause, Read, Steps, Write
+from drivers.ethercat.ring import RING_BYTES, SLOT, VALID, Ring
+from drivers.ethercat.segmentcyclic import _contiguous
+from drivers.ethercat.setup import interpolation_period
+
+
+@pytest.fixture
+def ring() -> Ring:
+    descriptor = Ring.create()
+    made = Ring(descriptor)
+    os.close(descriptor)
+    return made
+
+
+def put(ring: Ring, number: int) -> None:
+    value = number.to_bytes(4, "little")
+    ring.put((number, number * 1_000_000, 0, 3, 3, VALID, 0), [value, b"\xff\xff"])
+
+
+def test_samples_come_out_as_they_went_in(ring: Ring) -> None:
+    ring.prepare(6)
+    reader = ring.reader({"position": ("<i4", 0), "torque": ("<i2", 4)})
+    for number in range(5):
+        put(ring, number)
+    taken, lost = reader.drain()
+    assert list(taken["position"]) == [0, 1, 2, 3, 4]
+    assert list(taken["torque"]) == [-1] * 5
+    assert list(taken["cycle"]) == [0, 1, 2, 3, 4]
+    assert lost == 0
+    assert len(reader.drain()[0]) == 0
+    reader.release()
+
+
+def test_a_reader_that_is_too_slow_loses_the_oldest_and_counts_them(ring: Ring) -> None:
+    ring.prepare(100_000 - SLOT.size)
+    slots = (RING_BYTES - 4096) // 100_000
+    reader = ring.reader({"position": ("<i4", 0)})
+    for number in range(slots + 10):
+        put(ring, number)
+    taken, lost = reader.drain()
+    assert len(taken) + lost == slots + 10, "every sample is delivered or counted"
+    assert list(taken["position"]) == list(range(lost, slots + 10))
+    reader.release()
+
+
+def test_signs_of_life(ring: Ring) -> None:
+    assert ring.host_deadline_ns() == 0
+    ring.host_lives_until(77, "searching the segment")
+    assert (ring.host_deadline_ns(), ring.host_doing()) == (77, "searching the segment")
+
+
+def test_blocks_are_cut_at_gaps_of_the_cycle_counter() -> None:
+    taken = np.zeros(5, np.dtype([("cycle", "<u8")]))
+    taken["cycle"] = [7, 8, 11, 12, 13]
+    assert [list(part["cycle"]) for part in _contiguous(taken)] == [[7, 8], [11, 12, 13]]
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        DriveError("a"), errors.LinkTimeout("b"), LinkLost("c", remedy="d"),
+        errors.ProtocolError("e", parameter="6041:00"), errors.OutOfRange("f", limit="1…2"),
+        errors.NotAllowed("g"), errors.Busy("h"), Rejected("i", code=0x06010002),
+    ],
+)  # fmt: skip
+def test_every_error_survives_the_pipe(error: DriveError) -> None:
+    unpacker = protocol.Unpacker()
+    data = protocol.pack({"error": protocol.error_to_wire(error)})
+    for byte in data[:-1]:
+        assert unpacker.feed(bytes([byte])) == []
+    back = protocol.error_from_wire(unpacker.feed(data[-1:])[0]["error"])
+    assert type(back) is type(error)
+    assert (back.message, back.remedy, back.limit) == (error.message, error.remedy, error.limit)
+    assert getattr(back, "code", None) == getattr(error, "code", None)
+
+
+class FakeWire:
+    def __init__(self) -> None:
+        self.log: list[tuple[int, int]] = []
+
+    def read(self, station: int, register: int, size: int) -> bytes | None:
+        self.log.append((station, register))
+        return bytes(size)
+
+    def write(self, station: int, register: int, data: bytes) -> bool:
+        self.log.append((station, register))
+        return True
+
+
+def test_lanes_interleave_stations_and_keep_order_within_one() -> None:
+    wire, now, finished = FakeWire(), [0.0], []
+    lanes = Lanes(wire, lambda: now[0])
+
+    def job(register: int) -> Steps[int]:
+        yield Read(register, 1)
+        yield Pause(1.0)
+        yield Write(register + 1, b"x")
+        return register
+
+    for station, register in ((1, 0x10), (1, 0x20), (2, 0x30)):
+        lanes.submit(station, "mailbox", job(register), lambda r, e: finished.append((r, e)))
+    while lanes.step():
+        pass
+    assert wire.log == [(1, 0x10), (2, 0x30)], "a pause of one does not hold up the other"
+    assert lanes.wake_s() == 1.0
+    now[0] = 1.0
+    while lanes.step():
+        pass
+    now[0] = 2.0
+    while lanes.step():
+        pass
+    assert wire.log == [(1, 0x10), (2, 0x30), (1, 0x11), (2, 0x31), (1, 0x20), (1, 0x21)]
+    assert [r for r, _ in finished] == [0x10, 0x30, 0x20]
+    assert not lanes.pending()
+
+
+def test_dropped_transactions_end_with_an_error() -> None:
+    lanes = Lanes(FakeWire(), lambda: 0.0)
+    ended: list[DriveError | None] = []
+
+    def job() -> Steps[None]:
+        yield Read(0, 1)
+        yield Pause(1.0)
+
+    for _ in range(2):
+        lanes.submit(1, "mailbox", job(), lambda _r, e: ended.append(e))
+    lanes.step()
+    lanes.drop("gone")
+    assert [str(e) for e in ended] == ["gone", "gone"]
+    assert not lanes.pending()
+
+
+def ports(station: int, *open_ports: int, counters: bytes = bytes(20)) -> esc.PortCounters:
+    status = sum(1 << 4 + p | 1 << 9 + 2 * p for p in (0, *open_ports))
+    return esc.decode_ports(station, status.to_bytes(2, "little"), counters)
+
+
+def test_topology_of_a_line_and_of_a_branch() -> None:
+    line = [ports(1, 1), ports(2, 1), ports(3)]
+    assert esc.parents(line) == {1: (0, 0), 2: (1, 1), 3: (2, 1)}
+    # Station 1 branches: port 3 is served before port 1 (ETG.1000.4: order 0, 3, 1, 2).
+    branch = [ports(1, 1, 3), ports(2), ports(3)]
+    assert esc.parents(branch) == {1: (0, 0), 2: (1, 3), 3: (1, 1)}
+
+
+def test_counters_name_the_cable() -> None:
+    counters = bytearray(20)
+    counters[1] = 7  # port 0: RX errors
+    counters[17] = 2  # port 1: lost links
+    found = esc.cable_findings([ports(1, 1), ports(2, 1, counters=bytes(counters)), ports(3)])
+    assert found == [
+        "cable between station 1 and station 2: damaged frames arrived 7 times;"
+        " check cable, screen and earth",
+        "cable between station 2 and station 3: the link was lost 2 times; check plug and cable",
+    ]
+
+
+def test_errors_that_were_only_passed_on_accuse_nobody() -> None:
+    counters = bytearray(20)
+    counters[0], counters[8] = 5, 5  # port 0: invalid frames, all of them forwarded
+    assert esc.cable_findings([ports(1, 1), ports(2, counters=bytes(counters))]) == []
+
+
+def test_eeprom_checksum() -> None:
+    words = bytes.fromhex("0503 4464 0000 0000 0000 0000 0000")
+    assert sii.checksum(words) == _division(words)
+    assert sii.checksum(words) != sii.checksum(words[:8] + b"\x01" + words[9:])
+
+
+def _division(data: bytes) -> int:
+    """CRC-8, polynomial 0x107, start 0xFF, as a division of whole numbers."""
+    length = 8 * len(data)
+    # A start value of 0xFF is the same as inverting the first eight bits of the message.
+    value = (int.from_bytes(data, "big") ^ (0xFF << length - 8)) << 8
+    for bit in range(length + 7, 7, -1):
+        if value >> bit & 1:
+            value ^= 0x107 << bit - 8
+    return value
+
+
+def test_al_status_in_words() -> None:
+    assert al_status_text(0x001B).text.startswith("sync manager watchdog")
+    assert "0x9abc" in al_status_text(0x9ABC).text
+    assert state_name(0x14) == "SAFEOP + error"
+
+
+@pytest.mark.parametrize(
+    ("cycle_us", "value", "exponent"),
+    [(1000, 1, -3), (250, 25, -5), (500, 5, -4), (10_000, 10, -3)],
+)
+def test_interpolation_period(cycle_us: int, value: int, exponent: int) -> None:
+    assert interpolation_period(cycle_us * 1000) == (value, exponent)
+
+
+def test_permissions_name_what_is_missing_and_the_command() -> None:
+    status = f"Name:\tx\nCapEff:\t{1 << 13:016x}\n"
+    report = permissions.check("lo", status=status, python="/usr/bin/env")
+    assert report.missing == ("CAP_NET_ADMIN",)
+    assert report.advised == ("CAP_SYS_NICE", "CAP_IPC_LOCK")
+    assert report.words() == "CAP_NET_ADMIN is missing"
+    assert report.commands[0].startswith(
+        "sudo setcap cap_net_raw,cap_net_admin,cap_sys_nice,cap_ipc_lock+ep /"
+    )
+    assert not report.ready
+    everything = permissions.check("lo", status="CapEff:\tffffffffffffffff\n")
+    assert everything.missing == ()
+
+
+def test_permissions_without_the_interface() -> None:
+    report = permissions.check("nosuch0")
+    assert not report.ready
+    assert "no network interface 'nosuch0'" in report.words()
+
+
+def test_percentiles_of_the_lateness() -> None:
+    bins = [0] * 16
+    bins[3], bins[8] = 99, 1
+    assert percentile_us(bins, 0.5) == 8
+    assert percentile_us(bins, 0.995) == 256

@@ -1,0 +1,269 @@
+"""The axis in the loop against CiA 402-2 and the rules of `drivers.link.Trajectory`."""
+
+from __future__ import annotations
+
+import array
+import itertools
+
+import pytest
+
+from drivers.cia402 import State
+from drivers.errors import NotAllowed
+from drivers.ethercat.playback import STOP_S, AxisLoop, Limits, Motion, Phase
+
+IN = {0x6041: 0, 0x6064: 1, 0x606C: 2, 0x6077: 3, 0x6061: 4}
+OUT = {0x6040: 0, 0x607A: 1, 0x60FF: 2, 0x6071: 3, 0x60B2: 4, 0x6060: 5}
+DISABLED, READY, ON, ENABLED, FAULT = 0x0250, 0x0231, 0x0233, 0x0237, 0x0218
+CYCLE_S = 0.001
+
+
+class Bench:
+    """An axis whose drive does at once what its control word says."""
+
+    def __init__(self, position: int = 500) -> None:
+        self.told: list[str] = []
+        self.axis = AxisLoop(
+            1, inputs=IN, outputs=OUT, output_count=6, cycle_s=CYCLE_S,
+            report=lambda _station, text: self.told.append(text),
+        )  # fmt: skip
+        self.status, self.position, self.speed, self.torque, self.mode = DISABLED, position, 0, 0, 8
+
+    def step(self, cycles: int = 1) -> None:
+        for _ in range(cycles):
+            self.axis.step((self.status, self.position, self.speed, self.torque, self.mode))
+
+    def obey(self, cycles: int = 6) -> None:
+        for _ in range(cycles):
+            self.step()
+            word = self.axis.outputs[0]
+            if self.status == FAULT:
+                self.status = DISABLED if word & 0x80 else FAULT
+            elif word & 0x02 == 0:
+                self.status = DISABLED
+            elif word == 0x06:
+                self.status = READY
+            elif word == 0x07 and self.status != DISABLED:
+                self.status = ON
+            elif word == 0x0F and self.status in (ON, ENABLED):
+                self.status = ENABLED
+
+    def enabled(self, mode: int = 8) -> Bench:
+        self.mode = mode
+        self.step()
+        self.axis.drive_to(State.OPERATION_ENABLED, mode)
+        self.obey()
+        assert self.axis.state is State.OPERATION_ENABLED
+        return self
+
+    def play(
+        self,
+        values: list[int],
+        target: int = 0x607A,
+        renew: int = 200,
+        limits: Limits | None = None,
+    ) -> None:
+        steps = [abs(b - a) for a, b in itertools.pairwise(values)]
+        self.axis.play(
+            Motion(
+                target, array.array("q", values), limits or Limits(), renew, max(steps, default=0)
+            )
+        )
+
+
+def test_enabling_walks_through_the_states_and_does_not_move() -> None:
+    bench = Bench(position=500)
+    words = []
+    bench.axis.drive_to(State.OPERATION_ENABLED, 8)
+    for _ in range(5):
+        bench.obey(1)
+        words.append(bench.axis.outputs[0])
+        assert bench.axis.outputs[1] == 500, "the target waits where the axis is"
+    assert [w for n, w in enumerate(words) if n == 0 or w != words[n - 1]] == [0x06, 0x07, 0x0F]
+
+
+def test_the_target_follows_the_axis_until_it_is_enabled() -> None:
+    bench = Bench(position=500)
+    bench.step()
+    bench.position = 730
+    bench.step()
+    assert bench.axis.outputs[1] == 730
+
+
+def test_one_value_per_cycle() -> None:
+    bench = Bench().enabled()
+    values = [500, 503, 509, 518]
+    bench.play(values)
+    seen = []
+    for _ in values:
+        bench.step()
+        seen.append(bench.axis.outputs[1])
+    assert seen == values
+    assert bench.axis.phase is Phase.HOLDING
+
+
+def test_without_renewal_it_brakes_and_leaves_operation_enabled() -> None:
+    bench = Bench().enabled()
+    bench.play(list(range(500, 5000, 10)), renew=200)
+    bench.step(200)
+    assert bench.axis.phase is Phase.PLAYING
+    before = bench.axis.outputs[1]
+    assert before == 500 + 199 * 10
+    bench.step()
+    assert bench.axis.phase is Phase.BRAKING
+    cycles = round(STOP_S / CYCLE_S)
+    track = [before, bench.axis.outputs[1]]
+    for _ in range(cycles):
+        bench.step()
+        track.append(bench.axis.outputs[1])
+    speeds = [b - a for a, b in itertools.pairwise(track)]
+    assert all(b <= a + 1 for a, b in itertools.pairwise(speeds)), "it only gets slower"
+    # From 10 counts per cycle linearly to zero in n cycles: 10·n/2 counts, less the last half step.
+    assert track[-1] - before == pytest.approx(10 * cycles / 2, rel=0.03)
+    assert speeds[-1] == 0
+    bench.obey(3)
+    assert bench.axis.state is not State.OPERATION_ENABLED
+    assert "not renewed" in bench.axis.halted
+
+
+def test_renewal_keeps_it_going() -> None:
+    bench = Bench().enabled()
+    bench.play(list(range(500, 900)), renew=50)
+    for _ in range(350):
+        bench.axis.renew()
+        bench.step()
+    assert bench.axis.phase is Phase.PLAYING
+    assert bench.told == []
+
+
+@pytest.mark.parametrize(
+    ("field", "limits", "value", "word"),
+    [
+        ("position", Limits(position_max=1000), 1001, "position 1001 is beyond the limit of 1000"),
+        ("position", Limits(position_min=400), 399, "position 399 is beyond the limit of 400"),
+        ("speed", Limits(speed_max=100), -101, "speed -101 is beyond"),
+        ("torque", Limits(torque_max=300), 301, "torque 301 is beyond"),
+    ],
+)
+def test_the_envelope_stops_in_the_very_cycle(
+    field: str, limits: Limits, value: int, word: str
+) -> None:
+    bench = Bench().enabled()
+    bench.play([500] * 400, limits=limits)
+    bench.step(3)
+    assert bench.axis.phase is Phase.PLAYING
+    setattr(bench, field, value)
+    bench.step()
+    assert bench.axis.phase is Phase.BRAKING
+    assert word in bench.axis.halted
+    assert bench.told
+    assert bench.told[0].startswith(word)
+
+
+def test_following_error_is_computed_where_the_drive_does_not_tell_it() -> None:
+    bench = Bench().enabled()
+    bench.play(list(range(500, 900)), limits=Limits(following_error_max=50))
+    bench.step(51)
+    assert bench.axis.phase is Phase.PLAYING
+    bench.step(2)
+    assert "following error" in bench.axis.halted
+
+
+def test_a_limit_that_cannot_be_watched_is_refused() -> None:
+    bench = Bench()
+    bench.axis = AxisLoop(
+        1, inputs={0x6041: 0, 0x6064: 1}, outputs=OUT, output_count=6, cycle_s=CYCLE_S,
+        report=lambda *_: None,
+    )  # fmt: skip
+    bench.enabled()
+    with pytest.raises(NotAllowed, match="606Ch is not mapped"):
+        bench.play([500], limits=Limits(speed_max=1))
+
+
+def test_a_jump_at_the_beginning_is_refused() -> None:
+    bench = Bench().enabled()
+    with pytest.raises(NotAllowed, match="begins at 700, the axis is held at 500"):
+        bench.play([700, 701, 702])
+
+
+def test_a_trajectory_for_another_mode_is_refused() -> None:
+    bench = Bench().enabled(mode=8)
+    with pytest.raises(NotAllowed, match=r"mode 8, this setpoint needs mode 9"):
+        bench.play([0, 1], target=0x60FF)
+
+
+def test_velocity_ramps_down_to_zero() -> None:
+    bench = Bench().enabled(mode=9)
+    bench.play([1000] * 1000, target=0x60FF, renew=10)
+    bench.step(11)
+    speeds = []
+    for _ in range(round(STOP_S / CYCLE_S)):
+        speeds.append(bench.axis.outputs[2])
+        bench.step()
+    assert speeds == sorted(speeds, reverse=True)
+    assert bench.axis.outputs[2] == 0
+
+
+def test_torque_ends_with_a_quick_stop_because_no_torque_does_not_stop_an_axis() -> None:
+    bench = Bench().enabled(mode=10)
+    bench.play([100] * 1000, target=0x6071)
+    bench.step(5)
+    bench.axis.stop("test")
+    bench.step()
+    assert bench.axis.outputs[3] == 0
+    assert bench.axis.outputs[0] == 0x02
+
+
+def test_a_fault_is_never_reset_by_enabling_nor_left_behind_enabled() -> None:
+    bench = Bench().enabled()
+    bench.play(list(range(500, 900)))
+    bench.step(5)
+    bench.status = FAULT
+    bench.step(10)
+    assert bench.axis.phase is Phase.IDLE
+    assert bench.axis.outputs[0] & 0x80 == 0
+    with pytest.raises(NotAllowed, match="has a fault"):
+        bench.axis.drive_to(State.OPERATION_ENABLED, 8)
+    bench.axis.reset_fault()
+    bench.obey(4)
+    assert bench.axis.state is State.SWITCH_ON_DISABLED
+    bench.step(5)
+    assert bench.axis.outputs[0] == 0, "it stays disabled"
+
+
+def test_a_drive_that_leaves_operation_enabled_is_not_enabled_again_by_itself() -> None:
+    bench = Bench().enabled()
+    bench.status = DISABLED
+    bench.obey(10)
+    assert bench.status == DISABLED
+    assert "left Operation enabled" in bench.told[0]
+
+
+def test_cycles_without_trusted_inputs_go_on_but_conclude_nothing() -> None:
+    bench = Bench().enabled()
+    bench.play([500, 501, 502, 503, 504])
+    bench.step(2)
+    bench.axis.blind()
+    assert bench.axis.outputs[1] == 502
+    assert bench.axis.state is State.OPERATION_ENABLED
+
+
+def test_disabling_a_moving_axis_brakes_first() -> None:
+    bench = Bench().enabled()
+    bench.play(list(range(500, 5000, 10)))
+    bench.step(10)
+    bench.axis.drive_to(State.SWITCH_ON_DISABLED, None)
+    bench.step()
+    assert bench.axis.outputs[0] == 0x0F
+    assert bench.axis.phase is Phase.BRAKING
+    bench.step(round(STOP_S / CYCLE_S))
+    bench.step()
+    assert bench.axis.outputs[0] == 0x00
+
+
+def test_play_while_braking_is_refused() -> None:
+    bench = Bench().enabled()
+    bench.play(list(range(500, 5000, 10)))
+    bench.step(5)
+    bench.axis.stop("stopped by the user")
+    with pytest.raises(NotAllowed, match="braking: stopped by the user"):
+        bench.play([550])
