@@ -9,6 +9,8 @@ from __future__ import annotations
 import errno
 import os
 import select
+import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
@@ -96,6 +98,10 @@ def open_port(settings: LineSettings) -> Port:
         raise _unsuitable(settings, str(error)) from error
     except OSError as error:  # SerialException is one
         raise _explain(settings, error) from error
+    if sys.platform == "linux":
+        # USB chips hold answers back for up to 16 ms unless asked not to; ptys cannot be asked.
+        with suppress(OSError, ValueError):
+            port.set_low_latency_mode(True)
     if os.name == "posix":
         return _PosixPort(port, settings.device)
     return SerialPort(port, settings.device)
