@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from drivers.virtual.wires.ethercat.segment import Segment
 from drivers.virtual.wires.ethercat.slave import Slave
+
 from .dictionary_device import DictionaryDevice, make_profile
 
 APRD, APWR, APRW, FPRD, FPWR, FPRW, BRD, BWR, BRW, LRD, LWR, LRW, ARMW, FRMW = range(1, 15)

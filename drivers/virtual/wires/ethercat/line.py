@@ -50,6 +50,8 @@ class Line:
         device = self._slaves[position].device
         device.advance(now_ns)
         device.power_cycle(_FOR_GOOD_S if for_s is None else for_s)
+        if not device.powered and position not in self._off:
+            self._power_changed(position, now_ns)
 
     def power_on(self, position: int) -> None:
         """Switch it on again; its link comes up after `LINK_UP_NS`."""
