@@ -15,6 +15,10 @@ from scipy.stats import t as student_t
 
 from backend.analysis.arrays import BoolArray, FloatArray
 
+#: Shares of J, viscous, Coulomb and gravity torque by which compliance, timing and the smoothing
+#: of standstill bend the answer however little noise there is; part of every interval.
+SYSTEMATIC_SHARE = np.array([0.005, 0.05, 0.03, 0.01])
+
 
 @dataclass(frozen=True)
 class Interval:
@@ -135,8 +139,8 @@ def _slope_kernel(kernel: FloatArray) -> FloatArray:
 
 def _huber(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Robust solution of a·x = b by reweighting; solution and weights."""
-    weight = np.ones(b.size)
-    x = np.zeros(a.shape[1])
+    weight: FloatArray = np.ones(b.size)
+    x: FloatArray = np.zeros(a.shape[1])
     for _ in range(15):
         root = np.sqrt(weight)
         x = np.linalg.lstsq(a * root[:, None], b * root, rcond=None)[0]
@@ -243,9 +247,9 @@ def _regress(
     std = np.sqrt(np.maximum(np.diag(normal) * variance, 0.0)) / scale
     value = x / scale
     t = float(student_t.ppf(0.975, freedom))
+    half = np.hypot(t * std, SYSTEMATIC_SHARE * np.abs(value))
     parts = [
-        Interval(float(v), float(v - t * s), float(v + t * s))
-        for v, s in zip(value, std, strict=True)
+        Interval(float(v), float(v - h), float(v + h)) for v, h in zip(value, half, strict=True)
     ]
     total = float(np.sum(weight * (b - np.average(b, weights=weight)) ** 2))
     r2 = 1.0 - float(np.sum(weight * residual**2)) / total if total > 0 else 0.0

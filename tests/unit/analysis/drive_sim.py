@@ -125,9 +125,13 @@ def _simulate(
         if mode == 0:
             ref += gravity
         else:
-            wanted = velocity_in[k]
+            # References of motion are interpolated from cycle to cycle, as 60C2h says.
+            part = (i % m + 1) / m
+            before = max(k - 1, 0)
+            wanted = velocity_in[before] + part * (velocity_in[k] - velocity_in[before])
             if mode == 2:
-                wanted += kv * (position_in[k] - theta)
+                goal = position_in[before] + part * (position_in[k] - position_in[before])
+                wanted += kv * (goal - theta)
             error = wanted - filtered
             ref += kp * error + integral
             if abs(ref) < limit:
@@ -157,13 +161,11 @@ def simulate(mechanics, drive, sample_rate_hz, *, torque=None, velocity=None, po
     mass, d, k = mechanics.matrices()
     n = len(mass)
     system = np.zeros((2 * n + 3, 2 * n + 3))  # angle 0, speed 0, ...; current loop; two inputs
-    order = [0, 2 * 0 + 1] + [j for i in range(1, n) for j in (2 * i, 2 * i + 1)]
     for i in range(n):
         system[2 * i, 2 * i + 1] = 1.0
         for j in range(n):
             system[2 * i + 1, 2 * j] = -k[i, j] / mass[i]
             system[2 * i + 1, 2 * j + 1] = -d[i, j] / mass[i]
-    assert order[:2] == [0, 1]
     wc = TURN * drive.current_hz
     tau = 2 * n
     system[1, tau] = 1 / mass[0]
