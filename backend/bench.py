@@ -71,12 +71,15 @@ class Member:
 class Bench:
     """Buses and drives of one server.
 
-    ``aliases`` maps addresses such as ``mlink://virtual0`` to the URL behind them.
+    ``wires`` are the wires of a demo bench: URLs such as ``mlink://virtual0`` and what makes
+    their links.
     ``state_folder`` keeps the list of drives over restarts and the parameter sets.
     """
 
-    def __init__(self, state_folder: Path, aliases: Mapping[str, str] | None = None) -> None:
-        self.aliases = dict(aliases or {})
+    def __init__(
+        self, state_folder: Path, wires: Mapping[str, Callable[[], Link]] | None = None
+    ) -> None:
+        self.wires = dict(wires or {})
         self.journal = Journal()
         self.sets = SetLibrary(state_folder / "sets")
         self.members: dict[str, Member] = {}
@@ -102,7 +105,8 @@ class Bench:
         async with self._opening:
             link = self.links.get(url)
             if link is None:
-                link = link_for(self.aliases.get(url, url))
+                make = self.wires.get(url)
+                link = make() if make is not None else link_for(url)
                 await link.open()
                 link.listen(lambda event: self._bus_event(url, event))
                 self.links[url] = link

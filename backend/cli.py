@@ -62,11 +62,11 @@ def demo(
             state = config or Path(folder) / "state"
             print("starting the virtual drives …", flush=True)
             with DemoBench(bench, Path(folder) / "wires", state / "nvm") as drives:
-                for alias, real in drives.aliases.items():
-                    print(f"  {alias}  is  {real}")
+                for url, real in drives.addresses.items():
+                    print(f"  {url}  is  {real}")
                 for problem in drives.problems:
                     print(f"  note: {problem}")
-                server_bench = Bench(state, drives.aliases)
+                server_bench = Bench(state, drives.wires)
                 await run_server(server_bench, host, port, open_page=open_)
 
     _until_interrupted(work)
@@ -105,7 +105,7 @@ def virtual(
             }
             file.write_text(json.dumps({"axis": [axis]}), "utf-8")
             with DemoBench(file, Path(folder), nvm) as drives:
-                for real in drives.aliases.values():
+                for real in drives.addresses.values():
                     print(f"{drive} answers at {real} station {station}  (Ctrl+C ends it)")
                 sys.stdout.flush()
                 await asyncio.Event().wait()

@@ -5,11 +5,18 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
 from drivers.errors import LinkLost
+from drivers.ethercat.link import EthercatLink
+from drivers.link import Link
+from drivers.urls import link_for
 from drivers.virtual.bench import STANDARD_BENCH, BenchSpec, load_bench
+from drivers.virtual.wires.ethercat.launch import VirtualSegment
+from drivers.virtual.wires.netns import Namespace, NamespaceUnavailable
 
 
 class DemoBench:
@@ -24,7 +31,12 @@ class DemoBench:
         self._nvm = nvm
         self._host: subprocess.Popen[str] | None = None
         self.spec: BenchSpec = load_bench(self._file)
-        self.aliases: dict[str, str] = {}
+        #: The bench's bus URLs, and how to open the wire behind each.
+        self.wires: dict[str, Callable[[], Link]] = {}
+        #: The same wires as other programs name them.
+        self.addresses: dict[str, str] = {}
+        self.segments: dict[str, VirtualSegment] = {}
+        self._namespaces: list[Namespace] = []
         #: Sentences for the user about what could not be started.
         self.problems: list[str] = []
 
@@ -56,7 +68,30 @@ class DemoBench:
             )
         wires = answer["wires"]
         if isinstance(wires, dict):
-            self.aliases.update(wires)
+            self.addresses.update(wires)
+            self.wires.update({url: partial(link_for, real) for url, real in wires.items()})
+        for number, url in enumerate(self.spec.urls("ethercat")):
+            self._start_segment(url, number)
+
+    def _start_segment(self, url: str, number: int) -> None:
+        """A private network with the segment at one end of its cable.
+
+        Where the system forbids such networks the rest of the bench runs, and the user is told.
+        """
+        master, slave = f"ec{number}m", f"ec{number}s"
+        try:
+            namespace = Namespace.create([(master, slave)])
+        except NamespaceUnavailable as error:
+            self.problems.append(f"{url} is left out: {error}")
+            return
+        self._namespaces.append(namespace)
+        arguments = ["--bench", str(self._file), "--on", url]
+        if self._nvm is not None:
+            arguments += ["--nvm", str(self._nvm)]
+        self.segments[url] = VirtualSegment.start(slave, arguments, namespace)
+        launcher = namespace.command(())
+        self.addresses[url] = f"interface {master} in the network of process {namespace.pid}"
+        self.wires[url] = partial(EthercatLink, master, url=url, launcher=launcher)
 
     def command(self, **command: object) -> object:
         """Cause trouble: see drivers.virtual.host.
@@ -78,6 +113,11 @@ class DemoBench:
 
     def stop(self) -> None:
         """End the virtual drives. Calling again does nothing."""
+        for segment in self.segments.values():
+            segment.close()
+        for namespace in self._namespaces:
+            namespace.close()
+        self.segments, self._namespaces = {}, []
         host, self._host = self._host, None
         if host is None:
             return

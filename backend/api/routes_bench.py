@@ -37,7 +37,7 @@ router = APIRouter()
 async def health(bench: TheBench) -> Health:
     """Whether the server is alive."""
     now = convert.moment(backend.now())
-    return Health(version=backend.__version__, time=now, demo=bool(bench.aliases))
+    return Health(version=backend.__version__, time=now, demo=bool(bench.wires))
 
 
 @router.get("/session")
@@ -49,7 +49,7 @@ async def session() -> Session:
 @router.get("/interfaces")
 async def interfaces(bench: TheBench) -> Interfaces:
     """What this machine can connect through."""
-    return list_interfaces(list(bench.aliases))
+    return list_interfaces(list(bench.wires))
 
 
 @router.get("/profiles")

@@ -19,14 +19,44 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Protocol
 
 from drivers.errors import DriveError
 from drivers.urls import parse_url
 from drivers.virtual.bench import AxisSpec, BenchSpec, load_bench
 from drivers.virtual.device import Device
 from drivers.virtual.firmware.factory import make_device
+from drivers.virtual.shared import SharedDevice
+from drivers.virtual.wires.can_wire import CanWire
+from drivers.virtual.wires.canopen import CanopenNode
 from drivers.virtual.wires.modbus import ModbusSlave, ObjectRegisters, Registers, TableRegisters
 from drivers.virtual.wires.pty import PtyWire, WireTime
+from drivers.virtual.wires.slcan import SlcanSide
+
+
+class Cable(Protocol):
+    """Something that can be pulled and plugged in again."""
+
+    def pull(self) -> None:
+        """Pull it."""
+
+    def heal(self) -> None:
+        """Plug it in again."""
+
+
+class CanCable:
+    """A CAN adapter as a cable."""
+
+    def __init__(self, side: SlcanSide) -> None:
+        self._side = side
+
+    def pull(self) -> None:
+        """Unplug the adapter."""
+        self._side.unplug()
+
+    def heal(self) -> None:
+        """Plug it in again."""
+        self._side.plug()
 
 
 class Wires:
@@ -36,6 +66,7 @@ class Wires:
         self.devices: dict[str, Device] = {}
         self.real_urls: dict[str, str] = {}
         self._slaves: dict[str, ModbusSlave] = {}
+        self._can_wires: dict[str, tuple[CanWire, SlcanSide]] = {}
         self._lock = threading.RLock()
         self._bench = bench
         self._folder = folder
@@ -50,16 +81,21 @@ class Wires:
         for scheme in ("mlink", "modbus"):
             for number, url in enumerate(self._bench.urls(scheme)):
                 self._start_serial(scheme, url, number)
+        for number, url in enumerate(self._bench.urls("canopen")):
+            self._start_can(url, number)
 
     def stop(self) -> None:
         """Take all wires down."""
         for slave in self._slaves.values():
             slave.stop()
+        for wire, _ in self._can_wires.values():
+            wire.stop()
 
     def _device(self, axis: AxisSpec, station: int) -> Device:
         device = self.devices.get(axis.name)
         if device is None:
-            device = make_device(axis.drive, axis.mechanics, self._nvm, station)
+            real = make_device(axis.drive, axis.mechanics, self._nvm, station)
+            device = SharedDevice(real, self._lock)
             # Compiles the physics on a machine's first start, before anybody asks the drive.
             now_ns = time.monotonic_ns()
             device.advance(now_ns)
@@ -87,6 +123,21 @@ class Wires:
         # A pty refuses parity (EINVAL), so the address that is handed out asks for none.
         self.real_urls[url] = f"{scheme}://{path}?parity=N"
 
+    def _start_can(self, url: str, number: int) -> None:
+        parsed = parse_url(url)
+        place = parsed.place.removeprefix("slcan/")
+        path = self._folder / f"can{number}" if parsed.is_virtual else Path(place)
+        bitrate = int(dict(parsed.options).get("bitrate", "1000000"))
+        nodes = [
+            CanopenNode(self._device(axis, station), station, time.monotonic_ns)
+            for axis, station in self._bench.on(url)
+        ]
+        side = SlcanSide(path)
+        wire = CanWire(side, nodes)
+        wire.start()
+        self._can_wires[url] = (wire, side)
+        self.real_urls[url] = f"canopen://slcan/{path}?bitrate={bitrate}"
+
     # --- trouble ----------------------------------------------------------------------
 
     def carry_out(self, command: dict[str, object]) -> object:
@@ -96,8 +147,8 @@ class Wires:
             ValueError: no such command, wire or axis.
         """
         actions: dict[str, Callable[[dict[str, object]], object]] = {
-            "pull": lambda c: self._slave(c).wire.pull(),
-            "heal": lambda c: self._slave(c).wire.heal(),
+            "pull": lambda c: self._cable(c).pull(),
+            "heal": lambda c: self._cable(c).heal(),
             "mute": self._mute,
             "power_cycle": self._power_cycle,
             "inject": self._inject,
@@ -107,6 +158,10 @@ class Wires:
         if action is None:
             raise ValueError(f"no command {command.get('do')!r}; there are {', '.join(actions)}")
         return action(command)
+
+    def _cable(self, command: dict[str, object]) -> Cable:
+        found = self._can_wires.get(str(command.get("wire")))
+        return CanCable(found[1]) if found is not None else self._slave(command).wire
 
     def _slave(self, command: dict[str, object]) -> ModbusSlave:
         slave = self._slaves.get(str(command.get("wire")))

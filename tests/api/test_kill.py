@@ -91,7 +91,7 @@ def add_drive(server: ServerProcess, url: str) -> str:
 def test_killed_server_leaves_an_axis_that_stops_by_itself(
     drives: DemoBench, tmp_path: Path
 ) -> None:
-    url = drives.aliases["mlink://virtual0"]
+    url = drives.addresses["mlink://virtual0"]
     server = ServerProcess(tmp_path / "state")
     x = add_drive(server, url)
     page = server.live()
@@ -114,7 +114,7 @@ def test_killed_server_leaves_an_axis_that_stops_by_itself(
 
 
 def test_server_finds_its_drives_again_after_a_kill(drives: DemoBench, tmp_path: Path) -> None:
-    url = drives.aliases["mlink://virtual0"]
+    url = drives.addresses["mlink://virtual0"]
     server = ServerProcess(tmp_path / "state")
     x = add_drive(server, url)
     server.kill()
@@ -127,7 +127,7 @@ def test_server_finds_its_drives_again_after_a_kill(drives: DemoBench, tmp_path:
 
 
 def test_ended_server_stops_the_axis_first(drives: DemoBench, tmp_path: Path) -> None:
-    url = drives.aliases["mlink://virtual0"]
+    url = drives.addresses["mlink://virtual0"]
     server = ServerProcess(tmp_path / "state")
     x = add_drive(server, url)
     body = {"mode": "PV", "target": 200, "acceleration": 3000, "deceleration": 3000,

@@ -54,7 +54,7 @@ class Station:
 
         def run() -> None:
             async def main() -> None:
-                bench = Bench(self.folder / "state", self.drives.aliases)
+                bench = Bench(self.folder / "state", self.drives.wires)
                 config = uvicorn.Config(
                     make_app(bench, hosts=LOOPBACK),
                     log_level="warning",
@@ -63,7 +63,7 @@ class Station:
                 )
                 self._server = uvicorn.Server(config)
                 serving = asyncio.create_task(self._server.serve(sockets=[listening]))
-                while not self._server.started:
+                while not self._server.started:  # noqa: ASYNC110 - uvicorn has no event for it
                     await asyncio.sleep(0.01)
                 started.set()
                 await serving
