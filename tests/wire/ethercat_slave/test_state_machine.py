@@ -114,6 +114,22 @@ def test_op_waits_for_the_first_outputs(wire: Wire) -> None:
     assert wire.state() == (OP, 0)
 
 
+def test_op_waits_for_the_first_sync0(wire: Wire) -> None:
+    wire.to_preop()
+    wire.set_process_data()
+    wire.write(0x0990, struct.pack("<Q", 100_000_000))
+    wire.write(0x09A0, struct.pack("<I", 1_000_000))
+    wire.write(0x0981, b"\x03")
+    wire.request(SAFEOP)
+    wire.request(OP)
+    wire.write(OUT, wire.outputs())
+    wire.clock.time_ns = 99_999_999
+    assert wire.state() == (SAFEOP, 0)
+    wire.clock.time_ns = 100_000_000
+    wire.write(OUT, wire.outputs())
+    assert wire.state() == (OP, 0)
+
+
 def test_op_gives_up_when_no_outputs_come(wire: Wire) -> None:
     wire.to_safeop()
     wire.request(OP)

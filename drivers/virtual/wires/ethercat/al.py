@@ -14,8 +14,8 @@ _ALLOWED: dict[AlState, tuple[AlState, ...]] = {
     AlState.OP: (AlState.INIT, AlState.PREOP, AlState.SAFEOP),
 }
 
-OUTPUTS_TIMEOUT_NS = 9_000_000_000
-"""How long Safe-Op waits for the first outputs (ETG.1020 default of SafeOp to Op)."""
+WAIT_NS = 9_000_000_000
+"""How long Safe-Op waits for outputs and SYNC0 (ETG.2000 default time-out of SafeOp to Op)."""
 
 
 class Application(Protocol):
@@ -24,8 +24,8 @@ class Application(Protocol):
     def check(self, target: AlState) -> int:
         """AL status code that forbids ``target``, 0 if nothing does."""
 
-    def ready(self, target: AlState) -> bool:
-        """False while ``target`` must still wait for something (outputs for Op)."""
+    def waits_for(self, target: AlState) -> int:
+        """0, or while ``target`` must wait for something the code to give if it never comes."""
 
     def entered(self, old: AlState, new: AlState, code: int) -> None:
         """The state has changed; ``code`` is not 0 when an error forced it."""
@@ -87,7 +87,7 @@ class AlStateMachine:
             return
         self._target = target
         self._due_ns = now_ns + self.delay_ns
-        self._give_up_ns = self._due_ns + OUTPUTS_TIMEOUT_NS
+        self._give_up_ns = self._due_ns + WAIT_NS
         if not self.delay_ns:
             self.run(now_ns)
 
@@ -101,12 +101,12 @@ class AlStateMachine:
             self._target = None
             self._fail(code)
             return
-        if not self._application.ready(target):
+        if missing := self._application.waits_for(target):
             if now_ns < self._give_up_ns:
                 self._due_ns = self._give_up_ns
                 return
             self._target = None
-            self._fail(AlCode.WATCHDOG)
+            self._fail(missing)
             return
         self._target = None
         self.error, self.code = False, 0

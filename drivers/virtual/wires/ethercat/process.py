@@ -41,6 +41,7 @@ class ProcessData:
         self._running = False
         self._operational = False
         self._ticked_ns = -1
+        self._seen_sync0 = False
         outputs.on_written = self._written
         self._now_ns = 0
         self.received = False
@@ -94,6 +95,7 @@ class ProcessData:
         self._latest, self._fresh, self.received = b"", False, False
         self._ticked_ns = now_ns
         self._running = True
+        self._seen_sync0 = False
         self.written_ns = None
         self._report.mode = _SYNC0 if self._clock.sync0_requested else _SYNC_MANAGER
         self._report.cycle_ns = self._clock.sync0_cycle_ns
@@ -114,6 +116,11 @@ class ProcessData:
             self._report.missed = 0
 
     @property
+    def synchronised(self) -> bool:
+        """SYNC0 has come since Safe-Op, or is not asked for."""
+        return self._seen_sync0 or not self._clock.sync0_requested
+
+    @property
     def next_tick_ns(self) -> int | None:
         """Next SYNC0 that has work to do."""
         return self._clock.next_sync0(self._ticked_ns) if self._running else None
@@ -121,6 +128,7 @@ class ProcessData:
     def tick(self, now_ns: int) -> None:
         """SYNC0 at ``now_ns``: take outputs, latch inputs."""
         self._ticked_ns = now_ns
+        self._seen_sync0 = True
         self._device.advance(now_ns)
         if self._operational:
             if not self._fresh and self.has_outputs:

@@ -210,9 +210,15 @@ class Slave:
             for sm in self.controller.sms[:2]
         )
 
-    def ready(self, target: AlState) -> bool:
-        """Op begins with the first outputs (004:990-992)."""
-        return target != AlState.OP or self.process.received or not self.process.has_outputs
+    def waits_for(self, target: AlState) -> int:
+        """Op begins with the first outputs (004:990-992) and, with DC, the first SYNC0."""
+        if target != AlState.OP:
+            return 0
+        if not self.process.synchronised:
+            return AlCode.NO_SYNC
+        if self.process.has_outputs and not self.process.received:
+            return AlCode.WATCHDOG
+        return 0
 
     def entered(self, old: AlState, new: AlState, code: int) -> None:
         """Start and stop mailbox, process data and the drive's reaction."""

@@ -1,0 +1,142 @@
+"""SOEM against the segment over a veth pair, in a namespace of an ordinary user."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.errors import LinkLost
+from drivers.virtual.wires.ethercat.launch import VirtualSegment
+from drivers.virtual.wires.netns import Namespace, NamespaceUnavailable
+
+HERE = Path(__file__).parent
+FACTORY = "tests.wire.ethercat_slave.dictionary_device:make_device"
+MASTER, SLAVE = "ec0m", "ec0s"
+
+
+@pytest.fixture(scope="module")
+def namespace() -> Iterator[Namespace]:
+    try:
+        made = Namespace.create([(MASTER, SLAVE)])
+    except NamespaceUnavailable as error:
+        pytest.skip(str(error))
+    with made:
+        yield made
+
+
+def segment(namespace: Namespace, count: int, *options: str) -> VirtualSegment:
+    drives = ["--drive", "dictionary"] * count
+    return VirtualSegment.start(SLAVE, [*drives, "--factory", FACTORY, *options], namespace)
+
+
+def start(namespace: Namespace, scenario: str) -> subprocess.Popen[str]:
+    script = str(HERE / "soem_master.py")
+    return namespace.popen(
+        [sys.executable, script, scenario, MASTER],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+
+
+def finish(process: subprocess.Popen[str]) -> dict[str, Any]:
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    answer: dict[str, Any] = json.loads(out.splitlines()[-1])
+    return answer
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_soem_takes_the_segment_to_op(namespace: Namespace, count: int) -> None:
+    with segment(namespace, count) as running:
+        got = finish(start(namespace, "everything"))
+        state = running.command("state")
+    assert got["found"] == count
+    assert got["names"] == ["DICT-1"] * count
+    assert got["ids"] == [[0xABCD, 0x1234, 0x00010002]] * count
+    assert got["device_type"] == "92010200"
+    assert got["complete"] == "0300" + "2211" + "33" + "77665544"
+    assert got["segmented"] is True
+    assert got["abort"] == 0x06020000
+    assert got["od"] == sorted(got["od"])
+    assert {0x1000, 0x1603, 0x1C12, 0x2001, 0x6041} <= set(got["od"])
+    assert got["entries"] == [[8, 5], [16, 6], [8, 5], [32, 7]]
+    assert got["eeprom"].startswith("cdab0000")
+    assert got["alias"] == "0500"
+    assert got["op"] is True
+    assert got["expected_wkc"] == 3 * count
+    assert got["wkc"] == [3 * count]
+    assert got["statusword"] == ["5002"] * count
+    assert [s["station"] for s in state["slaves"]] == [0x1001 + n for n in range(count)]
+
+
+def test_in_lockstep_a_target_comes_back_as_position_two_frames_later(
+    namespace: Namespace,
+) -> None:
+    """Set by frame n, taken at the next SYNC0, followed one cycle later, read by frame n + 2."""
+    with segment(namespace, 4, "--lockstep", "--al-ms", "0", "--sdo-ms", "0"):
+        got = finish(start(namespace, "lockstep"))
+    assert got["op"] is True
+    assert got["positions"][2:] == list(range(298))
+
+
+def test_without_process_data_the_watchdog_acts(namespace: Namespace) -> None:
+    with segment(namespace, 2):
+        got = finish(start(namespace, "watchdog"))
+    assert got["op"] is True
+    assert got["states"] == [[0x14, 0x1B]] * 2
+
+
+def test_an_emergency_reaches_the_master(namespace: Namespace) -> None:
+    with segment(namespace, 1) as running:
+        process = start(namespace, "emergency")
+        assert process.stdout is not None
+        assert json.loads(process.stdout.readline()) == {"ready": True}
+        running.command("inject", slave=0, what="emergency", value=0x7305)
+        assert finish(process)["codes"] == [0x7305]
+
+
+def test_one_segment_per_interface(namespace: Namespace) -> None:
+    with segment(namespace, 1), pytest.raises(LinkLost, match="already answers on ec0s"):
+        segment(namespace, 1)
+
+
+def test_a_wrong_interface_and_a_wrong_drive_are_told_in_words(namespace: Namespace) -> None:
+    with pytest.raises(LinkLost, match="cannot use interface nosuch0"):
+        VirtualSegment.start("nosuch0", ["--drive", "dictionary", "--factory", FACTORY], namespace)
+    with pytest.raises(LinkLost, match="no drives"):
+        VirtualSegment.start(SLAVE, [], namespace)
+
+
+def test_a_killed_segment_is_noticed_and_can_be_restarted(namespace: Namespace) -> None:
+    running = segment(namespace, 1)
+    running.kill()
+    with pytest.raises(LinkLost, match="has ended"):
+        running.command("state")
+    running.close()
+    with segment(namespace, 1) as again:
+        assert again.command("state")["slaves"][0]["state"] == "INIT"
+
+
+def test_the_namespace_is_private(namespace: Namespace) -> None:
+    code = "import socket; print(sorted(name for _, name in socket.if_nameindex()))"
+    process = namespace.popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    out, _ = process.communicate(timeout=20)
+    # A kernel may add its own tunnel devices to every namespace; our cable must be there.
+    assert {MASTER, SLAVE} <= set(eval(out))
+
+
+def test_the_cable_is_silent(namespace: Namespace) -> None:
+    """No IPv6 or other chatter: nothing but what the master sends arrives at the slave's end."""
+    code = (
+        "import socket, select;"
+        f"s = socket.socket(17, 3, socket.htons(3)); s.bind(('{SLAVE}', 3));"
+        "print(len(select.select([s], [], [], 0.3)[0]))"
+    )
+    process = namespace.popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    assert process.communicate(timeout=20)[0].strip() == "0"
