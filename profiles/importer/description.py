@@ -1,0 +1,64 @@
+"""A drive as a description file tells of it, whatever the file's format."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from profiles.schema import Access, DataType, LinkKind, PdoMapping, Raw
+
+MAX_ENTRIES = 20_000
+"""More entries than any drive has: a file with more is broken or hostile."""
+
+
+@dataclass(frozen=True, slots=True)
+class DescribedEntry:
+    """One object-dictionary entry. ``type`` None: the file does not say or nobody knows it."""
+
+    index: int
+    subindex: int
+    name: str
+    type: DataType | None
+    access: Access = "ro"
+    pdo: PdoMapping = "none"
+    default_raw: Raw | None = None
+    min_raw: int | float | None = None
+    max_raw: int | float | None = None
+    unit: str = ""
+    group: str = ""
+    enum: dict[int, str] = field(default_factory=dict)
+    help: str = ""
+    source: str = ""
+
+    @property
+    def key(self) -> str:
+        """As `profiles.schema.Parameter.key`."""
+        return f"{self.index:04X}:{self.subindex:02X}"
+
+
+@dataclass(frozen=True, slots=True)
+class DescribedPdo:
+    """One PDO with its entries as keys."""
+
+    index: int
+    direction: Literal["rx", "tx"]
+    entries: tuple[str, ...]
+    fixed: bool
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """Everything taken from one file or drive."""
+
+    file: str
+    link: LinkKind
+    maker: str
+    model: str
+    vendor_id: int | None
+    product_code: int | None
+    revision: int | None
+    entries: tuple[DescribedEntry, ...]
+    pdos: tuple[DescribedPdo, ...] = ()
+    complete_access: bool = False
+    foe: bool = False

@@ -1,0 +1,106 @@
+"""A drive's own dictionary, as its SDO information service enumerates it.
+
+Source: ETG.1000.6 clause 5.6.3 (object access flags), clause 5.6.7.3 (data types).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from profiles.importer.description import MAX_ENTRIES, DescribedEntry, Description
+from profiles.importer.report import ImportFailed, ImportReport
+from profiles.importer.values import TYPE_BY_CODE, named_type, tidy, unit_of_name
+from profiles.schema import Access, LinkKind, PdoMapping
+
+
+@dataclass(frozen=True, slots=True)
+class DictionaryEntry:
+    """One entry as enumerated.
+
+    ``type_code`` is the CANopen data type number, ``access`` the 16 access flags: bits 0 to 2
+    read in Pre-Op, Safe-Op, Op; bits 3 to 5 write in the same states; bit 6 mappable as RxPDO,
+    bit 7 as TxPDO. ``object_name`` is the name of the whole object where it has subindices.
+    """
+
+    index: int
+    subindex: int
+    name: str
+    type_code: int
+    bit_length: int
+    access: int
+    object_name: str = ""
+    members: int = 0
+
+
+def describe_dictionary(
+    entries: Iterable[DictionaryEntry],
+    *,
+    name: str,
+    report: ImportReport,
+    vendor_id: int | None = None,
+    product_code: int | None = None,
+    revision: int | None = None,
+    link: LinkKind = "ethercat",
+) -> Description:
+    """Describe a drive by what it says of itself.
+
+    Raises:
+        ImportFailed: it says nothing.
+    """
+    found: list[DescribedEntry] = []
+    seen: set[tuple[int, int]] = set()
+    for entry in entries:
+        place = f"{entry.index:04X}:{entry.subindex:02X}"
+        if (entry.index, entry.subindex) in seen:
+            report.noted(place, "the drive lists it twice")
+            continue
+        seen.add((entry.index, entry.subindex))
+        if not 0x1000 <= entry.index <= 0xFFFF or not 0 <= entry.subindex <= 255:
+            continue  # below are the definitions of types
+        if entry.subindex == 0 and entry.members > 1:
+            continue  # only counts the others
+        if len(found) >= MAX_ENTRIES:
+            report.left_out(place, "the drive lists more entries than any drive has")
+            break
+        found.append(_described(entry, report))
+    if not found:
+        raise ImportFailed(f"{name} lists no objects: it may not offer the SDO information service")
+    return Description(
+        file=f"dictionary of {name}",
+        link=link,
+        maker="unknown maker",
+        model=tidy(name),
+        vendor_id=vendor_id,
+        product_code=product_code,
+        revision=revision,
+        entries=tuple(found),
+    )
+
+
+def _described(entry: DictionaryEntry, report: ImportReport) -> DescribedEntry:
+    place = f"{entry.index:04X}:{entry.subindex:02X}"
+    data_type = TYPE_BY_CODE.get(entry.type_code)
+    if data_type is None:
+        data_type = named_type("", entry.bit_length)
+        if data_type is not None:
+            report.repaired(
+                place, f"data type {entry.type_code:#06x} is unknown, taken by its length"
+            )
+    readable, writable = bool(entry.access & 0x07), bool(entry.access & 0x38)
+    access: Access = "rw" if readable and writable else "wo" if writable else "ro"
+    rx, tx = bool(entry.access & 0x40), bool(entry.access & 0x80)
+    pdo: PdoMapping = "rxtx" if rx and tx else "rx" if rx else "tx" if tx else "none"
+    plain, unit = unit_of_name(tidy(entry.name))
+    title = tidy(entry.object_name)
+    name = f"{title}: {plain}" if title and plain and title != plain else plain or title
+    return DescribedEntry(
+        index=entry.index,
+        subindex=entry.subindex,
+        name=name or f"Object {place}",
+        type=data_type,
+        access=access,
+        pdo=pdo,
+        unit=unit,
+        source=f"the drive's dictionary: {place}",
+    )

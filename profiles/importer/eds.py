@@ -1,0 +1,337 @@
+"""CANopen EDS and DCF files.
+
+Source: CiA 306-1 v1.3. Makers' files deviate in many ways; a reader that refuses them is of no
+use, one that guesses in silence is dangerous. So everything repaired or left out is reported.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Literal
+
+from profiles.importer.description import (
+    MAX_ENTRIES,
+    DescribedEntry,
+    DescribedPdo,
+    Description,
+)
+from profiles.importer.report import ImportFailed, ImportReport
+from profiles.importer.texts import check_size, decode_text
+from profiles.importer.values import (
+    TYPE_BY_CODE,
+    default_value,
+    fit,
+    parse_access,
+    parse_number,
+    tidy,
+    unit_of_name,
+)
+from profiles.schema import DataType, PdoMapping, Raw
+
+MAX_BYTES = 8 * 2**20
+_MAX_LINES = 400_000
+
+_OBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})$")
+_SUBOBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})\s*_?sub\s*_?(?:0x)?([0-9a-f]{1,2})$")
+_COMPACT = re.compile(r"(?:0x)?([0-9a-f]{4})(name|value|denotation)$")
+_DEFTYPE = re.compile(r"(?:0x)?([0-9a-f]{1,3})(?:sub([0-9a-f]{1,2}))?$")
+_MODULE = re.compile(r"m\d+|supportedmodules|dynamicchannels")
+
+
+@dataclass(slots=True)
+class _Section:
+    """A section's values by lower-case key, and the line it starts on."""
+
+    line: int
+    values: dict[str, str] = field(default_factory=dict)
+
+    def get(self, *names: str) -> str:
+        return next((self.values[n] for n in names if n in self.values), "")
+
+
+def read_eds(data: bytes, name: str, report: ImportReport) -> Description:
+    """Read an EDS or DCF file.
+
+    Raises:
+        ImportFailed: too big, or no object with a known type in it.
+    """
+    check_size(data, MAX_BYTES, name)
+    sections = _sections(decode_text(data, name, report), name, report)
+    device = sections.get("deviceinfo", _Section(0))
+    if "deviceinfo" not in sections:
+        report.noted(name, "there is no [DeviceInfo] section: the drive is not identified")
+    entries = _Entries(sections, name, report).read()
+    if not entries:
+        raise ImportFailed(
+            f"{name} describes no objects: it is not an EDS or DCF file, or it is damaged"
+        )
+    return Description(
+        file=name,
+        link="canopen",
+        maker=tidy(device.get("vendorname")) or "unknown maker",
+        model=tidy(device.get("productname")) or tidy(name.rsplit(".", 1)[0]),
+        vendor_id=_identity(device, "vendornumber", name, report),
+        product_code=_identity(device, "productnumber", name, report),
+        revision=_identity(device, "revisionnumber", name, report),
+        entries=tuple(entries),
+        pdos=tuple(_pdos(entries, name, report)),
+    )
+
+
+def _identity(device: _Section, key: str, name: str, report: ImportReport) -> int | None:
+    number = parse_number(device.get(key), f"{name}: {key}", report)
+    if number is None or number != int(number) or not 0 <= number < 2**32:
+        return None
+    # Templates leave 0 in these fields, and vendor 0 does not exist.
+    return int(number) or None
+
+
+def _sections(text: str, name: str, report: ImportReport) -> dict[str, _Section]:
+    sections: dict[str, _Section] = {}
+    current: _Section | None = None
+    for number, raw in enumerate(text.splitlines()[:_MAX_LINES], start=1):
+        line = raw.strip().strip("\ufeff\0\x1a")
+        place = f"{name}:{number}"
+        if not line or line[0] in ";#" or line.startswith("//"):
+            continue
+        if line[0] == "[":
+            title = line[1:].partition("]")[0].strip().lower()
+            if "]" not in line:
+                report.repaired(place, f"the section heading {line[:40]!r} is not closed")
+            if title in sections:
+                report.noted(place, f"section [{title[:40]}] comes a second time")
+            current = sections.setdefault(title, _Section(number))
+            continue
+        key, equals, value = line.partition("=")
+        if not equals:
+            report.left_out(place, f"{line[:60]!r} is neither a section nor a value")
+        elif current is None:
+            report.left_out(place, f"{key.strip()[:40]!r} stands before the first section")
+        else:
+            key = key.strip().lower().replace(" ", "")
+            if key in current.values and current.values[key] != value.strip():
+                report.noted(place, f"{key[:40]} is given twice, the first one counts")
+            current.values.setdefault(key, value.strip())
+    return sections
+
+
+class _Entries:
+    """Object sections to entries."""
+
+    def __init__(self, sections: dict[str, _Section], name: str, report: ImportReport) -> None:
+        self._sections = sections
+        self._name = name
+        self._report = report
+        self._objects: dict[int, _Section] = {}
+        self._members: dict[int, dict[int, _Section]] = {}
+        self._compact: dict[tuple[int, str], _Section] = {}
+        self._deftypes: dict[tuple[int, int | None], _Section] = {}
+        self._sort()
+
+    def _sort(self) -> None:
+        modules = 0
+        for title, section in self._sections.items():
+            if match := _SUBOBJECT.match(title):
+                index, subindex = int(match[1], 16), int(match[2], 16)
+                self._members.setdefault(index, {})[subindex] = section
+            elif match := _COMPACT.match(title):
+                self._compact[int(match[1], 16), match[2]] = section
+            elif match := _OBJECT.match(title):
+                self._objects[int(match[1], 16)] = section
+            elif match := _DEFTYPE.match(title):
+                subindex_text = match[2]
+                key = (int(match[1], 16), int(subindex_text, 16) if subindex_text else None)
+                self._deftypes[key] = section
+            elif _MODULE.match(title):
+                modules += 1
+        if modules:
+            self._report.left_out(
+                self._name, f"{modules} sections of pluggable modules: a drive has none"
+            )
+
+    def read(self) -> list[DescribedEntry]:
+        entries: list[DescribedEntry] = []
+        for index in sorted({*self._objects, *self._members}):
+            if index < 0x1000:
+                continue  # definitions of types, used below
+            if len(entries) > MAX_ENTRIES:
+                self._report.left_out(self._name, f"objects from {index:04X}h on: too many")
+                break
+            entries += self._object(index)
+        self._compare_with_lists({e.index for e in entries})
+        return entries
+
+    def _object(self, index: int) -> list[DescribedEntry]:
+        parent = self._objects.get(index)
+        members = self._members.get(index, {})
+        if parent is None:
+            line = min(s.line for s in members.values())
+            self._report.repaired(
+                f"{self._name}:{line}", f"{index:04X}h has subindices but no section of its own"
+            )
+            parent = _Section(line)
+        place = f"{self._name}:{parent.line} [{index:04X}]"
+        compact = parse_number(parent.get("compactsubobj"), place, self._report)
+        if compact and 0 < compact <= 254 and not members:
+            return self._compact_object(index, parent, int(compact))
+        if not members:
+            return self._entry(index, 0, parent, parent, "")
+        count = parse_number(parent.get("subnumber"), place, self._report)
+        if count is not None and count != len(members):
+            self._report.noted(
+                place, f"{int(count)} subindices are announced and {len(members)} given"
+            )
+        title = tidy(parent.get("parametername"))
+        return [
+            entry
+            for subindex, member in sorted(members.items())
+            # Subindex 0 only counts the others (CiA 301 clause 7.4.4).
+            if subindex > 0 or len(members) == 1
+            for entry in self._entry(index, subindex, member, parent, title)
+        ]
+
+    def _compact_object(self, index: int, parent: _Section, count: int) -> list[DescribedEntry]:
+        names = self._compact.get((index, "name"), _Section(0))
+        values = self._compact.get((index, "value"), _Section(0))
+        title = tidy(parent.get("parametername"))
+        entries = []
+        for subindex in range(1, count + 1):
+            member = _Section(parent.line, dict(parent.values))
+            member.values["parametername"] = names.get(str(subindex)) or f"{title}{subindex}"
+            if value := values.get(str(subindex)):
+                member.values["defaultvalue"] = value
+            entries += self._entry(index, subindex, member, parent, title)
+        return entries
+
+    def _entry(
+        self, index: int, subindex: int, section: _Section, parent: _Section, title: str
+    ) -> list[DescribedEntry]:
+        place = f"{self._name}:{section.line} [{index:04X}sub{subindex:X}]"
+        data_type = self._type(section, parent, place)
+        access_text = section.get("accesstype", "access") or parent.get("accesstype")
+        if not access_text:
+            self._report.repaired(place, "no access is given, taken as read-only")
+            access_text = "ro"
+        access = parse_access(access_text, place, self._report)
+        own = tidy(section.get("denotation") or section.get("parametername"))
+        plain, unit = unit_of_name(own)
+        name = f"{title}: {plain}" if title and plain and not plain.startswith(title) else plain
+        default: Raw | None = None
+        remark = ""
+        low = high = None
+        if data_type is not None:
+            text = section.get("parametervalue", "defaultvalue")
+            default, remark = default_value(text, data_type, place, self._report)
+            low = self._limit(section, "lowlimit", data_type, place)
+            high = self._limit(section, "highlimit", data_type, place)
+        entry = DescribedEntry(
+            index=index,
+            subindex=subindex,
+            name=name or title or f"Object {index:04X}h",
+            type=data_type,
+            access=access,
+            pdo=_mapping(section, parent, access_text),
+            default_raw=default,
+            min_raw=low,
+            max_raw=high,
+            unit=tidy(section.get("unit"), 20) or unit,
+            group=tidy(section.get("group") or parent.get("group"), 60),
+            help="; ".join(t for t in (tidy(section.get("description")), remark) if t),
+            source=f"{self._name}:{section.line}",
+        )
+        return [entry]
+
+    def _limit(
+        self, section: _Section, key: str, data_type: DataType, place: str
+    ) -> int | float | None:
+        text = section.get(key)
+        if re.search(r"node[-_ ]?id", text, re.I):
+            return None
+        number = parse_number(text, f"{place} {key}", self._report)
+        return fit(number, data_type, key, place, self._report)
+
+    def _type(self, section: _Section, parent: _Section, place: str) -> DataType | None:
+        code = parse_number(section.get("datatype"), place, self._report)
+        if code is None:
+            kind = parse_number(section.get("objecttype"), place, self._report)
+            if kind == 2:  # DOMAIN needs no data type
+                return "OCTETS"
+            code = parse_number(parent.get("datatype"), place, self._report)
+        if code is None:
+            return None
+        code = int(code)
+        found = TYPE_BY_CODE.get(code)
+        if found is None:
+            found = self._deftype(code, place)
+        if found == "OCTETS" and code in (0x10, 0x11, 0x12, 0x13, 0x14, 0x16, 0x18, 0x19, 0x1A):
+            self._report.noted(place, f"data type {code:#04x} is shown as bytes")
+        return found
+
+    def _deftype(self, code: int, place: str) -> DataType | None:
+        """Types that a file defines itself, as an editor does for values with limits."""
+        member = self._deftypes.get((code, 2)) or self._members.get(code, {}).get(2)
+        if member is not None:
+            base = parse_number(member.get("datatype"), place, self._report)
+            known = None if base is None else TYPE_BY_CODE.get(int(base))
+            if known is not None:
+                self._report.noted(place, f"data type {code:#06x} is defined by the file itself")
+                return known
+        self._report.left_out(place, f"data type {code:#06x} is unknown")
+        return None
+
+    def _compare_with_lists(self, present: set[int]) -> None:
+        """The lists of objects often disagree with the sections; the sections count."""
+        for title in ("mandatoryobjects", "optionalobjects", "manufacturerobjects"):
+            section = self._sections.get(title)
+            if section is None:
+                continue
+            place = f"{self._name}:{section.line} [{title}]"
+            listed = [
+                int(number)
+                for key, text in section.values.items()
+                if key.isdecimal()
+                and (number := parse_number(text, place, self._report)) is not None
+            ]
+            announced = parse_number(section.get("supportedobjects"), place, self._report)
+            if announced is not None and announced != len(listed):
+                self._report.noted(place, f"{announced:g} objects announced, {len(listed)} listed")
+            for index in sorted(set(listed) - present):
+                if 0x1000 <= index <= 0xFFFF:
+                    self._report.noted(place, f"{index:04X}h is listed but not described")
+
+
+def _mapping(section: _Section, parent: _Section, access_text: str) -> PdoMapping:
+    text = (section.get("pdomapping") or parent.get("pdomapping")).split(";")[0].strip().lower()
+    if text not in ("1", "0x1", "true", "yes", "0x01", "01"):
+        return "none"
+    access = access_text.strip().lower()
+    if access in ("ro", "r", "rwr", "const"):
+        return "tx"
+    return "rx" if access in ("wo", "w", "rww") else "rxtx"
+
+
+def _pdos(entries: list[DescribedEntry], name: str, report: ImportReport) -> list[DescribedPdo]:
+    """Default mappings out of the defaults of 1600h… and 1A00h…."""
+    keys = {e.key for e in entries}
+    pdos: list[DescribedPdo] = []
+    by_index: dict[int, list[DescribedEntry]] = {}
+    for entry in entries:
+        if 0x1600 <= entry.index < 0x1800 or 0x1A00 <= entry.index < 0x1C00:
+            by_index.setdefault(entry.index, []).append(entry)
+    for index, mapping in sorted(by_index.items()):
+        mapped: list[str] = []
+        for entry in sorted(mapping, key=lambda e: e.subindex):
+            value = entry.default_raw
+            if entry.subindex == 0 or not isinstance(value, int) or value == 0:
+                continue
+            key = f"{value >> 16 & 0xFFFF:04X}:{value >> 8 & 0xFF:02X}"
+            if key in keys:
+                mapped.append(key)
+            elif value >> 16 & 0xFFFF >= 0x20:  # below are dummies that only fill space
+                report.left_out(f"{name} [{index:04X}]", f"{key} is mapped but not described")
+        if mapped:
+            direction: Literal["rx", "tx"] = "rx" if index < 0x1A00 else "tx"
+            fixed = all(e.access == "ro" for e in mapping)
+            pdos.append(DescribedPdo(index, direction, tuple(mapped), fixed, name))
+    return pdos

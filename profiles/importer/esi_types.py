@@ -1,0 +1,131 @@
+"""Data types that an ESI file defines: records, arrays, enumerations."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+from profiles.importer.report import ImportReport
+from profiles.importer.values import named_type, parse_number, tidy
+from profiles.importer.xml_tree import child, children, text_of
+from profiles.schema import DataType
+
+_DEEPEST = 8
+_LONGEST_ARRAY = 255
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One subindex of a type. ``flags`` is its own Flags element, where it has one."""
+
+    subindex: int
+    name: str
+    type: str
+    bits: int | None
+    flags: Element | None
+
+
+class EsiTypes:
+    """The ``DataTypes`` of one dictionary. Types may refer to others, even wrongly in a circle."""
+
+    def __init__(self, element: Element | None, file: str, report: ImportReport) -> None:
+        self._file = file
+        self._report = report
+        self._types: dict[str, Element] = {}
+        for data_type in children(element, "DataType"):
+            name = text_of(child(data_type, "Name"))
+            if name and name not in self._types:
+                self._types[name] = data_type
+
+    def members(self, name: str) -> list[Member]:
+        """Subindices of a record or array type; empty for a plain one."""
+        element = self._types.get(name)
+        members: list[Member] = []
+        for position, item in enumerate(children(element, "SubItem")):
+            members += self._sub_item(name, position, item)
+        seen: set[int] = set()
+        unique = []
+        for member in members:
+            if member.subindex in seen:
+                self._report.noted(
+                    f"{self._file}: {name}", f"subindex {member.subindex} is there twice"
+                )
+            elif 0 <= member.subindex <= 255:
+                seen.add(member.subindex)
+                unique.append(member)
+        return unique
+
+    def _sub_item(self, name: str, position: int, item: Element) -> list[Member]:
+        place = f"{self._file}: {name[:30]}"
+        type_name = text_of(child(item, "Type"))
+        flags = child(item, "Flags")
+        array = self._array(type_name)
+        if array is not None:
+            first, count, base = array
+            return [
+                Member(first + n, f"{first + n}", base, None, flags)
+                for n in range(min(count, _LONGEST_ARRAY))
+            ]
+        given = parse_number(text_of(child(item, "SubIdx")), place, self._report)
+        bits = parse_number(text_of(child(item, "BitSize")), place, self._report)
+        return [
+            Member(
+                position if given is None else int(given),
+                tidy(text_of(child(item, "Name"))),
+                type_name,
+                None if bits is None else int(bits),
+                flags,
+            )
+        ]
+
+    def _array(self, name: str) -> tuple[int, int, str] | None:
+        """First subindex, number and element type of an array type."""
+        element = self._types.get(name)
+        info = child(element, "ArrayInfo")
+        if info is not None:
+            place = f"{self._file}: {name[:30]}"
+            first = parse_number(text_of(child(info, "LBound")), place, self._report)
+            count = parse_number(text_of(child(info, "Elements")), place, self._report)
+            base = text_of(child(element, "BaseType"))
+            if count is None or count < 1 or self._resolves_to_text(base, name):
+                return None
+            return max(int(first or 1), 1), int(count), base
+        match = re.fullmatch(r"ARRAY\s*\[\s*(\d{1,3})\s*\.\.\s*(\d{1,3})\s*\]\s*OF\s+(\w+)", name)
+        if match is None or element is not None:
+            return None
+        return max(int(match[1]), 1), int(match[2]) - int(match[1]) + 1, match[3]
+
+    def _resolves_to_text(self, base: str, name: str) -> bool:
+        """Arrays of characters are text or bytes, not subindices."""
+        return base.upper() in ("BYTE", "CHAR") and not re.search(r"ARR", name, re.I)
+
+    def base(self, name: str, bits: int | None) -> DataType | None:
+        """The plain type behind ``name``."""
+        seen: set[str] = set()
+        for _ in range(_DEEPEST):
+            element = self._types.get(name)
+            if element is None or name in seen:
+                break
+            seen.add(name)
+            size = parse_number(text_of(child(element, "BitSize")), self._file, self._report)
+            bits = int(size) if size is not None else bits
+            following = text_of(child(element, "BaseType"))
+            if not following:
+                break
+            name = following
+        found = named_type(name, bits)
+        # Enumerations and the like have a name of their own and only a length.
+        return found if found is not None else named_type("", bits)
+
+    def enumeration(self, name: str) -> dict[int, str]:
+        """Texts of an enumeration's values; empty for other types."""
+        element = self._types.get(name)
+        texts: dict[int, str] = {}
+        for info in children(element, "EnumInfo"):
+            value = parse_number(text_of(child(info, "Enum")), self._file, self._report)
+            names = [t for t in children(info, "Text") if (t.get("LcId") or "1033") == "1033"]
+            text = text_of(names[0]) if names else text_of(child(info, "Text"))
+            if value is not None and value == int(value) and len(texts) < 1000:
+                texts[int(value)] = tidy(text)
+        return texts

@@ -1,0 +1,128 @@
+"""A profile as a CANopen electronic data sheet (CiA 306-1 v1.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from datetime import datetime
+
+from profiles.schema import DataType, Parameter, Profile
+
+_CODE: dict[DataType, int] = {
+    "BOOL": 0x01, "INT8": 0x02, "INT16": 0x03, "INT32": 0x04, "UINT8": 0x05, "UINT16": 0x06,
+    "UINT32": 0x07, "REAL32": 0x08, "STRING": 0x09, "OCTETS": 0x0A, "INT64": 0x15, "UINT64": 0x1B,
+}  # fmt: skip
+_MANDATORY = (0x1000, 0x1001, 0x1018)
+_BAUDRATES = (10, 20, 50, 125, 250, 500, 800, 1000)
+_RECORD, _VARIABLE = 9, 7
+
+
+def export_eds(profile: Profile, created: datetime, file_name: str | None = None) -> str:
+    """The profile's objects as EDS text with CRLF line ends.
+
+    Parameters that only Modbus reaches have no object and are left out. ``created`` stands in
+    the file, so that the same profile and time give the same text.
+    """
+    objects: dict[int, list[Parameter]] = {}
+    for parameter in profile.parameters:
+        if parameter.index is not None:
+            objects.setdefault(parameter.index, []).append(parameter)
+    for members in objects.values():
+        members.sort(key=lambda p: p.subindex or 0)
+    lines = _head(profile, created, file_name or f"{profile.drive}.eds", objects)
+    lines += _lists(objects)
+    for index in sorted(objects):
+        lines += _object(index, objects[index])
+    return "\r\n".join(lines) + "\r\n"
+
+
+def _head(
+    profile: Profile, created: datetime, file_name: str, objects: dict[int, list[Parameter]]
+) -> list[str]:
+    identity = profile.identity
+    link = profile.link("canopen")
+    rates = {rate // 1000 for rate in link.baudrates} if link and link.baudrates else {1000}
+    day, time = created.strftime("%m-%d-%Y"), created.strftime("%I:%M%p")
+    return [
+        "[FileInfo]", f"FileName={_text(file_name)}", "FileVersion=1", "FileRevision=0",
+        "EDSVersion=4.0", f"Description={_text(profile.title)}", f"CreationTime={time}",
+        f"CreationDate={day}", "CreatedBy=servodeck", f"ModificationTime={time}",
+        f"ModificationDate={day}", "ModifiedBy=servodeck", "",
+        "[DeviceInfo]", f"VendorName={_text(identity.maker)}",
+        f"VendorNumber=0x{identity.vendor_id or 0:08X}", f"ProductName={_text(identity.model)}",
+        f"ProductNumber=0x{identity.product_code or 0:08X}",
+        f"RevisionNumber=0x{identity.revision or 0:08X}", "OrderCode=",
+        *(f"BaudRate_{rate}={int(rate in rates)}" for rate in _BAUDRATES),
+        "SimpleBootUpMaster=0", "SimpleBootUpSlave=1", "Granularity=8",
+        "DynamicChannelsSupported=0", "GroupMessaging=0",
+        f"NrOfRXPDO={sum(0x1600 <= i < 0x1800 for i in objects)}",
+        f"NrOfTXPDO={sum(0x1A00 <= i < 0x1C00 for i in objects)}", "LSS_Supported=0", "",
+        "[DummyUsage]", *(f"Dummy{n:04d}=0" for n in range(1, 8)), "",
+    ]  # fmt: skip
+
+
+def _lists(objects: Iterable[int]) -> list[str]:
+    mandatory = [i for i in sorted(objects) if i in _MANDATORY]
+    maker = [i for i in sorted(objects) if 0x2000 <= i < 0x6000]
+    optional = [i for i in sorted(objects) if i not in mandatory and i not in maker]
+    lines: list[str] = []
+    for title, indices in (
+        ("MandatoryObjects", mandatory),
+        ("OptionalObjects", optional),
+        ("ManufacturerObjects", maker),
+    ):
+        lines += [f"[{title}]", f"SupportedObjects={len(indices)}"]
+        lines += [f"{n}=0x{index:04X}" for n, index in enumerate(indices, start=1)] + [""]
+    return lines
+
+
+def _object(index: int, members: list[Parameter]) -> list[str]:
+    if len(members) == 1 and members[0].subindex == 0:
+        return [f"[{index:04X}]", *_entry(members[0], members[0].name), ""]
+    title = members[0].name.partition(":")[0].strip()
+    counted = [p for p in members if p.subindex]
+    lines = [
+        f"[{index:04X}]", f"ParameterName={_text(title)}", f"ObjectType=0x{_RECORD:X}",
+        f"SubNumber={len(counted) + 1}", "",
+        f"[{index:04X}sub0]", "ParameterName=Highest subindex", f"ObjectType=0x{_VARIABLE:X}",
+        "DataType=0x0005", "AccessType=ro", f"DefaultValue={counted[-1].subindex or 0}",
+        "PDOMapping=0", "",
+    ]  # fmt: skip
+    for parameter in counted:
+        name = parameter.name.partition(":")[2].strip() or parameter.name
+        lines += [f"[{index:04X}sub{parameter.subindex or 0:X}]", *_entry(parameter, name), ""]
+    return lines
+
+
+def _entry(parameter: Parameter, name: str) -> list[str]:
+    access = parameter.access
+    if access == "rw" and parameter.pdo in ("rx", "tx"):
+        access_text = "rww" if parameter.pdo == "rx" else "rwr"
+    else:
+        access_text = access
+    lines = [
+        f"ParameterName={_text(name)}",
+        f"ObjectType=0x{_VARIABLE:X}",
+        f"DataType=0x{_CODE[parameter.type]:04X}",
+        f"AccessType={access_text}",
+        f"DefaultValue={_value(parameter)}",
+        f"PDOMapping={int(parameter.pdo != 'none')}",
+    ]
+    if parameter.min_raw is not None:
+        lines.append(f"LowLimit={parameter.min_raw}")
+    if parameter.max_raw is not None:
+        lines.append(f"HighLimit={parameter.max_raw}")
+    if parameter.unit:
+        lines.append(f";Unit={_text(parameter.unit)}")
+    return lines
+
+
+def _value(parameter: Parameter) -> str:
+    default = parameter.default_raw
+    if default is None or parameter.type == "OCTETS":
+        return ""
+    return _text(str(default))
+
+
+def _text(text: str) -> str:
+    """One line; CiA 306 allows at most 241 characters."""
+    return " ".join(text.split())[:241]

@@ -1,0 +1,83 @@
+"""From a file to a profile, and from a profile to a folder that the loader reads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+
+from profiles.importer.build import ImportedProfile, build_profile
+from profiles.importer.eds import read_eds
+from profiles.importer.esi import esi_devices, read_esi
+from profiles.importer.report import ImportFailed, ImportReport
+from profiles.schema import Profile
+
+
+def import_file(
+    data: bytes,
+    name: str,
+    *,
+    drive: str | None = None,
+    product_code: int | None = None,
+    revision: int | None = None,
+) -> ImportedProfile:
+    """A profile from an ESI, EDS or DCF file, told apart by their contents.
+
+    Of an ESI file with several devices the one with ``product_code`` (and ``revision``) is
+    taken; without them the first, and the report says which others there are.
+
+    Raises:
+        ImportFailed: not such a file, or nothing usable in it.
+    """
+    report = ImportReport()
+    start = data[:400].lstrip(b"\xef\xbb\xbf\xff\xfe\0 \t\r\n")
+    if start.startswith((b"<", b"\0<")):
+        number = _choose(data, name, report, product_code, revision)
+        description = read_esi(data, name, report, number)
+    else:
+        description = read_eds(data, name, report)
+    return build_profile(description, report, drive=drive)
+
+
+def _choose(
+    data: bytes, name: str, report: ImportReport, product_code: int | None, revision: int | None
+) -> int:
+    devices = esi_devices(data, name, ImportReport())
+    matching = [
+        d
+        for d in devices
+        if product_code in (None, d.product_code) and revision in (None, d.revision)
+    ]
+    if not matching:
+        # The newest revision of the right product is nearer than any other product.
+        matching = [d for d in devices if d.product_code == product_code][-1:]
+        if not matching:
+            known = ", ".join(f"{d.product_code or 0:#x} {d.name}" for d in devices[:10])
+            raise ImportFailed(f"{name} has no product {product_code or 0:#x}; it has {known}")
+        report.noted(name, f"revision {revision or 0:#x} is not in it, {matching[0].name} is used")
+    if len(matching) > 1:
+        others = ", ".join(d.name for d in matching[1:6])
+        report.noted(name, f"{matching[0].name} is used; there are also {others}")
+    return matching[0].number
+
+
+def write_profile(imported: Profile, folder: Path) -> Path:
+    """Write ``folder/DRIVE/profile.yaml``, to be edited like any other profile.
+
+    Raises:
+        ImportFailed: the folder already has a profile of this name; nothing is overwritten.
+    """
+    target = folder / imported.drive / "profile.yaml"
+    if target.exists():
+        raise ImportFailed(
+            f"{target} exists: import under another name, or move the old profile away first"
+        )
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(profile_yaml(imported), "utf-8")
+    return target
+
+
+def profile_yaml(profile: Profile) -> str:
+    """The profile as YAML with one parameter per line group, defaults left out."""
+    data = profile.model_dump(mode="json", exclude_defaults=True)
+    return yaml.safe_dump(data, allow_unicode=True, sort_keys=False, width=100)

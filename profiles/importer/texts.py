@@ -1,0 +1,72 @@
+"""Bytes of a description file to text, whatever encoding its maker used."""
+
+from __future__ import annotations
+
+import re
+
+from profiles.importer.report import ImportFailed, ImportReport
+
+_MARKS = (
+    (b"\xef\xbb\xbf", "utf-8"),
+    (b"\xff\xfe", "utf-16-le"),
+    (b"\xfe\xff", "utf-16-be"),
+)
+_DECLARED = re.compile(rb"^\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]{1,40})[\"'][^>]*\?>")
+_DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
+_KNOWN_ENCODINGS = {
+    "utf-8", "utf8", "us-ascii", "ascii", "utf-16", "gb2312", "gbk", "gb18030", "big5",
+    "shift_jis", "sjis", "euc-jp", "euc-kr", "ks_c_5601-1987", "iso-8859-1", "iso-8859-2",
+    "iso-8859-15", "latin1", "windows-1250", "windows-1251", "windows-1252", "windows-936",
+}  # fmt: skip
+
+
+def check_size(data: bytes, limit: int, name: str) -> None:
+    """Raises ImportFailed above ``limit`` bytes."""
+    if len(data) > limit:
+        raise ImportFailed(
+            f"{name} has {len(data)} bytes, more than the {limit // 2**20} MiB that are read"
+        )
+
+
+def decode_text(data: bytes, name: str, report: ImportReport) -> str:
+    """Text of a file without declared encoding (EDS)."""
+    for mark, encoding in _MARKS:
+        if data.startswith(mark):
+            return data[len(mark) :].decode(encoding, "replace")
+    if data[1:2] == b"\0" and data[:1].isascii():
+        report.repaired(name, "UTF-16 without a byte order mark")
+        return data.decode("utf-16-le", "replace")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        encoding = "gb18030" if _looks_chinese(data) else "cp1252"
+    report.repaired(name, f"the text is not UTF-8, read as {encoding}")
+    return data.decode(encoding, "replace")
+
+
+def _looks_chinese(data: bytes) -> bool:
+    """GB 2312 puts two bytes above A0h side by side; Western letters stand alone mostly."""
+    runs = re.findall(rb"[\x80-\xff]+", data[:100_000])
+    pairs = sum(len(run) for run in runs if len(run) % 2 == 0 and min(run) > 0xA0)
+    return pairs * 2 > sum(map(len, runs))
+
+
+def decode_xml(data: bytes, name: str, report: ImportReport) -> str:
+    """Text of an XML file without its declaration, so that the parser gets plain Unicode.
+
+    The parser itself knows no multi-byte encodings such as GB2312.
+    """
+    declared = _DECLARED.match(data[:400])
+    if declared is None or data.startswith(tuple(mark for mark, _ in _MARKS)):
+        text = decode_text(data, name, report)
+    else:
+        encoding = declared.group(1).decode("ascii").lower()
+        if encoding not in _KNOWN_ENCODINGS:
+            report.repaired(name, f"unknown encoding {encoding!r}, read as UTF-8")
+            encoding = "utf-8"
+        try:
+            text = data.decode(encoding)
+        except (UnicodeDecodeError, LookupError):
+            report.repaired(name, f"the text is not {encoding} as declared")
+            text = decode_text(data, name, report)
+    return _DECLARATION.sub("", text.lstrip("\ufeff \t\r\n\0"), count=1)

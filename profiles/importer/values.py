@@ -1,0 +1,228 @@
+"""Numbers, types and texts as makers write them. Pure.
+
+Each function takes what the files of many makers contain, not only what the standards allow:
+see ``docs/drives/not-listed.md`` for the list.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+from profiles.importer.report import ImportReport
+from profiles.schema import INTEGER_RANGE, Access, DataType, Raw
+
+#: CiA 301 v4.2.0 clause 7.4.7.1 table 44, as far as a parameter can hold them.
+TYPE_BY_CODE: dict[int, DataType] = {
+    0x01: "BOOL", 0x02: "INT8", 0x03: "INT16", 0x04: "INT32", 0x05: "UINT8", 0x06: "UINT16",
+    0x07: "UINT32", 0x08: "REAL32", 0x09: "STRING", 0x0A: "OCTETS", 0x0B: "OCTETS",
+    0x0C: "OCTETS", 0x0D: "OCTETS", 0x0F: "OCTETS", 0x10: "OCTETS", 0x11: "OCTETS",
+    0x12: "OCTETS", 0x13: "OCTETS", 0x14: "OCTETS", 0x15: "INT64", 0x16: "OCTETS",
+    0x18: "OCTETS", 0x19: "OCTETS", 0x1A: "OCTETS", 0x1B: "UINT64",
+    # ETG.1000.6 clause 5.6.7.3: bit types and bit strings
+    0x1E: "UINT8", 0x1F: "UINT16", 0x20: "UINT32", 0x2D: "UINT8", 0x2E: "UINT16",
+    0x30: "BOOL", 0x31: "UINT8", 0x32: "UINT8", 0x33: "UINT8", 0x34: "UINT8", 0x35: "UINT8",
+    0x36: "UINT8", 0x37: "UINT8",
+}  # fmt: skip
+
+_NAMED: dict[str, DataType] = {
+    "BOOL": "BOOL", "BOOLEAN": "BOOL", "BIT": "BOOL", "BIT1": "BOOL",
+    "SINT": "INT8", "INT8": "INT8", "INTEGER8": "INT8", "CHAR": "INT8",
+    "INT": "INT16", "INT16": "INT16", "INTEGER16": "INT16", "SHORT": "INT16",
+    "DINT": "INT32", "INT32": "INT32", "INTEGER32": "INT32", "LONG": "INT32",
+    "LINT": "INT64", "INT64": "INT64", "INTEGER64": "INT64",
+    "USINT": "UINT8", "UINT8": "UINT8", "UNSIGNED8": "UINT8", "BYTE": "UINT8", "BITARR8": "UINT8",
+    "UINT": "UINT16", "UINT16": "UINT16", "UNSIGNED16": "UINT16", "WORD": "UINT16",
+    "BITARR16": "UINT16",
+    "UDINT": "UINT32", "UINT32": "UINT32", "UNSIGNED32": "UINT32", "DWORD": "UINT32",
+    "BITARR32": "UINT32",
+    "ULINT": "UINT64", "UINT64": "UINT64", "UNSIGNED64": "UINT64", "LWORD": "UINT64",
+    "REAL": "REAL32", "REAL32": "REAL32", "FLOAT": "REAL32",
+    "LREAL": "OCTETS", "REAL64": "OCTETS", "DOUBLE": "OCTETS",
+    "STRING": "STRING", "VISIBLE_STRING": "STRING", "VISIBLESTRING": "STRING",
+    "OCTET_STRING": "OCTETS", "OCTETSTRING": "OCTETS", "UNICODE_STRING": "OCTETS",
+    "TIME_OF_DAY": "OCTETS", "TIME_DIFFERENCE": "OCTETS", "DOMAIN": "OCTETS", "GUID": "OCTETS",
+}  # fmt: skip
+
+_SMALLEST: tuple[tuple[int, DataType], ...] = (
+    (1, "BOOL"), (8, "UINT8"), (16, "UINT16"), (32, "UINT32"), (64, "UINT64"),
+)  # fmt: skip
+
+_ACCESS: dict[str, Access] = {
+    "ro": "ro", "r": "ro", "read": "ro", "readonly": "ro", "const": "ro", "c": "ro",
+    "wo": "wo", "w": "wo", "write": "wo", "writeonly": "wo",
+    "rw": "rw", "wr": "rw", "r/w": "rw", "readwrite": "rw", "rwr": "rw", "rww": "rw",
+}  # fmt: skip
+
+_UNITS = (
+    "rpm", "r/min", "rev/min", "ms", "us", "µs", "s", "min", "h", "hz", "khz", "v", "mv", "a",
+    "ma", "w", "kw", "nm", "mnm", "n", "%", "‰", "0.1%", "°c", "degc", "℃", "°", "deg", "mm",
+    "µm", "um", "m/s", "mm/s", "rad/s", "kg·m²", "kg.cm2", "g·cm²", "ohm", "ω", "mohm", "mh",
+    "inc", "inc/s", "inc/s²", "inc/s2", "inc/s^2", "counts", "cnt", "pulse", "pulses", "p",
+    "rev", "rpm/s", "r/s", "rps", "mr/s", "user unit", "units", "1/s", "0.1hz", "0.1rpm", "0.1ms",
+    "0.01ms", "0.1a", "0.01a", "0.1v", "bit",
+)  # fmt: skip
+_PREFIXES = {0x00: "", 0x03: "k", 0x06: "M", 0xFE: "c", 0xFD: "m", 0xFA: "µ", 0xF7: "n"}
+_UNIT_CODES = {
+    0x00: "", 0x01: "m", 0x02: "g", 0x03: "s", 0x04: "A", 0x05: "K", 0x10: "rad", 0x20: "Hz",
+    0x21: "N", 0x22: "Pa", 0x23: "J", 0x24: "W", 0x26: "V", 0x28: "Ω", 0x2C: "H", 0x2D: "°C",
+    0x41: "°", 0x47: "min", 0x48: "h", 0x56: "Nm", 0x57: "s²", 0xB4: "rev", 0xB5: "inc",
+}  # fmt: skip
+
+_UNIT_IN_NAME = re.compile(r"[\[({（]\s*(?:unit\s*:?\s*)?([^\])}）]{1,12}?)\s*[\])}）]\s*$", re.I)
+_NODE_ID = re.compile(r"\$?\s*NODE[-_ ]?ID", re.I)
+_LONGEST_NUMBER = 40
+_REAL32_MAX = 3.4028234e38
+
+
+def parse_number(text: str, place: str, report: ImportReport) -> int | float | None:
+    """A number in any of the notations found, or None with a finding where it is none.
+
+    Empty text is None without a finding: many files leave defaults empty.
+    """
+    bare = text.split(";", 1)[0].strip().strip("\"'").replace("_", "").replace(" ", "")
+    if not bare or bare in ("-", "0x", "0X"):
+        return None
+    if len(bare) > _LONGEST_NUMBER:
+        report.left_out(place, f"{bare[:20]}… is too long for a number")
+        return None
+    if bare.lower() in ("true", "false"):
+        return int(bare.lower() == "true")
+    for prefix, base in (("0x", 16), ("#x", 16), ("&h", 16), ("16#", 16), ("0b", 2), ("2#", 2)):
+        sign = -1 if bare.startswith("-") else 1
+        body = bare.lstrip("+-").lower()
+        if body.startswith(prefix):
+            return _based(body[len(prefix) :], base, sign, text, place, report)
+    return _decimal(bare, text, place, report)
+
+
+def _based(
+    digits: str, base: int, sign: int, text: str, place: str, report: ImportReport
+) -> int | None:
+    try:
+        return sign * int(digits, base)
+    except ValueError:
+        report.left_out(place, f"{text.strip()!r} is not a number")
+        return None
+
+
+def _decimal(bare: str, text: str, place: str, report: ImportReport) -> int | float | None:
+    if re.fullmatch(r"[+-]?\d+", bare):
+        if re.fullmatch(r"[+-]?0\d+", bare):
+            report.noted(place, f"{bare} has leading zeros and was read as decimal")
+        return int(bare)
+    if re.fullmatch(r"[+-]?[0-9a-fA-F]+[hH]", bare):
+        report.repaired(place, f"{bare} was read as hexadecimal")
+        return int(bare[:-1], 16)
+    if re.fullmatch(r"[+-]?\d+,\d+", bare):
+        report.repaired(place, f"{bare} has a decimal comma")
+        bare = bare.replace(",", ".")
+    try:
+        value = float(bare)
+    except ValueError:
+        report.left_out(place, f"{text.strip()!r} is not a number")
+        return None
+    if not math.isfinite(value):
+        report.left_out(place, f"{text.strip()!r} is not a finite number")
+        return None
+    return value
+
+
+def fit(
+    value: int | float | None, data_type: DataType, what: str, place: str, report: ImportReport
+) -> int | float | None:
+    """``value`` as a raw value of ``data_type``, or None with a finding.
+
+    A positive number above a signed type's maximum that fits its width is two's complement:
+    most makers write negative limits so.
+    """
+    if value is None or data_type in ("STRING", "OCTETS"):
+        return None
+    if data_type == "REAL32":
+        if abs(value) > _REAL32_MAX:
+            report.left_out(place, f"{what} {value:g} does not fit REAL32")
+            return None
+        return float(value)
+    if value != int(value):
+        report.left_out(place, f"{what} {value:g} is not whole, the type is {data_type}")
+        return None
+    if isinstance(value, float):
+        report.repaired(place, f"{what} {value} is written with a decimal point")
+    low, high = INTEGER_RANGE[data_type]
+    whole = int(value)
+    if whole > high and low < 0 and whole <= 2 * high + 1:
+        return whole - 2 * (high + 1)
+    if not low <= whole <= high:
+        report.left_out(place, f"{what} {whole} does not fit {data_type}")
+        return None
+    return whole
+
+
+def default_value(
+    text: str, data_type: DataType, place: str, report: ImportReport
+) -> tuple[Raw | None, str]:
+    """A default and a remark: a default that depends on the node number has no fixed value."""
+    if _NODE_ID.search(text):
+        return None, f"default {text.strip()[:60]}"
+    if data_type == "STRING":
+        return text.strip() or None, ""
+    if data_type == "OCTETS":
+        return None, ""
+    number = parse_number(text, f"{place} default", report)
+    return fit(number, data_type, "default", place, report), ""
+
+
+def named_type(name: str, bits: int | None) -> DataType | None:
+    """A data type by one of its names (``UDINT``, ``UNSIGNED32``, ``STRING(20)`` …)."""
+    bare = name.strip().upper()
+    bare = re.sub(r"\s*[(\[].*$", "", bare)
+    found = _NAMED.get(bare)
+    if found is None and re.fullmatch(r"BIT[2-9]|BIT1[0-6]", bare):
+        bits = int(bare[3:])
+    elif found is not None or bare:
+        return found
+    if bits is None or bits < 1:
+        return None
+    return next((kind for width, kind in _SMALLEST if bits <= width), None)
+
+
+def parse_access(text: str, place: str, report: ImportReport) -> Access:
+    """Access rights; what cannot be understood becomes read-only, the harmless choice."""
+    access = _ACCESS.get(text.strip().lower().replace(" ", "").replace("-", ""))
+    if access is None:
+        report.repaired(place, f"access {text.strip()!r} is unknown, taken as read-only")
+        return "ro"
+    return access
+
+
+def unit_of_name(name: str) -> tuple[str, str]:
+    """Name and unit, where the name ends with a unit in brackets; else the name and empty."""
+    match = _UNIT_IN_NAME.search(name)
+    if match is None or match.group(1).strip().lower() not in _UNITS:
+        return name, ""
+    return name[: match.start()].rstrip(" ,:-") or name, match.group(1).strip()
+
+
+def unit_of_code(text: str) -> str:
+    """A unit from its number of CiA 303-2 (as ETG.1004 uses it), or empty where it is none.
+
+    Bits 31-24 are the power of ten, 23-16 the numerator, 15-8 the denominator.
+    """
+    match = re.fullmatch(r"(?:#x|0x)([0-9a-fA-F]{1,8})", text.strip())
+    if match is None:
+        return ""
+    code = int(match[1], 16)
+    prefix = _PREFIXES.get(code >> 24)
+    numerator = _UNIT_CODES.get(code >> 16 & 0xFF)
+    denominator = _UNIT_CODES.get(code >> 8 & 0xFF)
+    if prefix is None or not numerator or denominator is None:
+        return ""
+    if (numerator, denominator) == ("rev", "min") and not prefix:
+        return "rpm"
+    return f"{prefix}{numerator}/{denominator}" if denominator else f"{prefix}{numerator}"
+
+
+def tidy(text: str, longest: int = 200) -> str:
+    """One line without control characters, at most ``longest`` characters."""
+    cleaned = "".join(c if c.isprintable() else " " for c in text)
+    return " ".join(cleaned.split())[:longest]
