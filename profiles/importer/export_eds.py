@@ -78,7 +78,8 @@ def _lists(objects: Iterable[int]) -> list[str]:
 def _object(index: int, members: list[Parameter]) -> list[str]:
     if len(members) == 1 and members[0].subindex == 0:
         return [f"[{index:04X}]", *_entry(members[0], members[0].name), ""]
-    title = members[0].name.partition(":")[0].strip()
+    titles = {p.name.partition(":")[0].strip() for p in members}
+    title = titles.pop() if len(titles) == 1 else f"Object {index:04X}h"
     counted = [p for p in members if p.subindex]
     lines = [
         f"[{index:04X}]", f"ParameterName={_text(title)}", f"ObjectType=0x{_RECORD:X}",
