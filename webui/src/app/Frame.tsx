@@ -1,0 +1,328 @@
+import { ActionIcon, Drawer, Menu, NativeSelect, useMantineColorScheme } from '@mantine/core'
+import { type ReactNode, useEffect, useState } from 'react'
+import { known, setLanguage, useLanguage, useT } from '../i18n'
+import * as live from '../live/live'
+import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '../live/store'
+import { Icon } from '../widgets/Icon'
+import {
+  AXIS_PAGES,
+  BENCH_PAGES,
+  chooseDrive,
+  href,
+  isAxisPage,
+  type Page,
+  useRoute,
+} from './router'
+import { StopButton } from './StopButton'
+import { linkLook, stateLook } from './states'
+import { useHasIo } from './useHasIo'
+
+/** What surrounds every page: axis, state, link, control, STOP, and the way to the pages. */
+export function Frame({ children }: { children: ReactNode }) {
+  const t = useT()
+  const [open, setOpen] = useState(false)
+  const { page, drive } = useRoute()
+  const drives = useDrives()
+  useEffect(() => {
+    live.stand('watch_state', {
+      type: 'watch_state',
+      drives: (drives ?? []).map((each) => each.id).slice(0, 64),
+    })
+  }, [drives?.map((each) => each.id).join(' ')])
+  const key = `${page} ${drive}`
+  useEffect(() => setOpen(false), [key])
+  return (
+    <div className="frame">
+      <button
+        type="button"
+        className="skip"
+        onClick={() => document.getElementById('main')?.focus()}
+      >
+        {t('frame.skip')}
+      </button>
+      <header className="top">
+        <ActionIcon className="burger" aria-label={t('frame.menu')} onClick={() => setOpen(true)}>
+          <Icon name="menu" size={24} />
+        </ActionIcon>
+        <span className="brand">servodeck</span>
+        <AxisPicker />
+        <div className="top-status">
+          <StateBadge />
+          <LinkBadge />
+          <ControlBadge />
+        </div>
+        <Preferences />
+      </header>
+      <StopButton />
+      <ConnectionLost />
+      <nav className="side" aria-label={t('frame.pages')}>
+        <Pages />
+      </nav>
+      <Drawer
+        opened={open}
+        onClose={() => setOpen(false)}
+        size={260}
+        title="servodeck"
+        zIndex={250}
+      >
+        <Pages />
+      </Drawer>
+      <main id="main" tabIndex={-1}>
+        <Refused />
+        {children}
+      </main>
+      <nav className="bottom" aria-label={t('frame.pages')}>
+        {(['overview', 'parameters', 'motion', 'scope', 'alarms'] as const).map((name) => (
+          <PageLink key={name} name={name} short />
+        ))}
+      </nav>
+    </div>
+  )
+}
+
+function Pages() {
+  const t = useT()
+  const { drive } = useRoute()
+  const drives = useDrives() ?? []
+  const hasIo = useHasIo(drive)
+  return (
+    <>
+      <h2>{t('frame.axes')}</h2>
+      {drives.map((each) => (
+        <AxisEntry key={each.id} id={each.id} />
+      ))}
+      {drives.length === 0 && <p className="dim">{t('frame.noAxes')}</p>}
+      <h2>{t('frame.axisPages')}</h2>
+      {AXIS_PAGES.filter((name) => name !== 'io' || hasIo).map((name) => (
+        <PageLink key={name} name={name} />
+      ))}
+      <h2>{t('frame.bench')}</h2>
+      {BENCH_PAGES.map((name) => (
+        <PageLink key={name} name={name} />
+      ))}
+    </>
+  )
+}
+
+function AxisEntry({ id }: { id: string }) {
+  const { drive } = useRoute()
+  const summary = useDrive(id)
+  const state = useAxisState(id)
+  const t = useT()
+  const look = stateLook(state)
+  if (!summary) return null
+  return (
+    <button
+      type="button"
+      className="entry axis-entry"
+      aria-current={drive === id ? 'true' : undefined}
+      onClick={() => chooseDrive(id)}
+    >
+      <span className={`dot ${look.tone}`}>
+        <Icon name={look.icon} size={14} />
+      </span>
+      <span className="grow">
+        {summary.name}
+        <small>{state?.fresh ? known(t, 'state', state.state) : t('state.noAnswer')}</small>
+      </span>
+    </button>
+  )
+}
+
+function PageLink({ name, short = false }: { name: Page; short?: boolean }) {
+  const t = useT()
+  const { page, drive } = useRoute()
+  const drives = useDrives() ?? []
+  const target = drive ?? drives[0]?.id ?? null
+  const state = useAxisState(target)
+  const dead = isAxisPage(name) && target === null
+  const count = name === 'alarms' ? (state?.faults.length ?? 0) : 0
+  if (dead && short) return null
+  return dead ? (
+    <span className="entry off" aria-disabled="true">
+      <Icon name={name} /> {t(`page.${name}`)}
+    </span>
+  ) : (
+    <a
+      className="entry"
+      href={href(name, target)}
+      aria-current={page === name ? 'page' : undefined}
+    >
+      <Icon name={name} size={short ? 22 : 18} /> <span>{t(`page.${name}`)}</span>
+      {count > 0 && <b className="count">{count}</b>}
+    </a>
+  )
+}
+
+function AxisPicker() {
+  const t = useT()
+  const drives = useDrives() ?? []
+  const { drive } = useRoute()
+  const chosen = drive ?? drives[0]?.id ?? ''
+  return (
+    <NativeSelect
+      className="picker"
+      aria-label={t('frame.axis')}
+      value={chosen}
+      disabled={drives.length === 0}
+      onChange={(event) => chooseDrive(event.currentTarget.value)}
+      data={
+        drives.length === 0
+          ? [{ value: '', label: t('frame.noAxis') }]
+          : drives.map((each) => ({ value: each.id, label: each.name }))
+      }
+    />
+  )
+}
+
+function useChosen(): string | null {
+  const drives = useDrives() ?? []
+  return useRoute().drive ?? drives[0]?.id ?? null
+}
+
+function StateBadge() {
+  const t = useT()
+  const id = useChosen()
+  const state = useAxisState(id)
+  const look = stateLook(state)
+  const words = !id
+    ? t('frame.noAxis')
+    : !state
+      ? t('state.unknown')
+      : state.fresh
+        ? known(t, 'state', state.state)
+        : t('state.noAnswer')
+  return (
+    <span className={`badge ${look.tone}`} role="status" aria-label={t('frame.state')}>
+      <Icon name={look.icon} size={16} />
+      <span>{words}</span>
+    </span>
+  )
+}
+
+function LinkBadge() {
+  const t = useT()
+  const drive = useDrive(useChosen())
+  const look = linkLook(drive?.quality ?? null)
+  if (!drive) return null
+  const trip = drive.quality.round_trip_ms
+  return (
+    <a
+      className={`badge plain-badge ${look.tone}-text`}
+      href="#/connect"
+      title={t('frame.linkHelp')}
+    >
+      <Icon name="link" size={16} />
+      <span>
+        {t(`link.${look.word}`)}
+        {trip !== null && look.word !== 'lost' && (
+          <small className="num wide-only"> {trip.toFixed(1)} ms</small>
+        )}
+      </span>
+    </a>
+  )
+}
+
+function ControlBadge() {
+  const t = useT()
+  const drive = useDrive(useChosen())
+  if (!drive) return null
+  const { holder, mine } = drive.lease
+  const words = mine
+    ? t('control.mine')
+    : holder
+      ? t('control.other', { name: holder })
+      : t('control.free')
+  return (
+    <button
+      type="button"
+      className={`badge control ${mine ? 'ready' : holder ? 'warn' : 'plain-badge'}`}
+      disabled={holder !== null && !mine}
+      title={mine ? t('control.give') : t('control.take')}
+      onClick={() => live.send({ type: 'lease', drive: drive.id, take: !mine })}
+    >
+      <Icon name={mine || holder ? 'lock' : 'unlock'} size={16} />
+      <span>{words}</span>
+    </button>
+  )
+}
+
+function Preferences() {
+  const t = useT()
+  const language = useLanguage()
+  const { colorScheme, setColorScheme } = useMantineColorScheme()
+  return (
+    <Menu position="bottom-end" zIndex={260}>
+      <Menu.Target>
+        <ActionIcon className="preferences" aria-label={t('frame.preferences')}>
+          <Icon name="theme" size={22} />
+        </ActionIcon>
+      </Menu.Target>
+      <Menu.Dropdown>
+        <Menu.Label>{t('frame.scheme')}</Menu.Label>
+        {(['light', 'dark', 'auto'] as const).map((scheme) => (
+          <Menu.Item
+            key={scheme}
+            rightSection={colorScheme === scheme ? <Icon name="check" /> : null}
+            onClick={() => setColorScheme(scheme)}
+          >
+            {t(`scheme.${scheme}`)}
+          </Menu.Item>
+        ))}
+        <Menu.Label>{t('frame.language')}</Menu.Label>
+        {(['en', 'zh'] as const).map((each) => (
+          <Menu.Item
+            key={each}
+            lang={each}
+            rightSection={language === each ? <Icon name="check" /> : null}
+            onClick={() => setLanguage(each)}
+          >
+            {t(`language.${each}`)}
+          </Menu.Item>
+        ))}
+      </Menu.Dropdown>
+    </Menu>
+  )
+}
+
+function ConnectionLost() {
+  const t = useT()
+  const link = useLink()
+  if (link.open) return null
+  return (
+    <div className={`banner ${contents.everOpen ? 'fault' : 'ready'}`} role="alert">
+      <strong>{t(contents.everOpen ? 'lost.title' : 'lost.opening')}</strong>{' '}
+      {contents.everOpen && t('lost.text', { attempt: link.attempt })}
+    </div>
+  )
+}
+
+const REFUSED_MS = 12000
+
+/** A request over the websocket that the server turned down, with what to try. */
+function Refused() {
+  const t = useT()
+  const refused = useStore('refused', () => contents.refused)
+  const [seen, setSeen] = useState(0)
+  useEffect(() => {
+    if (!refused) return
+    const timer = setTimeout(() => setSeen(refused.at), REFUSED_MS)
+    return () => clearTimeout(timer)
+  }, [refused])
+  if (!refused || refused.at <= seen) return null
+  return (
+    <div className="note fault" role="alert">
+      <p>
+        <strong>{refused.problem.title}</strong> {refused.problem.detail}
+      </p>
+      {refused.problem.remedy && (
+        <p>
+          {t('problem.try')} {refused.problem.remedy}
+        </p>
+      )}
+      <button type="button" className="plain" onClick={() => setSeen(refused.at)}>
+        {t('close')}
+      </button>
+    </div>
+  )
+}

@@ -1,0 +1,77 @@
+import { useEffect } from 'react'
+import { createPortal } from 'react-dom'
+import { useT } from '../i18n'
+import { useDrives, useStore } from '../live/store'
+import { Icon } from '../widgets/Icon'
+import { currentReport, dismissReport, stopEverything } from './stop'
+
+const GOOD_NEWS_MS = 6000
+
+/** The STOP button and what it reached. Above everything, dialogs included. */
+export function StopButton() {
+  const t = useT()
+  return createPortal(
+    <>
+      <button
+        type="button"
+        className="stop"
+        // Down, not click: a finger that slides off the button has still asked for a stop.
+        onPointerDown={() => void stopEverything()}
+        onKeyDown={(event) => {
+          if ((event.key === 'Enter' || event.key === ' ') && !event.repeat) void stopEverything()
+        }}
+        title={t('stop.help')}
+        aria-label={t('stop.help')}
+      >
+        {t('stop.label')}
+      </button>
+      <StopReportNote />
+    </>,
+    document.body,
+  )
+}
+
+function StopReportNote() {
+  const t = useT()
+  const report = useStore('stop', currentReport)
+  const drives = useDrives() ?? []
+  const good = report?.answer && Object.keys(report.answer.failed).length === 0
+  useEffect(() => {
+    if (!good) return
+    const timer = setTimeout(dismissReport, GOOD_NEWS_MS)
+    return () => clearTimeout(timer)
+  }, [good])
+  if (!report) return null
+  const name = (id: string) => drives.find((drive) => drive.id === id)?.name ?? id
+  const failed = Object.entries(report.answer?.failed ?? {})
+  return (
+    <div className={`stop-report ${good ? 'good' : ''}`} role="alert">
+      {report.answer === null && report.failure === null && <p>{t('stop.sent')}</p>}
+      {report.failure !== null && (
+        <p>
+          <strong>{t(report.failure === 'unknown' ? 'stop.unknown' : 'stop.unreachable')}</strong>{' '}
+          {t('stop.useHardware')}
+        </p>
+      )}
+      {report.answer && report.answer.stopped.length > 0 && (
+        <p>
+          <Icon name="check" />{' '}
+          {t('stop.reached', { names: report.answer.stopped.map(name).join(', ') })}
+        </p>
+      )}
+      {report.answer && report.answer.stopped.length === 0 && failed.length === 0 && (
+        <p>{t('stop.none')}</p>
+      )}
+      {failed.map(([id, why]) => (
+        <p key={id}>
+          <strong>{t('stop.failed', { name: name(id) })}</strong> {why}. {t('stop.useHardware')}
+        </p>
+      ))}
+      {!good && (
+        <button type="button" className="plain" onClick={dismissReport}>
+          {t('close')}
+        </button>
+      )}
+    </div>
+  )
+}

@@ -1,0 +1,64 @@
+import { useSyncExternalStore } from 'react'
+
+export const AXIS_PAGES = ['overview', 'parameters', 'motion', 'io', 'alarms'] as const
+export const BENCH_PAGES = ['connect', 'scope', 'files'] as const
+export type AxisPage = (typeof AXIS_PAGES)[number]
+export type BenchPage = (typeof BENCH_PAGES)[number]
+export type Page = AxisPage | BenchPage
+
+export interface Route {
+  page: Page
+  /** The axis of an axis page; on other pages the axis chosen last. */
+  drive: string | null
+}
+
+let lastDrive: string | null = null
+let route: Route = read()
+
+function read(): Route {
+  const parts = window.location.hash.replace(/^#\/?/, '').split('/').map(decodeURIComponent)
+  if (parts[0] === 'axis' && parts[1]) {
+    lastDrive = parts[1]
+    const page = AXIS_PAGES.find((name) => name === parts[2]) ?? 'overview'
+    return { page, drive: lastDrive }
+  }
+  return { page: BENCH_PAGES.find((name) => name === parts[0]) ?? 'connect', drive: lastDrive }
+}
+
+export const isAxisPage = (page: Page): page is AxisPage =>
+  (AXIS_PAGES as readonly string[]).includes(page)
+
+export function href(page: Page, drive: string | null): string {
+  return isAxisPage(page) ? `#/axis/${encodeURIComponent(drive ?? '')}/${page}` : `#/${page}`
+}
+
+export function go(page: Page, drive: string | null = lastDrive): void {
+  window.location.hash = href(page, drive).slice(1)
+}
+
+/** Choose an axis without leaving a page that is not about one. */
+export function chooseDrive(drive: string | null): void {
+  lastDrive = drive
+  if (isAxisPage(route.page) && drive !== null) go(route.page, drive)
+  else changed()
+}
+
+const listeners = new Set<() => void>()
+
+function changed(): void {
+  const next = read()
+  if (next.page !== route.page || next.drive !== route.drive) route = next
+  for (const listener of listeners) listener()
+}
+
+window.addEventListener('hashchange', changed)
+
+export function useRoute(): Route {
+  return useSyncExternalStore(
+    (listener) => {
+      listeners.add(listener)
+      return () => listeners.delete(listener)
+    },
+    () => route,
+  )
+}

@@ -1,0 +1,45 @@
+import type { AxisState, Quality } from '../api/schema'
+import type { IconName } from '../widgets/Icon'
+
+/** How an axis state looks: a colour class and an icon; the words are always beside them. */
+export function stateLook(state: AxisState | null): { tone: string; icon: IconName } {
+  if (!state?.fresh) return { tone: 'old', icon: 'question' }
+  switch (state.state) {
+    case 'Operation enabled':
+      return { tone: 'live', icon: 'bolt' }
+    case 'Fault':
+    case 'Fault reaction active':
+      return { tone: 'fault', icon: 'alarms' }
+    case 'Quick stop active':
+      return { tone: 'warn', icon: 'hold' }
+    case 'Switched on':
+    case 'Ready to switch on':
+      return { tone: 'ready', icon: 'check' }
+    default:
+      return { tone: 'off', icon: 'hold' }
+  }
+}
+
+/** Counters that mean trouble on a link. */
+export function troubles(quality: Quality): number {
+  return (
+    quality.timeouts +
+    quality.crc_errors +
+    quality.framing_errors +
+    quality.lost_frames +
+    quality.wkc_errors
+  )
+}
+
+/** Link quality in one word: share of exchanges that went wrong since the link was opened. */
+export function linkLook(quality: Quality | null): {
+  word: 'none' | 'lost' | 'good' | 'fair' | 'poor'
+  tone: string
+} {
+  if (!quality) return { word: 'none', tone: 'old' }
+  if (!quality.connected) return { word: 'lost', tone: 'fault' }
+  const share = troubles(quality) / Math.max(1, quality.transactions)
+  if (share > 0.02) return { word: 'poor', tone: 'fault' }
+  if (share > 0.001) return { word: 'fair', tone: 'warn' }
+  return { word: 'good', tone: 'live' }
+}

@@ -1,0 +1,67 @@
+import { API_ROOT } from '../api/client'
+import type { StopResult } from '../api/schema'
+import * as live from '../live/live'
+import { contents, publish } from '../live/store'
+
+/** What the last STOP reached. `null` answer: the server has not answered yet. */
+export interface StopReport {
+  at: number
+  answer: StopResult | null
+  /** Set when neither way to the server worked. */
+  failure: string | null
+}
+
+let report: StopReport | null = null
+
+export const currentReport = () => report
+
+export function dismissReport(): void {
+  report = null
+  publish('stop')
+}
+
+/**
+ * STOP, all axes. Two ways at once, since either may be blocked: the open websocket (from the
+ * worker) and a request of its own that nothing else in the page can hold up.
+ */
+export async function stopEverything(): Promise<void> {
+  live.send({ type: 'stop', drive: null })
+  live.jogStop('STOP')
+  const mine: StopReport = { at: Date.now(), answer: null, failure: null }
+  report = mine
+  publish('stop')
+  try {
+    const answer = await fetch(`${API_ROOT}/api/v1/stop`, {
+      method: 'POST',
+      headers: { 'Content-Type': 'application/json' },
+      body: '{}',
+      keepalive: true,
+      priority: 'high',
+    })
+    if (!answer.ok) throw new Error(`HTTP ${answer.status}`)
+    finish(mine, { answer: (await answer.json()) as StopResult, failure: null })
+  } catch (error) {
+    // The websocket may still have carried it; what it reached is not known, and that is said.
+    finish(mine, {
+      answer: null,
+      failure: contents.link.open ? 'unknown' : `unreachable: ${String(error)}`,
+    })
+  }
+}
+
+function finish(mine: StopReport, result: Pick<StopReport, 'answer' | 'failure'>): void {
+  if (report?.at !== mine.at) return
+  report = { ...mine, ...result }
+  publish('stop')
+}
+
+/** Esc stops from everywhere, before any other handler of that key can keep it to itself. */
+export function listenForEscape(): void {
+  window.addEventListener(
+    'keydown',
+    (event) => {
+      if (event.key === 'Escape' && !event.repeat && !event.isComposing) void stopEverything()
+    },
+    { capture: true },
+  )
+}

@@ -1,0 +1,47 @@
+import {
+  ActionIcon,
+  Button,
+  Checkbox,
+  createTheme,
+  type MantineColorsTuple,
+  Modal,
+  NativeSelect,
+  SegmentedControl,
+  Textarea,
+  TextInput,
+} from '@mantine/core'
+
+const steel: MantineColorsTuple = [
+  '#eaf3f9',
+  '#d3e4f0',
+  '#a5c8df',
+  '#74aacf',
+  '#4d92c0',
+  '#3582b6',
+  '#1f6fa5',
+  '#175c8c',
+  '#114a72',
+  '#083653',
+]
+
+/** Dense and calm; targets of 44 px, system fonts only. */
+export const theme = createTheme({
+  colors: { steel },
+  primaryColor: 'steel',
+  primaryShade: { light: 7, dark: 6 },
+  defaultRadius: 3,
+  fontFamily:
+    'system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "Liberation Sans", "Noto Sans SC", "PingFang SC", "Microsoft YaHei", sans-serif',
+  fontFamilyMonospace: 'ui-monospace, "Cascadia Mono", Consolas, "DejaVu Sans Mono", monospace',
+  fontSizes: { xs: '12px', sm: '14px', md: '15px', lg: '17px', xl: '20px' },
+  components: {
+    Button: Button.extend({ defaultProps: { size: 'sm', variant: 'default' } }),
+    ActionIcon: ActionIcon.extend({ defaultProps: { size: 44, variant: 'subtle' } }),
+    TextInput: TextInput.extend({ defaultProps: { size: 'sm' } }),
+    Textarea: Textarea.extend({ defaultProps: { size: 'sm' } }),
+    NativeSelect: NativeSelect.extend({ defaultProps: { size: 'sm' } }),
+    SegmentedControl: SegmentedControl.extend({ defaultProps: { size: 'sm' } }),
+    Checkbox: Checkbox.extend({ defaultProps: { size: 'sm' } }),
+    Modal: Modal.extend({ defaultProps: { zIndex: 300, centered: true } }),
+  },
+})

@@ -1,0 +1,2 @@
+/** English, then Chinese. */
+export type Texts = Record<string, readonly [string, string]>

@@ -1,0 +1,145 @@
+import { API_ROOT, api, ask, setConnection } from '../api/client'
+import type { JogStart } from '../api/schema'
+import type { FromPage, ToPage } from './protocol'
+import * as store from './store'
+import type { FromWorker, ScopeFrame, ScopeView, ToWorker, TraceRef } from './worker-messages'
+
+const worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' })
+const post = (message: ToWorker) => worker.postMessage(message)
+
+let asked = 0
+const frames = new Map<number, (frame: ScopeFrame) => void>()
+const texts = new Map<number, (text: string) => void>()
+
+/** Open the connection for good. */
+export function start(): void {
+  const { protocol, host } = window.location
+  post({ kind: 'open', url: `${protocol.replace('http', 'ws')}//${host}${API_ROOT}/api/v1/live` })
+}
+
+export const send = (message: FromPage) => post({ kind: 'send', message })
+export const stand = (name: string, message: FromPage | null) =>
+  post({ kind: 'stand', name, message })
+export const jogStart = (message: JogStart) => post({ kind: 'jogStart', message })
+export const jogBeat = (drive: string) => post({ kind: 'jogBeat', drive })
+export const jogStop = (reason: string) => post({ kind: 'jogStop', reason })
+export const toScope = (
+  message: Extract<ToWorker, { kind: 'scopeStart' | 'scopeStop' | 'scopeClear' | 'trigger' }>,
+) => post(message)
+
+export function scopeFrame(view: ScopeView): Promise<ScopeFrame> {
+  const id = ++asked
+  return new Promise((resolve) => {
+    frames.set(id, resolve)
+    post({ kind: 'view', id, view })
+  })
+}
+
+export function scopeCsv(
+  traces: TraceRef[],
+  names: string[],
+  from: number,
+  to: number,
+): Promise<string> {
+  const id = ++asked
+  return new Promise((resolve) => {
+    texts.set(id, resolve)
+    post({ kind: 'csv', id, traces, names, from, to })
+  })
+}
+
+/** Fetch what the websocket only tells about when it changes. */
+async function refresh(): Promise<void> {
+  try {
+    store.setDrives(await ask(api.GET('/api/v1/drives')))
+    for (const job of await ask(api.GET('/api/v1/jobs'))) store.setJob(job)
+    for (const id of store.contents.rows.keys()) void loadRows(id)
+  } catch {
+    // The connection went again; its banner is already shown and the next one comes here.
+  }
+}
+
+/** Descriptions and last readings of a drive's parameters. */
+export async function loadRows(drive: string): Promise<void> {
+  store.setRows(
+    drive,
+    await ask(
+      api.GET('/api/v1/drives/{drive_id}/parameters', { params: { path: { drive_id: drive } } }),
+    ),
+  )
+}
+
+function receive(message: ToPage): void {
+  switch (message.type) {
+    case 'hello':
+      setConnection(message.connection)
+      store.contents.connection = message.connection
+      void refresh()
+      break
+    case 'state':
+      store.setState(message.state)
+      break
+    case 'drives':
+      store.setDrives(message.drives)
+      break
+    case 'values':
+      store.setReadings(message.drive, message.values)
+      break
+    case 'job':
+      store.setJob(message.job)
+      break
+    case 'lease_changed':
+      store.setDrives(
+        (store.contents.drives ?? []).map((drive) =>
+          drive.id === message.drive ? { ...drive, lease: message.lease } : drive,
+        ),
+      )
+      break
+    case 'jog_ended':
+      store.contents.jogEnded = message
+      store.publish('jogEnded')
+      break
+    case 'scope_info':
+      store.contents.scopeInfo = new Map(store.contents.scopeInfo).set(
+        message.subscription,
+        message,
+      )
+      store.publish('scopeInfo')
+      break
+    case 'log':
+      store.addLog([message.entry])
+      break
+    case 'refused':
+      store.contents.refused = { ...message, at: Date.now() }
+      store.publish('refused')
+      break
+    case 'pong':
+      break
+  }
+}
+
+worker.onmessage = (event: MessageEvent<FromWorker>) => {
+  const answer = event.data
+  switch (answer.kind) {
+    case 'link':
+      if (!answer.state.open) setConnection(null)
+      store.contents.link = answer.state
+      store.contents.everOpen ||= answer.state.open
+      store.publish('link')
+      break
+    case 'message':
+      receive(answer.message)
+      break
+    case 'jogRefused':
+      store.publish('jogRefused')
+      break
+    case 'frame':
+      frames.get(answer.id)?.(answer.frame)
+      frames.delete(answer.id)
+      break
+    case 'csv':
+      texts.get(answer.id)?.(answer.text)
+      texts.delete(answer.id)
+      break
+  }
+}

@@ -1,0 +1,129 @@
+import { useSyncExternalStore } from 'react'
+import type {
+  AxisState,
+  DriveSummary,
+  JobInfo,
+  JogEnded,
+  LogEntry,
+  ParameterRow,
+  ParameterValue,
+  Problem,
+  ScopeInfo,
+} from '../api/schema'
+import type { LinkState } from './socket'
+
+/** What the server said last. Nothing here is ever a value that a person typed. */
+interface Contents {
+  link: LinkState
+  everOpen: boolean
+  connection: string | null
+  drives: DriveSummary[] | null
+  jobs: Map<string, JobInfo>
+  states: Map<string, AxisState>
+  rows: Map<string, ParameterRow[]>
+  readings: Map<string, Map<string, ParameterValue>>
+  log: LogEntry[]
+  jogEnded: JogEnded | null
+  scopeInfo: Map<number, ScopeInfo>
+  refused: { request: string; problem: Problem; at: number } | null
+}
+
+const LOG_LENGTH = 500
+
+export const contents: Contents = {
+  link: { open: false, attempt: 0, roundTripMs: null },
+  everOpen: false,
+  connection: null,
+  drives: null,
+  jobs: new Map(),
+  states: new Map(),
+  rows: new Map(),
+  readings: new Map(),
+  log: [],
+  jogEnded: null,
+  scopeInfo: new Map(),
+  refused: null,
+}
+
+const listeners = new Map<string, Set<() => void>>()
+
+export function subscribe(topic: string, listener: () => void): () => void {
+  let set = listeners.get(topic)
+  if (!set) {
+    set = new Set()
+    listeners.set(topic, set)
+  }
+  set.add(listener)
+  return () => set.delete(listener)
+}
+
+export function publish(topic: string): void {
+  for (const listener of listeners.get(topic) ?? []) listener()
+}
+
+/** A value of the store that re-renders with its topic. `pick` must return the same object
+ * while nothing changed. */
+export function useStore<T>(topic: string, pick: () => T): T {
+  return useSyncExternalStore((listener) => subscribe(topic, listener), pick)
+}
+
+export const useLink = () => useStore('link', () => contents.link)
+export const useDrives = () => useStore('drives', () => contents.drives)
+export const useDrive = (id: string | null) =>
+  useStore('drives', () => contents.drives?.find((drive) => drive.id === id) ?? null)
+export const useAxisState = (id: string | null) =>
+  useStore(`state ${id}`, () => (id === null ? null : (contents.states.get(id) ?? null)))
+export const useJobs = () => useStore('jobs', () => contents.jobs)
+export const useJob = (id: string | null) =>
+  useStore('jobs', () => (id === null ? null : (contents.jobs.get(id) ?? null)))
+export const useLog = () => useStore('log', () => contents.log)
+export const useReading = (drive: string, key: string) =>
+  useStore(`value ${drive} ${key}`, () => contents.readings.get(drive)?.get(key) ?? null)
+export const useRows = (drive: string) =>
+  useStore(`rows ${drive}`, () => contents.rows.get(drive) ?? null)
+export const useReadings = (drive: string) =>
+  useStore(`values ${drive}`, () => contents.readings.get(drive) ?? null)
+
+export function setDrives(drives: DriveSummary[]): void {
+  contents.drives = drives
+  publish('drives')
+}
+
+export function setState(state: AxisState): void {
+  contents.states.set(state.drive, state)
+  publish(`state ${state.drive}`)
+}
+
+export function setJob(job: JobInfo): void {
+  contents.jobs = new Map(contents.jobs).set(job.id, job)
+  publish('jobs')
+}
+
+export function setRows(drive: string, rows: ParameterRow[]): void {
+  contents.rows.set(drive, rows)
+  setReadings(
+    drive,
+    rows.map((row) => row.reading),
+  )
+  publish(`rows ${drive}`)
+}
+
+/** Newer readings replace older ones; an answer that was overtaken on its way changes nothing. */
+export function setReadings(drive: string, values: ParameterValue[]): void {
+  const known = new Map(contents.readings.get(drive))
+  const changed: string[] = []
+  for (const value of values) {
+    const old = known.get(value.key)
+    if (old?.time && (!value.time || value.time < old.time)) continue
+    known.set(value.key, value)
+    changed.push(value.key)
+  }
+  contents.readings.set(drive, known)
+  for (const key of changed) publish(`value ${drive} ${key}`)
+  publish(`values ${drive}`)
+}
+
+export function addLog(entries: LogEntry[]): void {
+  contents.log = [...contents.log, ...entries].slice(-LOG_LENGTH)
+  publish('log')
+}

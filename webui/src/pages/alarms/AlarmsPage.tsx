@@ -1,0 +1,112 @@
+import { Button } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { LogEntry } from '../../api/schema'
+import { useT } from '../../i18n'
+import { setState, useAxisState, useDrive, useLink, useLog } from '../../live/store'
+import { FaultList } from '../../widgets/FaultList'
+import { dateTime } from '../../widgets/format'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProcedureButton } from '../../widgets/Procedures'
+import { useAction } from '../../widgets/useAction'
+
+export function AlarmsPage({ drive }: { drive: string }) {
+  const t = useT()
+  const state = useAxisState(drive)
+  const summary = useDrive(drive)
+  const reset = useAction()
+  const faults = state?.faults.filter((fault) => fault.kind === 'fault') ?? []
+  const warnings = state?.faults.filter((fault) => fault.kind === 'warning') ?? []
+  return (
+    <div className="page">
+      <h1>
+        {t('page.alarms')} <small className="dim">{summary?.name}</small>
+      </h1>
+      {state && !state.fresh && (
+        <p className="note warn">
+          <strong>{t('state.noAnswer')}</strong> {state.problem}
+        </p>
+      )}
+      <Panel
+        title={t('faults.active')}
+        tools={
+          <>
+            <Button
+              disabled={!state?.fresh || state.faults.length === 0}
+              loading={reset.busy}
+              onClick={() =>
+                void reset.run(async () =>
+                  setState(
+                    await ask(
+                      api.POST('/api/v1/drives/{drive_id}/fault-reset', {
+                        params: { path: { drive_id: drive } },
+                      }),
+                    ),
+                  ),
+                )
+              }
+            >
+              {t('faults.reset')}
+            </Button>
+            <ProcedureButton drive={drive} name="clear_history" label={t('faults.clearHistory')} />
+          </>
+        }
+      >
+        <ProblemNote problem={reset.problem} onClose={reset.clear} />
+        {state?.fresh && faults.length === 0 && <p className="good-text">{t('faults.none')}</p>}
+        <FaultList faults={faults} />
+      </Panel>
+      {warnings.length > 0 && (
+        <Panel title={t('faults.warnings')}>
+          <FaultList faults={warnings} />
+        </Panel>
+      )}
+      <Log drive={drive} />
+    </div>
+  )
+}
+
+/** The tool's own log of one axis: what was stored before, then what arrives. */
+function Log({ drive }: { drive: string }) {
+  const t = useT()
+  const { open } = useLink()
+  const streamed = useLog()
+  const [stored, setStored] = useState<LogEntry[]>([])
+  const [asked, setAsked] = useState('')
+  useEffect(() => {
+    if (!open) return
+    let current = true
+    ask(api.GET('/api/v1/drives/{drive_id}/log', { params: { path: { drive_id: drive } } })).then(
+      (entries) => {
+        if (!current) return
+        setStored(entries)
+        setAsked(entries[0]?.time ?? '')
+      },
+      () => {}, // asked again when the connection is back
+    )
+    return () => {
+      current = false
+    }
+  }, [drive, open])
+  const fresh = streamed
+    .filter((entry) => (entry.drive === drive || entry.drive === null) && entry.time > asked)
+    .toReversed()
+  const entries = [...fresh, ...stored]
+  return (
+    <Panel title={t('log.title')}>
+      {entries.length === 0 && <p className="dim">{t('log.empty')}</p>}
+      <ul className="log">
+        {entries.map((entry, i) => (
+          // biome-ignore lint/suspicious/noArrayIndexKey: entries have no name of their own
+          <li key={`${entry.time} ${i}`} className={entry.level}>
+            <time className="num dim">{dateTime(entry.time)}</time>
+            <strong>{t(`log.${entry.level}`)}</strong>
+            <span className="grow">{entry.text}</span>
+            <span className="dim">{entry.person}</span>
+          </li>
+        ))}
+      </ul>
+    </Panel>
+  )
+}

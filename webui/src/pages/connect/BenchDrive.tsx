@@ -1,0 +1,144 @@
+import { Button, Modal, Textarea, TextInput } from '@mantine/core'
+import { useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { DriveSummary } from '../../api/schema'
+import { href } from '../../app/router'
+import { linkLook } from '../../app/states'
+import { useT } from '../../i18n'
+import { Icon } from '../../widgets/Icon'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { QualityTable } from './QualityTable'
+
+/** A drive of the bench: identity, connection, name and notes. */
+export function BenchDrive({ drive }: { drive: DriveSummary }) {
+  const t = useT()
+  const [editing, setEditing] = useState(false)
+  const [removing, setRemoving] = useState(false)
+  const look = linkLook(drive.quality)
+  return (
+    <article className="bench-drive">
+      <div className="row middle">
+        <a className="grow big" href={href('overview', drive.id)}>
+          {drive.name}
+        </a>
+        <span className={`badge plain-badge ${look.tone}-text`}>
+          <Icon name="link" size={16} /> {t(`link.${look.word}`)}
+        </span>
+      </div>
+      <p>
+        {drive.maker} {drive.title}
+        {drive.partial && <em className="warn-text"> {t('connect.partial')}</em>}
+      </p>
+      {drive.identity_warning && (
+        <p className="note fault" role="alert">
+          <strong>{t('connect.swapped')}</strong> {drive.identity_warning}
+        </p>
+      )}
+      <p className="dim">
+        {drive.serial !== null && `${t('identity.serial')} ${drive.serial} · `}
+        {drive.firmware && `${t('identity.firmware')} ${drive.firmware}`}
+      </p>
+      {drive.ports.map((port) => (
+        <p key={`${port.url} ${port.station}`} className="dim mono">
+          {port.url} · {t('connect.station', { station: port.station })}
+          <span className={port.watchdog ? '' : 'warn-text'}>
+            {' · '}
+            {t(port.watchdog ? 'connect.watchdog' : 'connect.noWatchdog')}
+          </span>
+        </p>
+      ))}
+      {drive.notes && <p className="notes">{drive.notes}</p>}
+      <details>
+        <summary>{t('connect.quality')}</summary>
+        <QualityTable quality={drive.quality} />
+      </details>
+      <div className="row">
+        <Button onClick={() => setEditing(true)}>{t('connect.rename')}</Button>
+        <Button onClick={() => setRemoving(true)}>{t('connect.remove')}</Button>
+      </div>
+      {editing && <Rename drive={drive} onClose={() => setEditing(false)} />}
+      {removing && <Remove drive={drive} onClose={() => setRemoving(false)} />}
+    </article>
+  )
+}
+
+function Rename({ drive, onClose }: { drive: DriveSummary; onClose: () => void }) {
+  const t = useT()
+  const [name, setName] = useState(drive.name)
+  const [notes, setNotes] = useState(drive.notes)
+  const save = useAction()
+  return (
+    <Modal opened onClose={onClose} title={t('connect.rename')}>
+      <TextInput
+        label={t('connect.name')}
+        value={name}
+        maxLength={60}
+        onChange={(event) => setName(event.currentTarget.value)}
+      />
+      <Textarea
+        label={t('connect.notes')}
+        value={notes}
+        maxLength={4000}
+        rows={4}
+        onChange={(event) => setNotes(event.currentTarget.value)}
+      />
+      <ProblemNote problem={save.problem} />
+      <div className="row end">
+        <Button onClick={onClose}>{t('cancel')}</Button>
+        <Button
+          variant="filled"
+          disabled={name.trim() === ''}
+          loading={save.busy}
+          onClick={async () => {
+            const saved = await save.run(() =>
+              ask(
+                api.PATCH('/api/v1/drives/{drive_id}', {
+                  params: { path: { drive_id: drive.id } },
+                  body: { name: name.trim(), notes },
+                }),
+              ),
+            )
+            if (saved) onClose()
+          }}
+        >
+          {t('store')}
+        </Button>
+      </div>
+    </Modal>
+  )
+}
+
+function Remove({ drive, onClose }: { drive: DriveSummary; onClose: () => void }) {
+  const t = useT()
+  const remove = useAction()
+  return (
+    <Modal opened onClose={onClose} title={t('connect.remove')}>
+      <p>{t('connect.removeText', { name: drive.name })}</p>
+      {drive.unsaved > 0 && (
+        <p className="warn-text">{t('connect.removeUnsaved', { count: drive.unsaved })}</p>
+      )}
+      <ProblemNote problem={remove.problem} />
+      <div className="row end">
+        <Button onClick={onClose}>{t('cancel')}</Button>
+        <Button
+          color="red"
+          variant="filled"
+          loading={remove.busy}
+          onClick={async () => {
+            const done = await remove.run(() =>
+              ask(
+                api.DELETE('/api/v1/drives/{drive_id}', {
+                  params: { path: { drive_id: drive.id } },
+                }),
+              ),
+            )
+            if (done) onClose()
+          }}
+        >
+          {t('connect.remove')}
+        </Button>
+      </div>
+    </Modal>
+  )
+}

@@ -1,0 +1,116 @@
+import { Button, TextInput } from '@mantine/core'
+import { useCallback, useEffect, useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { Interfaces } from '../../api/schema'
+import { useT } from '../../i18n'
+import { useDrives, useLink } from '../../live/store'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { BenchDrive } from './BenchDrive'
+import { Buses } from './Buses'
+import { ConnectHelp } from './ConnectHelp'
+import { Scan } from './Scan'
+
+/** One way to a bus: what it is, whether it can be used, and the URL to start from. */
+interface Way {
+  url: string
+  label: string
+  kind: 'virtual' | 'serial' | 'network' | 'can'
+  usable: boolean
+  problem: string
+}
+
+function ways(found: Interfaces): Way[] {
+  return [
+    ...found.virtual.map((url) => way('virtual', url, url)),
+    ...found.serial.map((port) => ({
+      ...way('serial', port.url, `${port.path} ${port.description}`.trim()),
+      usable: port.usable,
+      problem: port.problem,
+    })),
+    ...found.network.map((card) => ({
+      ...way('network', card.url, card.name),
+      usable: card.usable,
+      problem: card.problem,
+    })),
+    ...found.can.map((url) => way('can', url, url)),
+  ]
+}
+
+function way(kind: Way['kind'], url: string, label: string): Way {
+  return { kind, url, label, usable: true, problem: '' }
+}
+
+export function ConnectPage() {
+  const t = useT()
+  const drives = useDrives()
+  const link = useLink()
+  const [interfaces, setInterfaces] = useState<Interfaces | null>(null)
+  const [url, setUrl] = useState('')
+  const load = useAction()
+  const refresh = useCallback(
+    () => load.run(async () => setInterfaces(await ask(api.GET('/api/v1/interfaces')))),
+    [load.run],
+  )
+  useEffect(() => {
+    if (link.open) void refresh()
+  }, [link.open, refresh])
+  const known = interfaces ? ways(interfaces) : []
+  return (
+    <div className="page">
+      <h1>{t('page.connect')}</h1>
+      <div className="columns">
+        <Panel
+          title={t('connect.interfaces')}
+          tools={
+            <Button loading={load.busy} onClick={() => void refresh()}>
+              {t('connect.refresh')}
+            </Button>
+          }
+        >
+          <ProblemNote problem={load.problem} onClose={load.clear} />
+          {interfaces && known.length === 0 && <p className="dim">{t('connect.noInterfaces')}</p>}
+          <ul className="ways">
+            {known.map((each) => (
+              <li key={each.url}>
+                <button
+                  type="button"
+                  className="entry"
+                  aria-pressed={url === each.url}
+                  onClick={() => setUrl(each.url)}
+                >
+                  <span className="grow">
+                    {each.label}
+                    <small>
+                      {t(`connect.kind.${each.kind}`)}
+                      {!each.usable && ` · ${each.problem || t('connect.unusable')}`}
+                    </small>
+                  </span>
+                </button>
+              </li>
+            ))}
+          </ul>
+          <TextInput
+            label={t('connect.url')}
+            description={t('connect.urlHelp')}
+            value={url}
+            spellCheck={false}
+            autoCapitalize="off"
+            className="mono-input"
+            onChange={(event) => setUrl(event.currentTarget.value)}
+          />
+          <Scan url={url.trim()} />
+        </Panel>
+        <Panel title={t('connect.bench')}>
+          {drives?.length === 0 && <p className="dim">{t('connect.benchEmpty')}</p>}
+          {drives?.map((drive) => (
+            <BenchDrive key={drive.id} drive={drive} />
+          ))}
+        </Panel>
+      </div>
+      <Buses />
+      <ConnectHelp />
+    </div>
+  )
+}

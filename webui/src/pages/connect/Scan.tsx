@@ -1,0 +1,174 @@
+import { Button, NativeSelect, TextInput } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { FoundDrive, ProfileInfo } from '../../api/schema'
+import { type T, useT } from '../../i18n'
+import { setJob, useDrives, useJob } from '../../live/store'
+import { JobNote } from '../../widgets/JobNote'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+
+/** `1-5, 9` as station numbers; null where it is not such a list. */
+export function parseStations(text: string): number[] | null {
+  const stations: number[] = []
+  for (const part of text.split(',').map((each) => each.trim())) {
+    const match = /^(\d{1,5})(?:\s*[-–]\s*(\d{1,5}))?$/.exec(part)
+    if (!match) return null
+    const first = Number(match[1])
+    const last = Number(match[2] ?? match[1])
+    if (last < first || last > 65535 || last - first > 1000) return null
+    for (let station = first; station <= last; station++) stations.push(station)
+  }
+  return stations
+}
+
+export function Scan({ url }: { url: string }) {
+  const t = useT()
+  const [stations, setStations] = useState('')
+  const [id, setId] = useState<string | null>(null)
+  const scan = useAction()
+  const job = useJob(id)
+  const list = stations.trim() === '' ? null : parseStations(stations)
+  const bad = stations.trim() !== '' && list === null
+  const running = job?.state === 'running'
+  const found = (job?.result?.found ?? []) as FoundDrive[]
+  const start = () =>
+    scan.run(async () => {
+      const begun = await ask(
+        api.POST('/api/v1/scan', { body: { url, stations: list, stop_after_first: false } }),
+      )
+      setJob(begun)
+      setId(begun.id)
+    })
+  return (
+    <>
+      <div className="row">
+        <TextInput
+          className="grow"
+          label={t('connect.stations')}
+          placeholder={t('connect.stationsAll')}
+          value={stations}
+          error={bad ? t('connect.stationsBad') : null}
+          onChange={(event) => setStations(event.currentTarget.value)}
+        />
+        <Button
+          variant="filled"
+          disabled={url === '' || bad || running}
+          loading={scan.busy}
+          onClick={() => void start()}
+        >
+          {t('connect.scan')}
+        </Button>
+      </div>
+      <ProblemNote problem={scan.problem} onClose={scan.clear} />
+      <JobNote id={id} onClose={() => setId(null)} />
+      {job?.state === 'done' && (
+        <section aria-label={t('connect.results')}>
+          <h3>{t('connect.found', { count: found.length })}</h3>
+          {found.length === 0 && <p>{t('connect.foundNone')}</p>}
+          {found.map((drive) => (
+            <Found key={`${drive.url} ${drive.station}`} found={drive} />
+          ))}
+        </section>
+      )}
+    </>
+  )
+}
+
+function identity(t: T, found: FoundDrive): string {
+  const hex = (n: number) => `0x${n.toString(16).toUpperCase()}`
+  return [
+    found.vendor_id !== null && `${t('identity.vendor')} ${hex(found.vendor_id)}`,
+    found.product_code !== null && `${t('identity.product')} ${hex(found.product_code)}`,
+    found.revision !== null && `${t('identity.revision')} ${hex(found.revision)}`,
+    found.serial !== null && `${t('identity.serial')} ${found.serial}`,
+    found.hardware && `${t('identity.hardware')} ${found.hardware}`,
+    found.firmware && `${t('identity.firmware')} ${found.firmware}`,
+    found.alias !== null && `${t('identity.alias')} ${found.alias}`,
+  ]
+    .filter(Boolean)
+    .join(' · ')
+}
+
+function Found({ found }: { found: FoundDrive }) {
+  const t = useT()
+  const connect = useAction()
+  const drives = useDrives() ?? []
+  const [profiles, setProfiles] = useState<ProfileInfo[]>([])
+  const [profile, setProfile] = useState(found.matches[0]?.profile ?? '')
+  const [name, setName] = useState('')
+  useEffect(() => {
+    ask(api.GET('/api/v1/profiles')).then(setProfiles, () => {})
+  }, [])
+  const match = found.matches.find((each) => each.profile === profile)
+  const used = drives.find((drive) =>
+    drive.ports.some((port) => port.url === found.url && port.station === found.station),
+  )
+  return (
+    <div className="found">
+      <p>
+        <strong>{t('connect.station', { station: found.station })}</strong>{' '}
+        {found.name || t('connect.nameless')} <span className="dim">{found.state}</span>
+      </p>
+      <p className="dim num">{identity(t, found) || t('connect.noIdentity')}</p>
+      {found.notes.map((note) => (
+        <p key={note} className="dim">
+          {note}
+        </p>
+      ))}
+      {used ? (
+        <p>{t('connect.inUse', { name: used.name })}</p>
+      ) : (
+        <div className="row">
+          <NativeSelect
+            className="grow"
+            label={t('connect.profile')}
+            value={profile}
+            onChange={(event) => setProfile(event.currentTarget.value)}
+            data={[
+              ...(profile === '' ? [{ value: '', label: t('connect.choose') }] : []),
+              ...found.matches.map((each) => ({
+                value: each.profile,
+                label: `${each.title} — ${t(`confidence.${each.confidence}`)}`,
+              })),
+              ...profiles
+                .filter((each) => !found.matches.some((known) => known.profile === each.profile))
+                .map((each) => ({
+                  value: each.profile,
+                  label: `${each.title} — ${t('confidence.none')}`,
+                })),
+            ]}
+          />
+          <TextInput
+            label={t('connect.name')}
+            value={name}
+            maxLength={60}
+            onChange={(event) => setName(event.currentTarget.value)}
+          />
+          <Button
+            variant="filled"
+            disabled={profile === ''}
+            loading={connect.busy}
+            onClick={() =>
+              void connect.run(() =>
+                ask(
+                  api.POST('/api/v1/drives', {
+                    body: { url: found.url, station: found.station, profile, name },
+                  }),
+                ),
+              )
+            }
+          >
+            {t('connect.connect')}
+          </Button>
+        </div>
+      )}
+      {!used && profile !== '' && (
+        <p className={match?.confidence === 'certain' ? 'dim' : 'warn-text'}>
+          {match ? match.why : t('connect.noMatch')}
+        </p>
+      )}
+      <ProblemNote problem={connect.problem} onClose={connect.clear} />
+    </div>
+  )
+}

@@ -1,0 +1,168 @@
+import { Button, NativeSelect } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { AxisState, HomingMethodInfo } from '../../api/schema'
+import { useT } from '../../i18n'
+import { setJob, useLink } from '../../live/store'
+import { NumberField } from '../../widgets/NumberField'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { HomingPicture } from './HomingPicture'
+import { startValue, useRemembered } from './remembered'
+
+export function HomingPanel({
+  drive,
+  state,
+  onStarted,
+}: {
+  drive: string
+  state: AxisState | null
+  onStarted: (job: string) => void
+}) {
+  const t = useT()
+  const { open } = useLink()
+  const units = state?.units ?? {}
+  const [methods, setMethods] = useState<HomingMethodInfo[]>([])
+  const [number, setNumber] = useState<number | null>(null)
+  const [fast, setFast] = useState<number | null>(null)
+  const [slow, setSlow] = useState<number | null>(null)
+  const [acceleration, setAcceleration] = useState<number | null>(null)
+  const [offset, setOffset] = useState<number | null>(null)
+  const [travel, setTravel] = useRemembered(drive, 'home.travel', startValue(units.position, 10))
+  const [torque, setTorque] = useRemembered(drive, 'home.torque', 50)
+  const [time, setTime] = useRemembered(drive, 'home.time', 60)
+  const load = useAction()
+  const start = useAction()
+  useEffect(() => {
+    if (!open) return
+    void load.run(async () => {
+      const list = await ask(
+        api.GET('/api/v1/drives/{drive_id}/homing-methods', {
+          params: { path: { drive_id: drive } },
+        }),
+      )
+      setMethods(list)
+      setNumber((old) =>
+        list.some((each) => each.method === old) ? old : (list[0]?.method ?? null),
+      )
+    })
+  }, [drive, open, load.run])
+  const method = methods.find((each) => each.method === number) ?? null
+  const go = () =>
+    start.run(async () => {
+      if (number === null || travel === null || torque === null || time === null) return
+      const job = await ask(
+        api.POST('/api/v1/drives/{drive_id}/jobs/home', {
+          params: { path: { drive_id: drive } },
+          body: {
+            method: number,
+            speed_switch: fast,
+            speed_zero: slow,
+            acceleration,
+            offset,
+            travel_limit: travel,
+            torque_limit: torque,
+            timeout_s: time,
+          },
+        }),
+      )
+      setJob(job)
+      onStarted(job.id)
+    })
+  return (
+    <Panel title={t('homing.title')}>
+      <ProblemNote problem={load.problem} />
+      <NativeSelect
+        label={t('homing.method')}
+        value={number === null ? '' : String(number)}
+        onChange={(event) => setNumber(Number(event.currentTarget.value))}
+        data={methods.map((each) => ({
+          value: String(each.method),
+          label: `${each.method} · ${each.name}`,
+        }))}
+      />
+      {method && (
+        <>
+          <HomingPicture method={method} />
+          <p className="prose">{method.help}</p>
+          {method.notes && <p className="dim">{method.notes}</p>}
+          <p className="dim">{t('source', { source: method.source })}</p>
+        </>
+      )}
+      <div className="fields">
+        <NumberField
+          label={t('homing.fast')}
+          unit={units.velocity ?? ''}
+          value={fast}
+          onChange={setFast}
+          above={0}
+          optional
+        />
+        <NumberField
+          label={t('homing.slow')}
+          unit={units.velocity ?? ''}
+          value={slow}
+          onChange={setSlow}
+          above={0}
+          optional
+        />
+        <NumberField
+          label={t('motion.acceleration')}
+          unit={units.acceleration ?? ''}
+          value={acceleration}
+          onChange={setAcceleration}
+          above={0}
+          optional
+        />
+        <NumberField
+          label={t('homing.offset')}
+          unit={units.position ?? ''}
+          value={offset}
+          onChange={setOffset}
+          optional
+        />
+        <NumberField
+          label={t('motion.travelLimit')}
+          unit={units.position ?? ''}
+          value={travel}
+          onChange={setTravel}
+          above={0}
+        />
+        <NumberField
+          label={t('motion.torqueLimit')}
+          unit="%"
+          value={torque}
+          onChange={setTorque}
+          above={0}
+          max={400}
+        />
+        <NumberField
+          label={t('move.timeout')}
+          unit="s"
+          value={time}
+          onChange={setTime}
+          above={0}
+          max={600}
+        />
+      </div>
+      <p className="dim">{t('homing.empty')}</p>
+      <Button
+        variant="filled"
+        disabled={
+          method === null ||
+          travel === null ||
+          torque === null ||
+          time === null ||
+          state?.moving_job != null ||
+          !state?.fresh
+        }
+        loading={start.busy}
+        onClick={() => void go()}
+      >
+        {t('homing.start')}
+      </Button>
+      <ProblemNote problem={start.problem} onClose={start.clear} />
+    </Panel>
+  )
+}

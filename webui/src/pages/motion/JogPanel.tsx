@@ -1,0 +1,187 @@
+import { type KeyboardEvent, type PointerEvent, useRef } from 'react'
+import type { AxisState } from '../../api/schema'
+import { known, useT } from '../../i18n'
+import { useLink } from '../../live/store'
+import { quantity } from '../../widgets/format'
+import { Icon } from '../../widgets/Icon'
+import { NumberField } from '../../widgets/NumberField'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { startValue, useRemembered } from './remembered'
+import { type JogSettings, useJog } from './useJog'
+
+/** Hold to run: by mouse, finger or arrow key; whatever ends the hold stops the axis. */
+export function JogPanel({ drive, state }: { drive: string; state: AxisState | null }) {
+  const t = useT()
+  const link = useLink()
+  const units = state?.units ?? {}
+  const [speed, setSpeed] = useRemembered(drive, 'jog.speed', startValue(units.velocity, 60))
+  const [acceleration, setAcceleration] = useRemembered(
+    drive,
+    'jog.acceleration',
+    startValue(units.acceleration, 600),
+  )
+  const [travel, setTravel] = useRemembered(drive, 'jog.travel', startValue(units.position, 5))
+  const [torque, setTorque] = useRemembered(drive, 'jog.torque', 50)
+  const settings: JogSettings | null =
+    speed !== null && acceleration !== null && travel !== null && torque !== null
+      ? { speed, acceleration, travel_limit: travel, torque_limit: torque }
+      : null
+  const { direction, ended, hold, press } = useJog(drive, settings)
+  const ready = settings !== null && link.open && (state?.fresh ?? false)
+  const pad = useRef<HTMLDivElement>(null)
+  const keys: Record<string, -1 | 1> = { ArrowLeft: -1, ArrowRight: 1 }
+  const keyDown = (event: KeyboardEvent) => {
+    const towards = keys[event.key]
+    if (towards === undefined || event.target !== pad.current) {
+      if (hold.held !== null && !event.repeat) hold.release('another key')
+      return
+    }
+    event.preventDefault()
+    if (event.repeat || event.ctrlKey || event.altKey || event.metaKey || event.shiftKey) return
+    if (ready) press(towards)
+  }
+  const keyUp = (event: KeyboardEvent) => {
+    if (keys[event.key] !== undefined) hold.release('released')
+  }
+  return (
+    <Panel title={t('jog.title')} className="jog-panel">
+      <p className="dim">{t('jog.help')}</p>
+      <div className="fields">
+        <NumberField
+          label={t('motion.speed')}
+          unit={units.velocity ?? ''}
+          value={speed}
+          onChange={setSpeed}
+          above={0}
+          disabled={direction !== null}
+        />
+        <NumberField
+          label={t('motion.acceleration')}
+          unit={units.acceleration ?? ''}
+          value={acceleration}
+          onChange={setAcceleration}
+          above={0}
+          disabled={direction !== null}
+        />
+        <NumberField
+          label={t('motion.travelLimit')}
+          unit={units.position ?? ''}
+          value={travel}
+          onChange={setTravel}
+          above={0}
+          disabled={direction !== null}
+        />
+        <NumberField
+          label={t('motion.torqueLimit')}
+          unit="%"
+          value={torque}
+          onChange={setTorque}
+          above={0}
+          max={400}
+          disabled={direction !== null}
+        />
+      </div>
+      <div
+        ref={pad}
+        className="jog-pad"
+        role="group"
+        tabIndex={0}
+        aria-label={t('jog.pad')}
+        onKeyDown={keyDown}
+        onKeyUp={keyUp}
+        onBlur={() => hold.release('window lost the focus')}
+      >
+        <JogButton
+          towards={-1}
+          held={direction}
+          disabled={!ready}
+          press={press}
+          hold={hold}
+          pad={pad}
+        />
+        <div className="jog-live">
+          <span className="big num">{quantity(state?.position, units.position ?? '')}</span>
+          <span className="unit">{units.position}</span>
+          <span className="num">
+            {quantity(state?.velocity, units.velocity ?? '')} {units.velocity}
+          </span>
+          <strong aria-live="polite">
+            {direction === null ? t('jog.idle') : t(direction > 0 ? 'jog.plus' : 'jog.minus')}
+          </strong>
+        </div>
+        <JogButton
+          towards={1}
+          held={direction}
+          disabled={!ready}
+          press={press}
+          hold={hold}
+          pad={pad}
+        />
+      </div>
+      <p className="dim keys-help">{t('jog.keys')}</p>
+      {!settings && <p className="warn-text">{t('jog.invalid')}</p>}
+      {ended && !ended.problem && (
+        <p className="note" role="status">
+          {t('jog.ended', { reason: known(t, 'reason', ended.reason) })}
+        </p>
+      )}
+      <ProblemNote problem={ended?.problem ?? null} />
+    </Panel>
+  )
+}
+
+function JogButton({
+  towards,
+  held,
+  disabled,
+  press,
+  hold,
+  pad,
+}: {
+  towards: -1 | 1
+  held: -1 | 1 | null
+  disabled: boolean
+  press: (towards: -1 | 1) => boolean
+  hold: { held: -1 | 1 | null; release(reason: 'released' | 'pointer cancelled'): void }
+  pad: React.RefObject<HTMLDivElement | null>
+}) {
+  const t = useT()
+  const pointer = useRef<number | null>(null)
+  const down = (event: PointerEvent<HTMLButtonElement>) => {
+    if (event.button !== 0) return
+    event.preventDefault()
+    if (hold.held !== null) {
+      hold.release('pointer cancelled')
+      return
+    }
+    if (disabled) return
+    // The captured pointer's end comes here wherever the finger has slid to.
+    event.currentTarget.setPointerCapture(event.pointerId)
+    pad.current?.focus({ preventScroll: true })
+    if (press(towards)) pointer.current = event.pointerId
+  }
+  const up = (reason: 'released' | 'pointer cancelled') => (event: PointerEvent) => {
+    if (pointer.current !== event.pointerId) return
+    pointer.current = null
+    hold.release(reason)
+  }
+  return (
+    <button
+      type="button"
+      className="jog-button"
+      tabIndex={-1}
+      aria-label={t(towards > 0 ? 'jog.buttonPlus' : 'jog.buttonMinus')}
+      aria-pressed={held === towards}
+      aria-disabled={disabled}
+      onPointerDown={down}
+      onPointerUp={up('released')}
+      onPointerCancel={up('pointer cancelled')}
+      onLostPointerCapture={up('pointer cancelled')}
+      onContextMenu={(event) => event.preventDefault()}
+    >
+      <Icon name={towards > 0 ? 'right' : 'left'} size={40} />
+      <span>{towards > 0 ? '+' : '−'}</span>
+    </button>
+  )
+}

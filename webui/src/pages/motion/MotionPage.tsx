@@ -1,0 +1,108 @@
+import { Button, SegmentedControl } from '@mantine/core'
+import { useState } from 'react'
+import { api, ask } from '../../api/client'
+import { known, useT } from '../../i18n'
+import { setState, useAxisState, useDrive, useJob } from '../../live/store'
+import { JobNote } from '../../widgets/JobNote'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { Blocked, Quantities } from '../overview/OverviewPage'
+import { HomingPanel } from './HomingPanel'
+import { JogPanel } from './JogPanel'
+import { MovePanel } from './MovePanel'
+import { SequencePanel } from './SequencePanel'
+
+const TABS = ['jog', 'move', 'sequence', 'homing'] as const
+
+export function MotionPage({ drive }: { drive: string }) {
+  const t = useT()
+  const summary = useDrive(drive)
+  const state = useAxisState(drive)
+  const [tab, setTab] = useState<(typeof TABS)[number]>('jog')
+  const [jobs, setJobs] = useState<Record<string, string>>({})
+  const moving = useJob(state?.moving_job ?? null)
+  const mine = jobs[drive] ?? null
+  if (!summary) return null
+  const started = (id: string) => setJobs((old) => ({ ...old, [drive]: id }))
+  return (
+    <div className="page">
+      <h1>
+        {t('page.motion')} <small className="dim">{summary.name}</small>
+      </h1>
+      {state && !state.fresh && (
+        <p className="note warn" role="status">
+          <strong>{t('state.noAnswer')}</strong> {state.problem}
+        </p>
+      )}
+      <div className="columns motion-columns">
+        <div>
+          <SegmentedControl
+            fullWidth
+            value={tab}
+            onChange={(next) => setTab(next as typeof tab)}
+            data={TABS.map((name) => ({ value: name, label: t(`motion.tab.${name}`) }))}
+          />
+          {tab === 'jog' && <JogPanel drive={drive} state={state} />}
+          {tab === 'move' && <MovePanel drive={summary} state={state} onStarted={started} />}
+          {tab === 'sequence' && <SequencePanel drive={drive} state={state} onStarted={started} />}
+          {tab === 'homing' && <HomingPanel drive={drive} state={state} onStarted={started} />}
+          {moving && moving.id !== mine && moving.kind !== 'jog' && <JobNote id={moving.id} />}
+          <JobNote id={mine} onClose={() => started('')} />
+        </div>
+        <Panel title={t('overview.now')}>
+          <Quantities state={state} />
+          <p>
+            {t('motion.state')} <strong>{state ? known(t, 'state', state.state) : '—'}</strong> ·{' '}
+            {state && known(t, 'mode', state.mode_name)}
+          </p>
+          <Power drive={drive} />
+          <Blocked state={state} />
+        </Panel>
+      </div>
+    </div>
+  )
+}
+
+function Power({ drive }: { drive: string }) {
+  const t = useT()
+  const state = useAxisState(drive)
+  const act = useAction()
+  const goals = state?.fresh ? state.goals : []
+  const goTo = (goal: 'Operation enabled' | 'Switch on disabled') =>
+    act.run(async () =>
+      setState(
+        await ask(
+          api.POST('/api/v1/drives/{drive_id}/transition', {
+            params: { path: { drive_id: drive } },
+            body: { goal, mode: null },
+          }),
+        ),
+      ),
+    )
+  return (
+    <>
+      <div className="row">
+        <Button
+          disabled={
+            !goals.includes('Operation enabled') || state?.state === 'Operation enabled' || act.busy
+          }
+          onClick={() => void goTo('Operation enabled')}
+        >
+          {t('motion.enable')}
+        </Button>
+        <Button
+          disabled={
+            !goals.includes('Switch on disabled') ||
+            state?.state === 'Switch on disabled' ||
+            act.busy
+          }
+          onClick={() => void goTo('Switch on disabled')}
+        >
+          {t('motion.disable')}
+        </Button>
+      </div>
+      <ProblemNote problem={act.problem} onClose={act.clear} />
+    </>
+  )
+}

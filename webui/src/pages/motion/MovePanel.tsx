@@ -1,0 +1,165 @@
+import { Button, Checkbox, SegmentedControl } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { AxisState, DriveSummary } from '../../api/schema'
+import { useT } from '../../i18n'
+import { setJob } from '../../live/store'
+import { NumberField } from '../../widgets/NumberField'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { startValue, useRemembered } from './remembered'
+
+/** CiA 402 modes of operation that this panel commands. */
+const MODES = { PP: 1, PV: 3, PT: 4 } as const
+type Mode = keyof typeof MODES
+
+export function MovePanel({
+  drive,
+  state,
+  onStarted,
+}: {
+  drive: DriveSummary
+  state: AxisState | null
+  onStarted: (job: string) => void
+}) {
+  const t = useT()
+  const units = state?.units ?? {}
+  const [mode, setMode] = useState<Mode>('PP')
+  const [target, setTarget] = useState<number | null>(null)
+  const [relative, setRelative] = useState(true)
+  const [consent, setConsent] = useState(false)
+  const [speed, setSpeed] = useRemembered(drive.id, 'move.speed', startValue(units.velocity, 60))
+  const [acceleration, setAcceleration] = useRemembered(
+    drive.id,
+    'move.acceleration',
+    startValue(units.acceleration, 600),
+  )
+  const [travel, setTravel] = useRemembered(drive.id, 'move.travel', startValue(units.position, 10))
+  const [torque, setTorque] = useRemembered(drive.id, 'move.torque', 50)
+  const [time, setTime] = useRemembered(drive.id, 'move.time', 10)
+  const start = useAction()
+  const key = `${drive.id} ${mode}`
+  useEffect(() => {
+    // A target or consent of another axis or mode is never carried over.
+    setTarget(null)
+    setConsent(false)
+  }, [key])
+  const unwatched = mode !== 'PP' && !(drive.ports[0]?.watchdog ?? false)
+  const unit = { PP: units.position, PV: units.velocity, PT: units.torque }[mode] ?? ''
+  const complete =
+    target !== null &&
+    travel !== null &&
+    torque !== null &&
+    time !== null &&
+    acceleration !== null &&
+    (mode === 'PV' || speed !== null) &&
+    (!unwatched || consent)
+  const go = () =>
+    start.run(async () => {
+      if (target === null || travel === null || torque === null || time === null) return
+      const job = await ask(
+        api.POST('/api/v1/drives/{drive_id}/jobs/move', {
+          params: { path: { drive_id: drive.id } },
+          body: {
+            mode,
+            target,
+            relative: mode === 'PP' && relative,
+            immediate: true,
+            speed: mode === 'PV' ? null : speed,
+            acceleration,
+            deceleration: acceleration,
+            travel_limit: travel,
+            torque_limit: torque,
+            timeout_s: time,
+            consent,
+          },
+        }),
+      )
+      setJob(job)
+      onStarted(job.id)
+      setConsent(false) // agreed to for one movement, not for the next
+    })
+  const possible = (Object.keys(MODES) as Mode[]).filter(
+    (each) => !state || state.modes.includes(MODES[each]),
+  )
+  return (
+    <Panel title={t('move.title')}>
+      <SegmentedControl
+        fullWidth
+        value={mode}
+        onChange={(next) => setMode(next as Mode)}
+        data={possible.map((each) => ({ value: each, label: t(`move.mode.${each}`) }))}
+      />
+      <p className="dim">{t(`move.help.${mode}`)}</p>
+      <div className="fields">
+        <NumberField label={t('move.target')} unit={unit} value={target} onChange={setTarget} />
+        {mode !== 'PV' && (
+          <NumberField
+            label={t(mode === 'PT' ? 'move.speedLimit' : 'motion.speed')}
+            unit={units.velocity ?? ''}
+            value={speed}
+            onChange={setSpeed}
+            above={0}
+          />
+        )}
+        <NumberField
+          label={t('motion.acceleration')}
+          unit={units.acceleration ?? ''}
+          value={acceleration}
+          onChange={setAcceleration}
+          above={0}
+        />
+        <NumberField
+          label={t('motion.travelLimit')}
+          unit={units.position ?? ''}
+          value={travel}
+          onChange={setTravel}
+          above={0}
+        />
+        <NumberField
+          label={t('motion.torqueLimit')}
+          unit="%"
+          value={torque}
+          onChange={setTorque}
+          above={0}
+          max={400}
+        />
+        <NumberField
+          label={t(mode === 'PP' ? 'move.timeout' : 'move.time')}
+          unit="s"
+          value={time}
+          onChange={setTime}
+          above={0}
+          max={600}
+        />
+      </div>
+      {mode === 'PP' && (
+        <Checkbox
+          label={t('move.relative')}
+          checked={relative}
+          onChange={(event) => setRelative(event.currentTarget.checked)}
+        />
+      )}
+      {unwatched && (
+        <div className="note warn">
+          <p>{t('move.consentText')}</p>
+          <Checkbox
+            label={t('move.consent')}
+            checked={consent}
+            onChange={(event) => setConsent(event.currentTarget.checked)}
+          />
+        </div>
+      )}
+      <Button
+        variant="filled"
+        disabled={!complete || state?.moving_job != null || !state?.fresh}
+        loading={start.busy}
+        onClick={() => void go()}
+      >
+        {t('move.start')}
+      </Button>
+      <ProblemNote problem={start.problem} onClose={start.clear} />
+    </Panel>
+  )
+}

@@ -1,0 +1,161 @@
+import { Button } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { AxisState } from '../../api/schema'
+import { useT } from '../../i18n'
+import { setJob } from '../../live/store'
+import { NumberField } from '../../widgets/NumberField'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { startValue, useRemembered } from './remembered'
+
+/** Back and forth between two absolute positions. */
+export function SequencePanel({
+  drive,
+  state,
+  onStarted,
+}: {
+  drive: string
+  state: AxisState | null
+  onStarted: (job: string) => void
+}) {
+  const t = useT()
+  const units = state?.units ?? {}
+  const [first, setFirst] = useState<number | null>(null)
+  const [second, setSecond] = useState<number | null>(null)
+  const [dwell, setDwell] = useRemembered(drive, 'sequence.dwell', 0.5)
+  const [count, setCount] = useRemembered(drive, 'sequence.count', 5)
+  const [speed, setSpeed] = useRemembered(drive, 'sequence.speed', startValue(units.velocity, 60))
+  const [acceleration, setAcceleration] = useRemembered(
+    drive,
+    'sequence.acceleration',
+    startValue(units.acceleration, 600),
+  )
+  const [travel, setTravel] = useRemembered(drive, 'sequence.travel', startValue(units.position, 5))
+  const [torque, setTorque] = useRemembered(drive, 'sequence.torque', 50)
+  const start = useAction()
+  useEffect(() => {
+    // Positions of another axis are never carried over.
+    if (drive) {
+      setFirst(null)
+      setSecond(null)
+    }
+  }, [drive])
+  const here = state?.fresh && state.position !== null ? Number(state.position.toFixed(4)) : null
+  const values = [first, second, dwell, count, speed, acceleration, travel, torque]
+  const go = () =>
+    start.run(async () => {
+      if (
+        first === null ||
+        second === null ||
+        dwell === null ||
+        count === null ||
+        speed === null ||
+        acceleration === null ||
+        travel === null ||
+        torque === null
+      )
+        return
+      const job = await ask(
+        api.POST('/api/v1/drives/{drive_id}/jobs/sequence', {
+          params: { path: { drive_id: drive } },
+          body: {
+            first,
+            second,
+            speed,
+            acceleration,
+            dwell_s: dwell,
+            count,
+            travel_limit: travel,
+            torque_limit: torque,
+          },
+        }),
+      )
+      setJob(job)
+      onStarted(job.id)
+    })
+  return (
+    <Panel title={t('sequence.title')}>
+      <p className="dim">{t('sequence.help')}</p>
+      <div className="fields">
+        <div className="with-button">
+          <NumberField
+            label={t('sequence.first')}
+            unit={units.position ?? ''}
+            value={first}
+            onChange={setFirst}
+          />
+          <Button disabled={here === null} onClick={() => setFirst(here)}>
+            {t('sequence.here')}
+          </Button>
+        </div>
+        <div className="with-button">
+          <NumberField
+            label={t('sequence.second')}
+            unit={units.position ?? ''}
+            value={second}
+            onChange={setSecond}
+          />
+          <Button disabled={here === null} onClick={() => setSecond(here)}>
+            {t('sequence.here')}
+          </Button>
+        </div>
+        <NumberField
+          label={t('motion.speed')}
+          unit={units.velocity ?? ''}
+          value={speed}
+          onChange={setSpeed}
+          above={0}
+        />
+        <NumberField
+          label={t('motion.acceleration')}
+          unit={units.acceleration ?? ''}
+          value={acceleration}
+          onChange={setAcceleration}
+          above={0}
+        />
+        <NumberField
+          label={t('sequence.dwell')}
+          unit="s"
+          value={dwell}
+          onChange={setDwell}
+          min={0}
+          max={60}
+        />
+        <NumberField
+          label={t('sequence.count')}
+          value={count}
+          onChange={setCount}
+          min={1}
+          max={100000}
+          integer
+        />
+        <NumberField
+          label={t('motion.travelLimit')}
+          unit={units.position ?? ''}
+          value={travel}
+          onChange={setTravel}
+          above={0}
+        />
+        <NumberField
+          label={t('motion.torqueLimit')}
+          unit="%"
+          value={torque}
+          onChange={setTorque}
+          above={0}
+          max={400}
+        />
+      </div>
+      <Button
+        variant="filled"
+        disabled={values.includes(null) || state?.moving_job != null || !state?.fresh}
+        loading={start.busy}
+        onClick={() => void go()}
+      >
+        {t('sequence.start')}
+      </Button>
+      <ProblemNote problem={start.problem} onClose={start.clear} />
+    </Panel>
+  )
+}

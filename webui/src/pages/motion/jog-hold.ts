@@ -1,0 +1,77 @@
+/** What ends a hold, in words that go to the server's log. */
+export type ReleaseReason =
+  | 'released'
+  | 'pointer cancelled'
+  | 'window lost the focus'
+  | 'page hidden'
+  | 'page left'
+  | 'Esc'
+  | 'another key'
+  | 'connection lost'
+  | 'axis changed'
+
+interface Port {
+  start(direction: -1 | 1): void
+  beat(): void
+  stop(reason: ReleaseReason): void
+  /** Called with the direction, or null, whenever it changes. */
+  changed(direction: -1 | 1 | null): void
+}
+
+/** The parts of a window that matter, so that a test can bring its own. */
+export interface Surroundings {
+  isVisible(): boolean
+  hasFocus(): boolean
+  requestFrame(callback: () => void): number
+  cancelFrame(id: number): void
+}
+
+/**
+ * One held button. While it is held, every drawn frame sends a beat; a page that is hidden,
+ * frozen, covered or unfocused draws none or is refused here, and the worker then stops the jog.
+ */
+export class JogHold {
+  private direction: -1 | 1 | null = null
+  private frame = 0
+
+  constructor(
+    private readonly port: Port,
+    private readonly around: Surroundings,
+  ) {}
+
+  get held(): -1 | 1 | null {
+    return this.direction
+  }
+
+  press(direction: -1 | 1): boolean {
+    if (this.direction !== null) {
+      // Two buttons at once is no clear wish: stop.
+      this.release('another key')
+      return false
+    }
+    if (!this.around.isVisible() || !this.around.hasFocus()) return false
+    this.direction = direction
+    this.port.start(direction)
+    this.port.changed(direction)
+    this.next()
+    return true
+  }
+
+  release(reason: ReleaseReason): void {
+    if (this.direction === null) return
+    this.around.cancelFrame(this.frame)
+    this.direction = null
+    this.port.stop(reason)
+    this.port.changed(null)
+  }
+
+  private next(): void {
+    this.frame = this.around.requestFrame(() => {
+      if (this.direction === null) return
+      if (!this.around.isVisible()) return this.release('page hidden')
+      if (!this.around.hasFocus()) return this.release('window lost the focus')
+      this.port.beat()
+      this.next()
+    })
+  }
+}

@@ -1,0 +1,79 @@
+import { useEffect, useMemo, useRef, useState } from 'react'
+import type { JogEnded } from '../../api/schema'
+import * as live from '../../live/live'
+import { contents, subscribe } from '../../live/store'
+import { JogHold } from './jog-hold'
+
+export interface JogSettings {
+  speed: number
+  acceleration: number
+  travel_limit: number
+  torque_limit: number
+}
+
+/** Hold-to-run for one axis. `settings` null: something is not valid, so nothing starts. */
+export function useJog(drive: string, settings: JogSettings | null) {
+  const [direction, setDirection] = useState<-1 | 1 | null>(null)
+  const [ended, setEnded] = useState<JogEnded | null>(null)
+  const latest = useRef(settings)
+  latest.current = settings
+  const hold = useMemo(
+    () =>
+      new JogHold(
+        {
+          start: (towards) => {
+            setEnded(null)
+            if (latest.current) {
+              live.jogStart({ type: 'jog_start', drive, direction: towards, ...latest.current })
+            }
+          },
+          beat: () => live.jogBeat(drive),
+          stop: (reason) => live.jogStop(reason),
+          changed: setDirection,
+        },
+        {
+          isVisible: () => document.visibilityState === 'visible',
+          hasFocus: () => document.hasFocus(),
+          requestFrame: (callback) => requestAnimationFrame(callback),
+          cancelFrame: (id) => cancelAnimationFrame(id),
+        },
+      ),
+    [drive],
+  )
+  useEffect(() => {
+    const hidden = () => document.visibilityState !== 'visible' && hold.release('page hidden')
+    const blur = () => hold.release('window lost the focus')
+    const leave = () => hold.release('page left')
+    const key = (event: KeyboardEvent) => event.key === 'Escape' && hold.release('Esc')
+    const lost = subscribe('link', () => !contents.link.open && hold.release('connection lost'))
+    const refused = subscribe('jogRefused', () => hold.release('connection lost'))
+    const over = subscribe('jogEnded', () => {
+      if (contents.jogEnded?.drive !== drive) return
+      setEnded(contents.jogEnded)
+      hold.release('released')
+    })
+    const turnedDown = subscribe('refused', () => {
+      if (contents.refused?.request === 'jog_start') hold.release('released')
+    })
+    document.addEventListener('visibilitychange', hidden)
+    window.addEventListener('blur', blur)
+    window.addEventListener('pagehide', leave)
+    document.addEventListener('freeze', hidden)
+    window.addEventListener('keydown', key, { capture: true })
+    return () => {
+      hold.release('axis changed')
+      for (const end of [lost, refused, over, turnedDown]) end()
+      document.removeEventListener('visibilitychange', hidden)
+      window.removeEventListener('blur', blur)
+      window.removeEventListener('pagehide', leave)
+      document.removeEventListener('freeze', hidden)
+      window.removeEventListener('keydown', key, { capture: true })
+    }
+  }, [drive, hold])
+  return {
+    direction,
+    ended,
+    hold,
+    press: (to: -1 | 1) => latest.current !== null && hold.press(to),
+  }
+}

@@ -1,0 +1,158 @@
+import { Button } from '@mantine/core'
+import { api, ask } from '../../api/client'
+import type { AxisState, TransitionRequest } from '../../api/schema'
+import { known, useT } from '../../i18n'
+import { setState, useAxisState, useDrive } from '../../live/store'
+import { FaultList } from '../../widgets/FaultList'
+import { quantity } from '../../widgets/format'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { Procedures } from '../../widgets/Procedures'
+import { useAction } from '../../widgets/useAction'
+import { StateMachine } from './StateMachine'
+
+export function OverviewPage({ drive }: { drive: string }) {
+  const t = useT()
+  const state = useAxisState(drive)
+  const summary = useDrive(drive)
+  const change = useAction()
+  const reset = useAction()
+  const goTo = (goal: string) =>
+    change.run(async () =>
+      setState(
+        await ask(
+          api.POST('/api/v1/drives/{drive_id}/transition', {
+            params: { path: { drive_id: drive } },
+            body: { goal: goal as TransitionRequest['goal'], mode: null },
+          }),
+        ),
+      ),
+    )
+  return (
+    <div className="page">
+      <h1>
+        {summary?.name} <small className="dim">{summary?.title}</small>
+      </h1>
+      {state && !state.fresh && (
+        <p className="note warn" role="status">
+          <strong>{t('state.noAnswer')}</strong> {state.problem}
+        </p>
+      )}
+      {state && state.faults.length > 0 && (
+        <Panel title={t('faults.active')} className="fault-panel">
+          <FaultList faults={state.faults} />
+          <Button
+            loading={reset.busy}
+            onClick={() =>
+              void reset.run(async () =>
+                setState(
+                  await ask(
+                    api.POST('/api/v1/drives/{drive_id}/fault-reset', {
+                      params: { path: { drive_id: drive } },
+                    }),
+                  ),
+                ),
+              )
+            }
+          >
+            {t('faults.reset')}
+          </Button>
+          <ProblemNote problem={reset.problem} onClose={reset.clear} />
+        </Panel>
+      )}
+      <div className="columns">
+        <Panel title={t('overview.now')}>
+          <Quantities state={state} />
+          <Words state={state} />
+        </Panel>
+        <Panel title={t('overview.machine')}>
+          <StateMachine
+            state={state?.fresh ? state.state : null}
+            goals={state?.fresh ? state.goals : []}
+            busy={change.busy}
+            onGoal={(goal) => void goTo(goal)}
+          />
+          <p className="dim">{t('overview.machineHelp')}</p>
+          <Blocked state={state} />
+          <ProblemNote problem={change.problem} onClose={change.clear} />
+        </Panel>
+      </div>
+      <Procedures drive={drive} />
+    </div>
+  )
+}
+
+const QUANTITIES = [
+  'position',
+  'velocity',
+  'torque',
+  'following_error',
+  'dc_voltage',
+  'temperature',
+] as const
+
+export function Quantities({ state }: { state: AxisState | null }) {
+  const t = useT()
+  return (
+    <dl className={`quantities ${state?.fresh ? '' : 'stale'}`}>
+      {QUANTITIES.filter((name) => !state || state[name] !== null).map((name) => (
+        <div key={name}>
+          <dt>{t(`quantity.${name}`)}</dt>
+          <dd>
+            <span className="num">{quantity(state?.[name], state?.units[name] ?? '')}</span>{' '}
+            <span className="unit">{state?.units[name]}</span>
+          </dd>
+        </div>
+      ))}
+    </dl>
+  )
+}
+
+function Words({ state }: { state: AxisState | null }) {
+  const t = useT()
+  if (!state) return null
+  const flags: [string, boolean][] = [
+    [t('flag.target_reached'), state.target_reached],
+    [t('flag.internal_limit'), state.internal_limit],
+    ...Object.entries(state.mode_bits).map(([name, on]): [string, boolean] => [
+      known(t, 'bit', name),
+      on,
+    ]),
+  ]
+  return (
+    <>
+      <p>
+        {t('overview.mode')} <strong>{known(t, 'mode', state.mode_name)}</strong>
+        {state.status_word !== null && (
+          <span className="dim mono">
+            {' '}
+            {t('overview.statusWord')} 0x
+            {state.status_word.toString(16).toUpperCase().padStart(4, '0')}
+          </span>
+        )}
+      </p>
+      <ul className="flags">
+        {flags.map(([name, on]) => (
+          <li key={name} className={on ? 'on' : ''}>
+            <span aria-hidden="true">{on ? '●' : '○'}</span> {name}: {t(on ? 'yes' : 'no')}
+          </li>
+        ))}
+      </ul>
+    </>
+  )
+}
+
+export function Blocked({ state }: { state: AxisState | null }) {
+  const t = useT()
+  if (!state?.fresh || state.blocked_by.length === 0) return null
+  return (
+    <div className="note warn">
+      <strong>{t('overview.blocked')}</strong>
+      <ul>
+        {state.blocked_by.map((cause) => (
+          <li key={cause}>{cause}</li>
+        ))}
+      </ul>
+    </div>
+  )
+}

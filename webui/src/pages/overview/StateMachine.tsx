@@ -1,0 +1,115 @@
+import { known, useT } from '../../i18n'
+
+/** Boxes of the picture: centre, in the units of the drawing. After CiA 402-2 figure 6. */
+const BOXES: { state: string; x: number; y: number }[] = [
+  { state: 'Not ready to switch on', x: 105, y: 26 },
+  { state: 'Switch on disabled', x: 105, y: 92 },
+  { state: 'Ready to switch on', x: 105, y: 158 },
+  { state: 'Switched on', x: 105, y: 224 },
+  { state: 'Operation enabled', x: 105, y: 290 },
+  { state: 'Fault reaction active', x: 330, y: 26 },
+  { state: 'Fault', x: 330, y: 92 },
+  { state: 'Quick stop active', x: 330, y: 290 },
+]
+const WIDTH = 178
+const HEIGHT = 44
+
+const ARROWS = [
+  'M105 48V70',
+  'M92 114V136M118 136V114',
+  'M92 180V202M118 202V180',
+  'M92 246V268M118 268V246',
+  'M194 290H241',
+  'M330 268V200Q330 180 310 180H290Q270 180 270 160V112Q270 100 255 100H194',
+  'M330 48V70',
+  'M241 92H194',
+]
+
+/** The power state machine. States that can be asked for now are buttons. */
+export function StateMachine({
+  state,
+  goals,
+  busy,
+  onGoal,
+}: {
+  state: string | null
+  goals: string[]
+  busy: boolean
+  onGoal: (goal: string) => void
+}) {
+  const t = useT()
+  return (
+    <svg className="state-machine" viewBox="0 0 436 320" aria-label={t('overview.machine')}>
+      <title>{t('overview.machine')}</title>
+      <defs>
+        <marker
+          id="tip"
+          viewBox="0 0 8 8"
+          refX="7"
+          refY="4"
+          markerWidth="7"
+          markerHeight="7"
+          orient="auto"
+        >
+          <path d="M0 0 8 4 0 8z" className="tip" />
+        </marker>
+      </defs>
+      {ARROWS.flatMap((path) => path.split(/(?=M)/)).map((path) => (
+        <path key={path} d={path} className="arrow" markerEnd="url(#tip)" />
+      ))}
+      {BOXES.map((box) => {
+        const name = known(t, 'state', box.state)
+        const now = state === box.state
+        const allowed = goals.includes(box.state) && !now
+        const look = `box ${now ? 'now' : ''} ${allowed ? 'allowed' : ''} ${
+          box.state.startsWith('Fault') ? 'bad' : ''
+        }`
+        const drawing = (
+          <>
+            <rect
+              x={box.x - WIDTH / 2}
+              y={box.y - HEIGHT / 2}
+              width={WIDTH}
+              height={HEIGHT}
+              rx={4}
+            />
+            <text x={box.x} y={box.y + (allowed || now ? -2 : 5)}>
+              {name}
+            </text>
+            {(allowed || now) && (
+              <text x={box.x} y={box.y + 14} className="hint">
+                {t(now ? 'overview.here' : 'overview.goThere')}
+              </text>
+            )}
+          </>
+        )
+        if (!allowed) {
+          return (
+            <g key={box.state} className={look}>
+              {drawing}
+            </g>
+          )
+        }
+        return (
+          // biome-ignore lint/a11y/useSemanticElements: a <button> cannot live inside an SVG
+          <g
+            key={box.state}
+            className={look}
+            role="button"
+            tabIndex={busy ? -1 : 0}
+            aria-disabled={busy}
+            aria-label={t('overview.goTo', { state: name })}
+            onClick={() => !busy && onGoal(box.state)}
+            onKeyDown={(event) => {
+              if (busy || event.repeat || (event.key !== 'Enter' && event.key !== ' ')) return
+              event.preventDefault()
+              onGoal(box.state)
+            }}
+          >
+            {drawing}
+          </g>
+        )
+      })}
+    </svg>
+  )
+}

@@ -1,0 +1,70 @@
+import { SegmentedControl } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask } from '../../api/client'
+import { useT } from '../../i18n'
+import { loadRows } from '../../live/live'
+import { contents, setJob, useDrive, useLink, useRows } from '../../live/store'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { Compare } from './Compare'
+import { ParameterTable } from './ParameterTable'
+
+/** Drives whose values were read afresh since this page was opened. */
+const readOnce = new Set<string>()
+
+/** A fresh read on connecting, so that nothing stale is ever taken for the drive's value. */
+async function readAfresh(drive: string): Promise<void> {
+  if (readOnce.has(drive)) return
+  readOnce.add(drive)
+  const running = [...contents.jobs.values()].some(
+    (job) => job.kind === 'read_all' && job.drive === drive && job.state === 'running',
+  )
+  const known = contents.rows.get(drive)?.some((row) => row.reading.time !== null)
+  if (running || known) return
+  setJob(
+    await ask(
+      api.POST('/api/v1/drives/{drive_id}/jobs/read_all', {
+        params: { path: { drive_id: drive } },
+        body: { keys: null },
+      }),
+    ),
+  )
+}
+
+export function ParametersPage({ drive }: { drive: string }) {
+  const t = useT()
+  const rows = useRows(drive)
+  const summary = useDrive(drive)
+  const link = useLink()
+  const load = useAction()
+  const [view, setView] = useState<'table' | 'compare'>('table')
+  useEffect(() => {
+    if (link.open) {
+      void load.run(async () => {
+        await loadRows(drive)
+        await readAfresh(drive)
+      })
+    }
+  }, [drive, link.open, load.run])
+  return (
+    <div className="page fill">
+      <div className="row middle">
+        <h1 className="grow">
+          {t('page.parameters')} <small className="dim">{summary?.name}</small>
+        </h1>
+        <SegmentedControl
+          value={view}
+          onChange={(next) => setView(next as 'table' | 'compare')}
+          data={[
+            { value: 'table', label: t('parameters.table') },
+            { value: 'compare', label: t('parameters.compare') },
+          ]}
+        />
+      </div>
+      <ProblemNote problem={load.problem} onClose={load.clear} />
+      {rows === null && load.busy && <p className="dim">{t('loading')}</p>}
+      {rows && summary && view === 'table' && <ParameterTable drive={summary} rows={rows} />}
+      {rows && summary && view === 'compare' && <Compare drive={summary} rows={rows} />}
+    </div>
+  )
+}

@@ -1,0 +1,150 @@
+import { api, ask, problemOf } from '../../api/client'
+import type { Problem, WriteResult } from '../../api/schema'
+import { contents, publish, setReadings, useStore } from '../../live/store'
+import { parseTyped } from '../../widgets/parse'
+import type { ParameterInfo } from '../../widgets/types'
+
+/** A typed value that is not in the drive. It survives leaving the page, not closing it. */
+export interface Edit {
+  text: string
+  /** The text is a raw value rather than one in the parameter's unit. */
+  asRaw: boolean
+}
+
+interface DriveEdits {
+  edits: ReadonlyMap<string, Edit>
+  problems: ReadonlyMap<string, Problem>
+  differs: ReadonlyMap<string, string>
+  writing: { done: number; total: number } | null
+}
+
+const EMPTY: DriveEdits = {
+  edits: new Map(),
+  problems: new Map(),
+  differs: new Map(),
+  writing: null,
+}
+const CHUNK = 16
+const byDrive = new Map<string, DriveEdits>()
+
+const get = (drive: string) => byDrive.get(drive) ?? EMPTY
+
+function change(drive: string, part: Partial<DriveEdits>): void {
+  byDrive.set(drive, { ...get(drive), ...part })
+  publish(`edits ${drive}`)
+}
+
+export const useEdits = (drive: string) => useStore(`edits ${drive}`, () => get(drive))
+
+export function setEdit(drive: string, key: string, edit: Edit | null): void {
+  const edits = new Map(get(drive).edits)
+  const problems = new Map(get(drive).problems)
+  problems.delete(key)
+  if (edit === null) edits.delete(key)
+  else edits.set(key, edit)
+  change(drive, { edits, problems })
+}
+
+export function discardEdits(drive: string): void {
+  change(drive, { edits: new Map(), problems: new Map() })
+}
+
+/** Rows that differ from what was compared with last; the text says what that was. */
+export function setDiffers(drive: string, differs: ReadonlyMap<string, string>): void {
+  change(drive, { differs })
+}
+
+/**
+ * Write edited values, each read back. A written one is no longer edited; a refused one stays
+ * edited with the reason. Returns what failed as a whole, such as a lost connection.
+ */
+export async function writeEdits(drive: string, keys: string[]): Promise<Problem | null> {
+  const rows = new Map(contents.rows.get(drive)?.map((row) => [row.key, row]))
+  const wanted = keys.flatMap((key) => {
+    const edit = get(drive).edits.get(key)
+    const row = rows.get(key)
+    return edit && row ? [{ key, edit, row }] : []
+  })
+  let done = 0
+  try {
+    for (let i = 0; i < wanted.length; i += CHUNK) {
+      change(drive, { writing: { done, total: wanted.length } })
+      const chunk = wanted.slice(i, i + CHUNK)
+      const values: Record<string, { raw: string | number | null; value: number | null }> = {}
+      for (const { key, edit, row } of chunk) {
+        const body = toBody(row, edit)
+        if (body) values[key] = body
+      }
+      const results = await ask(
+        api.PUT('/api/v1/drives/{drive_id}/parameters', {
+          params: { path: { drive_id: drive } },
+          body: { values },
+        }),
+      )
+      settle(drive, results)
+      done += chunk.length
+    }
+    return null
+  } catch (error) {
+    return problemOf(error)
+  } finally {
+    change(drive, { writing: null })
+  }
+}
+
+function toBody(
+  row: ParameterInfo,
+  edit: Edit,
+): { raw: string | number | null; value: number | null } | null {
+  const typed = parseTyped(row, edit.text, edit.asRaw)
+  return typed.ok ? { raw: typed.raw ?? null, value: typed.value ?? null } : null
+}
+
+function settle(drive: string, results: WriteResult[]): void {
+  setReadings(
+    drive,
+    results.map((result) => result.reading),
+  )
+  const edits = new Map(get(drive).edits)
+  const problems = new Map(get(drive).problems)
+  const differs = new Map(get(drive).differs)
+  for (const result of results) {
+    if (result.ok) {
+      edits.delete(result.key)
+      problems.delete(result.key)
+      differs.delete(result.key) // compared with the old value; a new comparison will tell
+    } else if (result.problem) problems.set(result.key, result.problem)
+  }
+  change(drive, { edits, problems, differs })
+}
+
+// --- favourites: kept in this browser, per drive family -------------------------------------
+
+const stored = (profile: string) => `servodeck.favourites.${profile}`
+const favourites = new Map<string, ReadonlySet<string>>()
+
+function loadFavourites(profile: string): ReadonlySet<string> {
+  let set = favourites.get(profile)
+  if (!set) {
+    let keys: unknown = []
+    try {
+      keys = JSON.parse(localStorage.getItem(stored(profile)) ?? '[]')
+    } catch {
+      // A damaged entry is as good as none.
+    }
+    set = new Set(Array.isArray(keys) ? keys.filter((key) => typeof key === 'string') : [])
+    favourites.set(profile, set)
+  }
+  return set
+}
+
+export const useFavourites = (profile: string) =>
+  useStore(`favourites ${profile}`, () => loadFavourites(profile))
+
+export function toggleFavourite(profile: string, key: string): void {
+  const set = new Set(loadFavourites(profile))
+  if (!set.delete(key)) set.add(key)
+  favourites.set(profile, set)
+  localStorage.setItem(stored(profile), JSON.stringify([...set]))
+  publish(`favourites ${profile}`)
+}

@@ -1,0 +1,46 @@
+import type { ActiveFault } from '../api/schema'
+import { useT } from '../i18n'
+import { Icon } from './Icon'
+
+/** Faults and warnings with cause and remedy from the manual. */
+export function FaultList({ faults }: { faults: ActiveFault[] }) {
+  const t = useT()
+  return (
+    <ul className="faults">
+      {faults.map((fault) => (
+        <li key={`${fault.code} ${fault.name}`} className={fault.kind}>
+          <h3>
+            <Icon name="alarms" /> <span className="mono">{fault.code}</span> {fault.name}{' '}
+            <small>{t(`faults.${fault.kind}`)}</small>
+          </h3>
+          {fault.causes.length > 0 && (
+            <>
+              <h4>{t('faults.causes')}</h4>
+              <ul>
+                {fault.causes.map((text) => (
+                  <li key={text}>{text}</li>
+                ))}
+              </ul>
+            </>
+          )}
+          {fault.remedies.length > 0 && (
+            <>
+              <h4>{t('faults.remedies')}</h4>
+              <ul>
+                {fault.remedies.map((text) => (
+                  <li key={text}>{text}</li>
+                ))}
+              </ul>
+            </>
+          )}
+          {fault.reset && (
+            <p>
+              <strong>{t('faults.resetHow')}</strong> {fault.reset}
+            </p>
+          )}
+          <p className="dim">{t('source', { source: fault.source })}</p>
+        </li>
+      ))}
+    </ul>
+  )
+}

@@ -1,0 +1,99 @@
+import { Button } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask } from '../api/client'
+import type { JobInfo } from '../api/schema'
+import { useT } from '../i18n'
+import { setJob, useJob } from '../live/store'
+import { duration } from './format'
+import { ProblemNote } from './ProblemNote'
+import { useAction } from './useAction'
+
+/** Progress of a job: step, elapsed and remaining time, cancel; then how it ended. */
+export function JobNote({ id, onClose }: { id: string | null; onClose?: () => void }) {
+  const t = useT()
+  const job = useJob(id)
+  const now = useNow(job?.state === 'running')
+  const cancel = useAction()
+  if (!job) return null
+  if (job.state === 'failed') {
+    return job.problem ? (
+      <ProblemNote problem={job.problem} {...(onClose ? { onClose } : {})} />
+    ) : (
+      <p className="note fault">{t('job.failed', { title: job.title })}</p>
+    )
+  }
+  if (job.state !== 'running') {
+    return (
+      <p className={`note ${job.state === 'done' ? 'good' : 'warn'}`} role="status">
+        {t(job.state === 'done' ? 'job.done' : 'job.cancelled', { title: job.title })}{' '}
+        <span className="num">{duration(seconds(job, now))}</span>
+        {onClose && (
+          <button type="button" className="plain" onClick={onClose}>
+            {t('close')}
+          </button>
+        )}
+      </p>
+    )
+  }
+  const elapsed = seconds(job, now)
+  return (
+    <div className="job" role="status">
+      <div className="job-line">
+        <strong>{job.title}</strong>
+        <span className="grow">{job.step}</span>
+        <span className="num">{t('job.elapsed', { time: duration(elapsed) })}</span>
+        {job.progress > 0.02 && elapsed > 1 && (
+          <span className="num">
+            {t('job.remaining', {
+              time: duration((elapsed * (1 - job.progress)) / job.progress),
+            })}
+          </span>
+        )}
+        <Button
+          loading={cancel.busy}
+          onClick={() =>
+            void cancel.run(async () =>
+              setJob(
+                await ask(
+                  api.DELETE('/api/v1/jobs/{job_id}', { params: { path: { job_id: job.id } } }),
+                ),
+              ),
+            )
+          }
+        >
+          {t('cancel')}
+        </Button>
+      </div>
+      <progress
+        max={1}
+        value={job.progress > 0 ? job.progress : undefined}
+        aria-label={job.title}
+      />
+      <ProblemNote problem={cancel.problem} onClose={cancel.clear} />
+    </div>
+  )
+}
+
+function seconds(job: JobInfo, now: number): number {
+  return ((job.ended ? Date.parse(job.ended) : now) - Date.parse(job.started)) / 1000
+}
+
+function useNow(ticking: boolean): number {
+  const [now, setNow] = useState(Date.now())
+  useEffect(() => {
+    if (!ticking) return
+    const timer = setInterval(() => setNow(Date.now()), 500)
+    return () => clearInterval(timer)
+  }, [ticking])
+  return now
+}
+
+/** Where a job's end matters: calls back once when it is over. */
+export function useJobEnd(id: string | null, ended: (job: JobInfo) => void): void {
+  const job = useJob(id)
+  const over = job !== null && job.state !== 'running'
+  useEffect(() => {
+    if (over && job) ended(job)
+    // Only the end itself counts, not every new closure.
+  }, [over, id])
+}

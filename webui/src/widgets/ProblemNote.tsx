@@ -1,0 +1,41 @@
+import { UNREACHABLE } from '../api/client'
+import type { Problem } from '../api/schema'
+import { useT } from '../i18n'
+
+/** What happened, to which drive and parameter, the limit, and what to try. */
+export function ProblemNote({
+  problem,
+  onClose,
+}: {
+  problem: Problem | null
+  onClose?: () => void
+}) {
+  const t = useT()
+  if (!problem) return null
+  const unreachable = problem.type === UNREACHABLE
+  return (
+    <div className="note fault" role="alert">
+      <p>
+        <strong>
+          {unreachable ? t('problem.unreachable') : problem.title || t('problem.title')}
+        </strong>{' '}
+        {problem.detail}
+      </p>
+      {problem.limit && (
+        <p>
+          {t('problem.limit')} <span className="num">{problem.limit}</span>
+        </p>
+      )}
+      {(problem.remedy || unreachable) && (
+        <p>
+          {t('problem.try')} {unreachable ? t('problem.unreachableTry') : problem.remedy}
+        </p>
+      )}
+      {onClose && (
+        <button type="button" className="plain" onClick={onClose}>
+          {t('close')}
+        </button>
+      )}
+    </div>
+  )
+}

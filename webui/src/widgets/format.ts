@@ -1,0 +1,81 @@
+import type { ParameterInfo, Raw } from './types'
+
+/** Decimals that a measured quantity is shown with, so that digits do not dance. */
+const DECIMALS: Record<string, number> = { rev: 4, rpm: 1, '%': 1, V: 1, '°C': 1, 'rpm/s': 0 }
+
+/** A live quantity with as many decimals as its unit deserves. */
+export function quantity(value: number | null | undefined, unit: string): string {
+  if (value === null || value === undefined || !Number.isFinite(value)) return '—'
+  return minus(value.toFixed(DECIMALS[unit] ?? (Number.isInteger(value) ? 0 : 2)))
+}
+
+/** A figure with about `digits` significant digits and no exponent for usual sizes. */
+export function figure(value: number | null | undefined, digits = 5): string {
+  if (value === null || value === undefined || !Number.isFinite(value)) return '—'
+  if (value !== 0 && (Math.abs(value) >= 1e9 || Math.abs(value) < 1e-4)) {
+    return minus(value.toExponential(digits - 1))
+  }
+  return minus(String(Number(value.toPrecision(digits))))
+}
+
+const minus = (text: string) => text.replace(/^-(?=[\d.])/, '−')
+
+/** Seconds as `12 s`, `3:05` or `1:02:03`. */
+export function duration(seconds: number): string {
+  const whole = Math.max(0, Math.round(seconds))
+  if (whole < 60) return `${whole} s`
+  const two = (n: number) => String(n).padStart(2, '0')
+  const hours = Math.floor(whole / 3600)
+  const rest = `${hours ? two(Math.floor(whole / 60) % 60) : Math.floor(whole / 60)}:${two(whole % 60)}`
+  return hours ? `${hours}:${rest}` : rest
+}
+
+const BITS: Record<string, number> = {
+  BOOL: 1,
+  INT8: 8,
+  UINT8: 8,
+  INT16: 16,
+  UINT16: 16,
+  INT32: 32,
+  UINT32: 32,
+  INT64: 64,
+  UINT64: 64,
+}
+
+export const isInteger = (type: string) => type in BITS
+export const isText = (type: string) => type === 'STRING' || type === 'OCTETS'
+
+/** A raw integer in hexadecimal, two's complement in the width of its type. */
+export function hexadecimal(raw: number, type: string): string {
+  const width = BITS[type] ?? 32
+  return `0x${BigInt.asUintN(width, BigInt(Math.trunc(raw)))
+    .toString(16)
+    .toUpperCase()
+    .padStart(Math.ceil(width / 4), '0')}`
+}
+
+/** Text of a value as it came from the drive, without unit. */
+export function shown(info: ParameterInfo, value: Raw | null, raw: Raw | null): string {
+  if (value === null) return '—'
+  if (typeof value === 'string') return value
+  if (typeof raw === 'number' && Number.isInteger(raw)) {
+    const label = info.enum[String(raw)]
+    if (label !== undefined) return `${raw} · ${label}`
+  }
+  return minus(String(value))
+}
+
+/** Engineering value of a raw one (profiles/schema.py: raw × scale + offset). */
+export function toValue(info: ParameterInfo, raw: Raw): Raw {
+  if (typeof raw === 'string' || (info.scale === 1 && info.offset === 0)) return raw
+  return Number((raw * info.scale + info.offset).toPrecision(12))
+}
+
+/** Time of day with seconds. */
+export function clock(time: string | null): string {
+  return time === null ? '—' : new Date(time).toLocaleTimeString([], { hour12: false })
+}
+
+export function dateTime(time: string | null): string {
+  return time === null ? '—' : new Date(time).toLocaleString([], { hour12: false })
+}
