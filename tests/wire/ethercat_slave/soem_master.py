@@ -30,7 +30,7 @@ def exchange(master: pysoem.Master, target: int) -> int:
     for slave in master.slaves:
         slave.output = (0x0F).to_bytes(2, "little") + target.to_bytes(4, "little", signed=True)
     master.send_processdata()
-    return int(master.receive_processdata(20_000))
+    return int(master.receive_processdata(100_000))
 
 
 def operational(master: pysoem.Master, dc: bool) -> bool:
@@ -137,11 +137,33 @@ def emergency(interface: str) -> dict[str, Any]:
     return {"codes": codes[:1]}
 
 
+def interactive(interface: str) -> dict[str, Any]:
+    """In Op; each input line ``N`` is answered by the working counters of N cycles of 2 ms."""
+    master, _ = opened(interface)
+    for slave in master.slaves:
+        slave.set_watchdog("processdata", 300)
+    print(json.dumps({"op": operational(master, dc=False)}), flush=True)
+    for line in sys.stdin:
+        wkcs = []
+        for n in range(int(line)):
+            for slave in master.slaves:
+                slave.output = (0x0F).to_bytes(2, "little") + n.to_bytes(4, "little")
+            master.send_processdata()
+            wkcs.append(int(master.receive_processdata(40_000)))
+            time.sleep(0.002)
+        master.read_state()
+        states = [[s.state, s.al_status] for s in master.slaves]
+        print(json.dumps({"wkc": wkcs, "states": states}), flush=True)
+    master.close()
+    return {}
+
+
 SCENARIOS: dict[str, Callable[[str], dict[str, Any]]] = {
     "everything": everything,
     "lockstep": lockstep,
     "watchdog": watchdog,
     "emergency": emergency,
+    "interactive": interactive,
 }
 
 if __name__ == "__main__":

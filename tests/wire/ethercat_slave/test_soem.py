@@ -101,6 +101,66 @@ def test_an_emergency_reaches_the_master(namespace: Namespace) -> None:
         assert finish(process)["codes"] == [0x7305]
 
 
+class Master:
+    """The interactive scenario: cycles on demand."""
+
+    def __init__(self, namespace: Namespace) -> None:
+        script = str(HERE / "soem_master.py")
+        self._process = namespace.popen(
+            [sys.executable, script, "interactive", MASTER],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+        assert self._answer() == {"op": True}
+
+    def cycles(self, count: int) -> tuple[list[int], list[list[int]]]:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{count}\n")
+        self._process.stdin.flush()
+        answer = self._answer()
+        return answer["wkc"], answer["states"]
+
+    def close(self) -> None:
+        self._process.communicate(timeout=20)
+
+    def _answer(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        answer: dict[str, Any] = json.loads(self._process.stdout.readline())
+        return answer
+
+
+def test_trouble_on_the_wire_as_the_master_sees_it(namespace: Namespace) -> None:
+    with segment(namespace, 2) as running:
+        master = Master(namespace)
+        assert master.cycles(3)[0] == [6, 6, 6]
+
+        running.command("lose", count=2, cyclic=True)
+        assert master.cycles(4)[0] == [-1, -1, 6, 6]
+
+        running.command("counter", by=-3, count=1)
+        assert master.cycles(3)[0] == [3, 6, 6]
+
+        # 100 ms late: the master has given up after 40 ms.
+        running.command("late", by_s=0.1, count=1, cyclic=True)
+        assert master.cycles(20)[0][0] == -1
+        assert running.command("state")["trouble"]["late"] == 1
+
+        running.command("cut", cable=1)
+        wkcs, _ = master.cycles(200)  # at least 400 ms
+        assert wkcs[-1] == 3
+        running.command("heal")
+        wkcs, states = master.cycles(3)
+        # Back on the cable, in Safe-Op by its watchdog; there it still exchanges data.
+        assert wkcs[-1] == 6
+        assert states == [[8, 0], [0x14, 0x1B]]
+
+        running.command("cut", cable=0)
+        assert set(master.cycles(2)[0]) == {-1}
+        running.command("heal", cable=0)
+        assert master.cycles(10)[0][-1] == 6
+        master.close()
+
+
 def test_one_segment_per_interface(namespace: Namespace) -> None:
     with segment(namespace, 1), pytest.raises(LinkLost, match="already answers on ec0s"):
         segment(namespace, 1)

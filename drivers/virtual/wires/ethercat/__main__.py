@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 from drivers.errors import DriveError
+from drivers.virtual.device import Device
 from drivers.virtual.wires.ethercat.bench import axes_by_name, axes_of_bench, load_factory
 from drivers.virtual.wires.ethercat.clock import LockstepClock, RealClock
 from drivers.virtual.wires.ethercat.segment import Segment
@@ -48,21 +49,29 @@ def _go_realtime(priority: int) -> None:
             sys.stderr.write("SCHED_FIFO is not permitted here; running with normal priority\n")
 
 
+def _warm_up(device: Device) -> None:
+    """Let a drive compile its physics before a master waits for it: two milliseconds will do."""
+    device.advance(0)
+    device.advance(2_000_000)
+
+
 def build(arguments: argparse.Namespace) -> Segment:
     """Segment with its devices, as the command line says."""
     axes = axes_of_bench(arguments.bench, arguments.on) if arguments.bench else []
     axes += axes_by_name(arguments.drive, len(axes) + 1)
     if not axes:
         raise ValueError("no drives: give --drive or a --bench file with EtherCAT axes")
-    clock = LockstepClock(arguments.cycle_us * 1000) if arguments.lockstep else RealClock()
     factory = load_factory(arguments.factory)
-    slaves = [
-        Slave(
-            factory(axis.drive, axis.mechanics, arguments.nvm, station),
-            clock,
-            SlaveIdentity(serial=axis.serial or station),
-        )
+    devices = [
+        factory(axis.drive, axis.mechanics, arguments.nvm, station)
         for station, axis in enumerate(axes, 1)
+    ]
+    for device in devices:
+        _warm_up(device)
+    clock = LockstepClock(arguments.cycle_us * 1000) if arguments.lockstep else RealClock()
+    slaves = [
+        Slave(device, clock, SlaveIdentity(serial=axis.serial or station))
+        for station, (device, axis) in enumerate(zip(devices, axes, strict=True), 1)
     ]
     for slave in slaves:
         slave.al.delay_ns = int(arguments.al_ms * 1e6)

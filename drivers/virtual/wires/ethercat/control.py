@@ -25,8 +25,15 @@ _FOREVER_NS = 1 << 60
 class Control:
     """Parses commands and applies them to the segment."""
 
-    def __init__(self, segment: Segment, interface: str, answers: IO[bytes]) -> None:
+    def __init__(
+        self,
+        segment: Segment,
+        interface: str,
+        answers: IO[bytes],
+        carrier: Callable[[bool], None] | None = None,
+    ) -> None:
         self._segment = segment
+        self._carrier = carrier
         self._interface = interface
         self._answers = answers
         self._rest = b""
@@ -150,10 +157,17 @@ class Control:
     def _cut(self, cable: int) -> None:
         self._segment.settle()
         self._segment.line.cut(cable)
+        self._show_carrier()
 
     def _heal(self, cable: int | None = None) -> None:
         self._segment.settle()
         self._segment.line.heal(cable)
+        self._show_carrier()
+
+    def _show_carrier(self) -> None:
+        """The master's interface loses its carrier with the first cable."""
+        if self._carrier is not None:
+            self._carrier(not self._segment.line.is_cut(0))
 
     def _power_off(self, slave: int) -> None:
         self._segment.line.power_off(slave, self._segment.settle())

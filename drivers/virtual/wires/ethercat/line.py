@@ -44,6 +44,10 @@ class Line:
             self._cut.discard(cable)
         self._next_ns = 0
 
+    def is_cut(self, cable: int) -> bool:
+        """Cable is pulled."""
+        return cable in self._cut
+
     def power_off(self, position: int, now_ns: int, for_s: float | None = None) -> None:
         """Switch one slave off, for a time or until `power_on`. The drive coasts."""
         self._check(position)

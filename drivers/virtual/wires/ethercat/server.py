@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO
 
 from drivers.errors import LinkLost
+from drivers.virtual.wires import netns
 from drivers.virtual.wires.ethercat.control import Control
 from drivers.virtual.wires.ethercat.segment import Segment
 
@@ -84,7 +85,8 @@ class SegmentServer:
         self, interface: str, segment: Segment, commands: IO[bytes], answers: IO[bytes]
     ) -> None:
         self._segment = segment
-        self._control = Control(segment, interface, answers)
+        self._interface = interface
+        self._control = Control(segment, interface, answers, self._carrier)
         self._commands = commands.fileno()
         self._lock = InterfaceLock(interface)
         try:
@@ -125,8 +127,18 @@ class SegmentServer:
     def _command(self) -> bool:
         data = os.read(self._commands, 65536)
         if data:
+            # A command looks at the present: frames that came before it belong to the past.
+            self._drain()
             self._control.feed(data)
         return bool(data)
+
+    def _carrier(self, on: bool) -> None:
+        """Pulling the master's cable takes its carrier away, where we may switch interfaces.
+
+        Where we may not, no frame comes back all the same.
+        """
+        with contextlib.suppress(OSError):
+            netns.set_up(self._interface, on)
 
     def _drain(self) -> None:
         """All frames that wait, at most a batch, so that commands are heard too."""

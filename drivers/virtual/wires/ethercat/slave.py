@@ -110,6 +110,7 @@ class Slave:
             if due == tick:
                 self.process.tick(due)
                 self._forward_emergencies()
+                self._housekeeping_ns = due + 2 * _HOUSEKEEPING_NS
             elif due == dog:
                 self._watchdog_fired(due)
             elif due == mailbox:
@@ -239,9 +240,9 @@ class Slave:
 
 
 def _supports_dc(device: Device) -> bool:
-    """The profile names its synchronisation modes; one of them begins with DC."""
+    """The profile names its synchronisation modes, and one of them is with distributed clocks."""
     pdo = device.profile.pdo
-    return bool(pdo and any(mode.upper().startswith("DC") for mode in pdo.sync_modes))
+    return bool(pdo and any("DC" in mode.upper() for mode in pdo.sync_modes))
 
 
 def _reason(new: AlState, code: int) -> str:
