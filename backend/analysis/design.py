@@ -174,7 +174,7 @@ def notch_sets(model: MechanicalModel, slots: int) -> list[tuple[Notch, ...]]:
     ranked = [m for h, m in sorted(heights, key=lambda x: -x[0]) if h > 2.0][:slots]
     sets: list[tuple[Notch, ...]] = [()]
     for count, ratio, depth in product(
-        range(1, len(ranked) + 1), (0.25, 0.5, 0.9), (-8.0, -14.0, -22.0)
+        range(1, len(ranked) + 1), (0.25, 0.5, 0.9, 1.5), (-8.0, -14.0, -22.0)
     ):
         chosen = sorted(ranked[:count], key=lambda m: m.frequency_hz)
         sets.append(tuple(Notch(m.frequency_hz, ratio * m.frequency_hz, depth) for m in chosen))

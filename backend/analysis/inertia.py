@@ -183,8 +183,8 @@ def estimate_inertia(
     ``torque_nm`` is the motor's torque. ``minimum_speed_rad_s`` defaults to 5 % of the peak
     speed. The motion must be smooth between bus cycles (interpolated, or made by the drive's own
     profile): with a reference that steps every cycle T, the torque sampled beside each step is
-    off by half a step, about ω_speed·T/2 of the acceleration torque. Samples at the torque limit, in gaps (``valid`` False) and within the filter's reach of
-    either are left out.
+    off by half a step, about ω_speed·T/2 of the acceleration torque. Samples at the torque limit,
+    in gaps (``valid`` False) and within the filter's reach of either are left out.
     """
     n = torque_nm.size
     if velocity_rad_s.size != n:

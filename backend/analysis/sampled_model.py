@@ -308,9 +308,13 @@ class _Problem:
             at = np.array([mode.frequency_hz])
             rest = replace(model, modes=tuple(m for m in model.modes if m is not mode))
             height = mode.residue / (2 * mode.damping * TURN * mode.frequency_hz)
-            spacing = float(np.min(np.abs(self.f - mode.frequency_hz)))
-            resolved = mode.damping * mode.frequency_hz > 0.1 * spacing
-            if height > 0.03 * float(np.abs(rest.response(at))[0]) and resolved:
+            above = int(np.clip(np.searchsorted(self.f, mode.frequency_hz), 1, self.f.size - 1))
+            gap = float(self.f[above] - self.f[above - 1])
+            resolved = mode.damping * mode.frequency_hz > 0.1 * gap
+            # A heavily damped mode at the end of the band only imitates a piece of delay.
+            invented = mode.damping > 0.3 and mode.frequency_hz > 0.8 * float(self.f[-1])
+            prominent = height > 0.03 * float(np.abs(rest.response(at))[0])
+            if prominent and resolved and not invented:
                 keep.append(q)
         return np.concatenate(keep)
 
