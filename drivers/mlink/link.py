@@ -11,7 +11,8 @@ from collections.abc import Sequence
 
 from drivers.errors import NotAllowed
 from drivers.link import Address, Found
-from drivers.modbus.link import BlockLimits, RegisterLink
+from drivers.modbus.layout import BlockLimits
+from drivers.modbus.link import RegisterLink
 from drivers.modbus.port import LineSettings
 from drivers.modbus.registers import Place, words_of
 from profiles.schema import DataType, LinkKind, Profile
@@ -54,14 +55,14 @@ class MlinkLayout:
         self._rivals: dict[int, dict[tuple[int, int], str]] = {}
 
     def configure(self, station: int, profile: Profile) -> None:
-        """See `drivers.modbus.link.Layout.configure`."""
+        """See `drivers.modbus.layout.Layout.configure`."""
         spec = profile.link("mlink")
         longest = spec.max_registers if spec and spec.max_registers else _MAX_WORDS
         self._limits[station] = BlockLimits(max(longest, _MAX_WORDS), 0)
         self._rivals[station] = ambiguous_objects(profile)
 
     def place(self, station: int, address: Address) -> Place:
-        """See `drivers.modbus.link.Layout.place`."""
+        """See `drivers.modbus.layout.Layout.place`."""
         if address.index is None:
             raise NotAllowed(f"{address} is no object: MLink reaches objects only")
         rival = self._rivals.get(station, {}).get((address.index, address.subindex))
@@ -84,7 +85,7 @@ class MlinkLayout:
         return Place(start, count, address.type, "low_first", group)
 
     def limits(self, station: int) -> BlockLimits:
-        """See `drivers.modbus.link.Layout.limits`."""
+        """See `drivers.modbus.layout.Layout.limits`."""
         return self._limits.get(station, BlockLimits(_MAX_WORDS, 0))
 
     def identity(self) -> tuple[Address, ...]:
@@ -97,7 +98,7 @@ class MlinkLayout:
         )
 
     def describe(self, station: int, values: Sequence[int | None]) -> Found:
-        """See `drivers.modbus.link.Layout.describe`."""
+        """See `drivers.modbus.layout.Layout.describe`."""
         status, mode, vendor, product, revision, serial, slave_address = values
         notes = []
         if vendor is None:

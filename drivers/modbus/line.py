@@ -30,7 +30,7 @@ from drivers.modbus.framing import (
     write_many_query,
     write_one_query,
 )
-from drivers.modbus.port import LineSettings, Port, open_port
+from drivers.modbus.port import LineSettings, Port, is_pseudo_terminal, open_port
 from drivers.modbus.timing import sleep_precisely
 
 #: A line that talks longer than this without a pause is no Modbus line at these settings.
@@ -75,6 +75,7 @@ class Line:
         self._sleep = sleep
         self._opener = opener
         self._port: Port | None = None
+        self._parity: str = settings.parity
         self._counters: dict[int, Counters] = {}
         self._late: dict[int, dict[bytes, float]] = {}
         self._last_failed = b""
@@ -97,6 +98,8 @@ class Line:
         if self._port is not None:
             return
         self._port = self._opener(self.settings)
+        if is_pseudo_terminal(self.settings.device):
+            self._parity = "none (pseudo-terminal)"
         self.echo = None
         self._late.clear()
         self._last_failed = b""
@@ -169,7 +172,7 @@ class Line:
             state="open" if self.is_open else "no adapter",
             details={
                 "baudrate": self.settings.baudrate,
-                "parity": self.settings.parity,
+                "parity": self._parity,
                 "echo": echo,
                 "losses": self.losses,
                 "refusals": sum(c.refusals for c in picked),

@@ -12,9 +12,9 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
-from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError, Rejected
+from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError, Rejected
 from drivers.link import (
     Address,
     Cyclic,
@@ -24,16 +24,15 @@ from drivers.link import (
     Progress,
     Unsubscribe,
 )
+from drivers.modbus.layout import Layout, TableLayout
 from drivers.modbus.line import Line
 from drivers.modbus.port import LineSettings
 from drivers.modbus.registers import (
     Block,
     Place,
-    WordOrder,
     plan_blocks,
     to_bytes,
     to_words,
-    words_of,
 )
 from drivers.modbus.thread import BusThread
 from profiles.schema import LinkKind, Profile
@@ -45,39 +44,6 @@ _TURN_S = 0.005
 _REOPEN_S = 0.25
 _STATIONS = range(1, 248)
 _PLANS_KEPT = 256
-
-
-@dataclass(frozen=True, slots=True)
-class BlockLimits:
-    """Longest block one request may read, and the unused registers it may bridge."""
-
-    max_registers: int = 125
-    max_gap: int = 0
-
-
-class Layout(Protocol):
-    """Where the objects of one kind of link lie among the registers."""
-
-    kind: LinkKind
-
-    def configure(self, station: int, profile: Profile) -> None:
-        """Take over what the profile says of this link for one station."""
-
-    def place(self, station: int, address: Address) -> Place:
-        """Registers of a value.
-
-        Raises:
-            NotAllowed: this value cannot be reached over this link; the message says why.
-        """
-
-    def limits(self, station: int) -> BlockLimits:
-        """How values may be read together."""
-
-    def identity(self) -> tuple[Address, ...]:
-        """What a scan reads: the first must exist in every drive; the rest is for `describe`."""
-
-    def describe(self, station: int, values: Sequence[int | None]) -> Found:
-        """A scan's finding from the values of `identity` (None: could not be read)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,14 +130,19 @@ class RegisterLink:
         A refusal counts as an answer. ``stop_after`` ends the search after so many drives.
         """
         found: list[Found] = []
+        damaged: list[int] = []
         wanted = list(stations if stations is not None else _STATIONS)
         for number, station in enumerate(wanted):
             progress(number / max(1, len(wanted)), f"asking address {station}")
-            if await self._run(partial(self._is_there, station)):
-                found.append(await self._identify(station))
-                if stop_after is not None and len(found) >= stop_after:
-                    break
-        progress(1.0, f"{len(found)} found")
+            there = await self._run(partial(self._is_there, station))
+            if there is None:
+                damaged.append(station)
+            if not there:
+                continue
+            found.append(await self._identify(station))
+            if stop_after is not None and len(found) >= stop_after:
+                break
+        progress(1.0, _summary(found, damaged))
         return found
 
     async def read(self, station: int, address: Address) -> bytes:
@@ -271,15 +242,20 @@ class RegisterLink:
                     batch.results[item] = _again(error)
             batch.todo.clear()
 
-    def _is_there(self, station: int) -> bool:
+    def _is_there(self, station: int) -> bool | None:
+        """True if it answers, False if not, None if something comes that is no good answer."""
         place = self._layout.place(station, self._layout.identity()[0])
-        try:
-            self._line.read(station, place.start, place.count, self._settings.scan_timeout_s)
-        except (LinkTimeout, ProtocolError):
-            return False
-        except Rejected:
+        for _ in range(2):
+            try:
+                self._line.read(station, place.start, place.count, self._settings.scan_timeout_s)
+            except ProtocolError:
+                continue
+            except LinkTimeout:
+                return False
+            except Rejected:
+                return True
             return True
-        return True
+        return None
 
     def _changed(self, up: bool, text: str) -> None:
         if self._loop is not None and not self._loop.is_closed():
@@ -357,6 +333,17 @@ def _singles(places: tuple[Place | None, ...], block: Block) -> list[Block]:
     return found
 
 
+def _summary(found: Sequence[Found], damaged: Sequence[int]) -> str:
+    text = f"{len(found)} found"
+    if not damaged:
+        return text
+    places = ", ".join(map(str, damaged))
+    return (
+        f"{text}; damaged answers at {places}: two drives with the same address, "
+        "or wrong line settings"
+    )
+
+
 def _again(error: DriveError) -> DriveError:
     """The same error as a new object: callers fill in which parameter it was about."""
     if isinstance(error, Rejected):
@@ -368,52 +355,6 @@ def _decided(result: bytes | DriveError | None) -> bytes | DriveError:
     if result is None:
         raise ProtocolError("a value was neither read nor refused")
     return result
-
-
-class TableLayout:
-    """Registers by table: each parameter of the profile names its own (manual 003)."""
-
-    kind: LinkKind = "modbus"
-
-    def __init__(self, word_order: WordOrder = "high_first") -> None:
-        self._default_order = word_order
-        self._orders: dict[int, WordOrder] = {}
-        self._limits: dict[int, BlockLimits] = {}
-
-    def configure(self, station: int, profile: Profile) -> None:
-        """See `Layout.configure`."""
-        spec = profile.link("modbus")
-        if spec is None:
-            return
-        self._orders[station] = spec.word_order or self._default_order
-        self._limits[station] = BlockLimits(spec.max_registers or 1, spec.max_gap or 0)
-
-    def place(self, station: int, address: Address) -> Place:
-        """See `Layout.place`."""
-        if address.register is None:
-            raise NotAllowed(
-                f"{address} has no Modbus register",
-                parameter=str(address),
-                remedy="connect the drive's other bus as well: this value is only there",
-            )
-        order = self._orders.get(station, self._default_order)
-        return Place(address.register, words_of(address.type), address.type, order)
-
-    def limits(self, station: int) -> BlockLimits:
-        """See `Layout.limits`."""
-        return self._limits.get(station, BlockLimits())
-
-    def identity(self) -> tuple[Address, ...]:
-        """Any answer to a read of register 0 shows that somebody is there."""
-        return (Address(None, 0, "UINT16", register=0),)
-
-    def describe(self, station: int, values: Sequence[int | None]) -> Found:
-        """See `Layout.describe`."""
-        answer = "refuses register 0" if values[0] is None else f"register 0 holds {values[0]}"
-        return Found(
-            station,
-            notes=(f"{answer}; Modbus RTU has no identity: choose the drive's profile",),
-        )
 
 
 def modbus_link(url: str, settings: LineSettings) -> RegisterLink:

@@ -178,6 +178,16 @@ async def test_scan_stops_early_and_can_be_cancelled(port: Path, opened: OpenLin
         assert slave.requests <= asked + 2  # at most the question under way, and this read
 
 
+async def test_scan_tells_of_damaged_answers(port: Path, opened: OpenLink) -> None:
+    said: list[str] = []
+    with serving(port, {1: ShelfDevice(), 2: ShelfDevice()}) as slave:
+        link = await opened(f"mlink://{port}")
+        slave.trouble(Trouble("corrupt"), Trouble("corrupt"))
+        found = await link.scan(lambda _fraction, text: said.append(text), (1, 2))
+    assert [f.station for f in found] == [2]
+    assert said[-1].startswith("1 found; damaged answers at 1: two drives with the same address")
+
+
 # --- trouble ---
 
 

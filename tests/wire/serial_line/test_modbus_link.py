@@ -10,7 +10,8 @@ import pytest
 from drivers.errors import DriveError, LinkLost, NotAllowed, Rejected
 from drivers.link import Address, Found
 from drivers.modbus.framing import EXCEPTION_TEXTS
-from drivers.modbus.link import RegisterLink, TableLayout, _again
+from drivers.modbus.layout import TableLayout
+from drivers.modbus.link import RegisterLink, _again
 from profiles.schema import DataType
 
 from .conftest import OpenLink

@@ -1,0 +1,91 @@
+"""Where the values of one kind of serial link lie among the registers: the seam, and by table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from drivers.errors import NotAllowed
+from drivers.link import Address, Found
+from drivers.modbus.registers import Place, WordOrder, words_of
+from profiles.schema import LinkKind, Profile
+
+
+@dataclass(frozen=True, slots=True)
+class BlockLimits:
+    """Longest block one request may read, and the unused registers it may bridge."""
+
+    max_registers: int = 125
+    max_gap: int = 0
+
+
+class Layout(Protocol):
+    """Where the objects of one kind of link lie among the registers."""
+
+    kind: LinkKind
+
+    def configure(self, station: int, profile: Profile) -> None:
+        """Take over what the profile says of this link for one station."""
+
+    def place(self, station: int, address: Address) -> Place:
+        """Registers of a value.
+
+        Raises:
+            NotAllowed: this value cannot be reached over this link; the message says why.
+        """
+
+    def limits(self, station: int) -> BlockLimits:
+        """How values may be read together."""
+
+    def identity(self) -> tuple[Address, ...]:
+        """What a scan reads: the first must exist in every drive; the rest is for `describe`."""
+
+    def describe(self, station: int, values: Sequence[int | None]) -> Found:
+        """A scan's finding from the values of `identity` (None: could not be read)."""
+
+
+class TableLayout:
+    """Registers by table: each parameter of the profile names its own (manual 003)."""
+
+    kind: LinkKind = "modbus"
+
+    def __init__(self, word_order: WordOrder = "high_first") -> None:
+        self._default_order = word_order
+        self._orders: dict[int, WordOrder] = {}
+        self._limits: dict[int, BlockLimits] = {}
+
+    def configure(self, station: int, profile: Profile) -> None:
+        """See `Layout.configure`."""
+        spec = profile.link("modbus")
+        if spec is None:
+            return
+        self._orders[station] = spec.word_order or self._default_order
+        self._limits[station] = BlockLimits(spec.max_registers or 1, spec.max_gap or 0)
+
+    def place(self, station: int, address: Address) -> Place:
+        """See `Layout.place`."""
+        if address.register is None:
+            raise NotAllowed(
+                f"{address} has no Modbus register",
+                parameter=str(address),
+                remedy="connect the drive's other bus as well: this value is only there",
+            )
+        order = self._orders.get(station, self._default_order)
+        return Place(address.register, words_of(address.type), address.type, order)
+
+    def limits(self, station: int) -> BlockLimits:
+        """See `Layout.limits`."""
+        return self._limits.get(station, BlockLimits())
+
+    def identity(self) -> tuple[Address, ...]:
+        """Any answer to a read of register 0 shows that somebody is there."""
+        return (Address(None, 0, "UINT16", register=0),)
+
+    def describe(self, station: int, values: Sequence[int | None]) -> Found:
+        """See `Layout.describe`."""
+        answer = "refuses register 0" if values[0] is None else f"register 0 holds {values[0]}"
+        return Found(
+            station,
+            notes=(f"{answer}; Modbus RTU has no identity: choose the drive's profile",),
+        )
