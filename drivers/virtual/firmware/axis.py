@@ -144,6 +144,7 @@ class VirtualAxis:
         p[k.P_OBSERVER_VISCOUS] = loops.viscous_nms
         p[k.P_OBSERVER_COULOMB] = loops.coulomb_nm
         p[k.P_STOP_SPEED], p[k.P_STOP_TORQUE] = loops.brake_speed_rad_s, loops.brake_torque_nm
+        p[k.P_TORQUE_FILTER] = _lag(loops.torque_filter_s)
         p[k.P_NOTCH_COUNT] = len(loops.notches)
         for i, notch in enumerate(loops.notches):
             start = k.P_NOTCHES + 4 * i
@@ -165,6 +166,7 @@ class VirtualAxis:
         p[k.P_OVERLOAD_NM], p[k.P_OVERLOAD_S] = limits.overload_nm, limits.overload_s
         p[k.P_OTP_C], p[k.P_OVER_SPEED] = limits.over_temperature_c, limits.over_speed_rad_s
         p[k.P_SPEED_ERROR], p[k.P_SPEED_ERROR_S] = limits.speed_error_rad_s, limits.speed_error_s
+        p[k.P_FOLLOWING_S] = limits.following_error_s
         p[k.P_BRAKE_TORQUE] = 2 * self.motor.rated_torque_nm if limits.holding_brake else 0.0
 
     def apply_impedance(self, settings: ImpedanceSettings) -> None:
@@ -292,7 +294,9 @@ class VirtualAxis:
 
     def clear_faults(self) -> None:
         """Forget latched faults and their timers."""
-        for name in (k.S_FAULTS, k.S_OVERLOAD_T, k.S_SPEED_ERROR_T, k.S_LOCK_T):
+        for name in (
+            k.S_FAULTS, k.S_OVERLOAD_T, k.S_SPEED_ERROR_T, k.S_LOCK_T, k.S_FOLLOWING_T,
+        ):  # fmt: skip
             self.s[name] = 0.0
 
     def live_faults(self) -> int:

@@ -10,7 +10,7 @@ from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.families.base import FaultInfo
 from drivers.virtual.firmware.identification import Identification
-from drivers.virtual.firmware.modes import Modes
+from drivers.virtual.firmware.modes import PP, Modes
 from drivers.virtual.firmware.states import Command, State, decode, next_state
 
 _HALT, _FAULT_RESET, _IDENTIFY = 1 << 8, 1 << 7, 1 << 11
@@ -217,6 +217,10 @@ class DeviceControl:
         self._axis.raise_fault(bits)
         self._on_fault()
 
+    def clear_history(self) -> None:
+        """Forget the alarm records."""
+        self.history = []
+
     def _on_fault(self) -> None:
         new = self._axis.faults & ~self._reported
         if not new:
@@ -269,8 +273,20 @@ class DeviceControl:
         return True
 
     def communication_lost(self) -> None:
-        """EtherCAT or CAN traffic ended while the servo is on (004:4903-4917)."""
-        if self.state in _OPERATING:
+        """EtherCAT or CAN traffic ended while the servo is on.
+
+        A drive with 6007h does what that says (CiA 402-2 object 6007h); the others report a
+        fault (004:4903-4917).
+        """
+        if self.state not in _OPERATING:
+            return
+        option = self._option("6007:00", 1) if "6007:00" in self._core.od.numbered else 1
+        if option == 2:
+            self._switch_off()
+            self.state = State.SWITCH_ON_DISABLED
+        elif option == 3 and self.state is State.OPERATION_ENABLED:
+            self._leave_operation(State.QUICK_STOP_ACTIVE, Command.QUICK_STOP)
+        elif option == 1:
             self.raise_fault(self._core.family.traits.communication_fault)
 
     # --- status ----------------------------------------------------------------------------
@@ -292,7 +308,12 @@ class DeviceControl:
 
     def status_word(self) -> int:
         """6041h; "voltage enabled" and "remote" are always set (004:6798-6806)."""
+        traits = self._core.family.traits
+        if traits.status == "echo":
+            return self._echo_status()
         word = self.state.value | 0x0210
+        if traits.home_found_bit is not None and self.homed:
+            word |= 1 << traits.home_found_bit
         if self.warning:
             word |= 1 << 7
         if self.identification.active:
@@ -300,3 +321,23 @@ class DeviceControl:
         enabled = self.state in _OPERATING
         stopping = self._halted or self.state is State.QUICK_STOP_ACTIVE
         return word | self.modes.status_bits(stopping, enabled)
+
+    @property
+    def homed(self) -> bool:
+        """A homing has succeeded since power-on."""
+        return self.modes.homing.attained or self.modes.homing.was_attained
+
+    def _echo_status(self) -> int:
+        """Status word of the DS_C (003:298-308): bits 0 to 2 echo the state."""
+        word = {
+            State.READY: 1, State.SWITCHED_ON: 3, State.OPERATION_ENABLED: 7,
+        }.get(self.state, 0)  # fmt: skip
+        s = self._axis.s
+        word |= (self.state in (State.FAULT, State.FAULT_REACTION)) << 7
+        word |= self.homed << 8
+        word |= (s[k.S_ZERO_T] > 0) << 10
+        if self.modes.mode == PP:
+            word |= self.modes.acknowledged << 12
+            in_place = s[k.S_POSITION_T] >= self._core.number("6068:00", 10) * 1e-3
+            word |= (self.state is State.OPERATION_ENABLED and in_place) << 15
+        return int(word)

@@ -76,6 +76,8 @@ class Core:
     def software_limits(self) -> tuple[float, float]:
         """607Dh in user units; equal or crossed limits mean none (CiA 402-2)."""
         low, high = self.number("607D:01", _INT32[0]), self.number("607D:02", _INT32[1])
+        if self.family.traits.positive_limit_first and "607D:01" in self.od.numbered:
+            low, high = high, low
         return (low, high) if low < high else _INT32
 
     def apply_settings(self) -> None:

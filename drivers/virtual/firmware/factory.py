@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from drivers.virtual.device import Device
 from drivers.virtual.firmware.families.base import Family
+from drivers.virtual.firmware.families.cia402 import Cia402
 from drivers.virtual.firmware.families.mms7 import Mms7
+from drivers.virtual.firmware.families.traits import TRAITS
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import MechanicsSpec, standard_mechanics
 from profiles.loader import load_profile
 from profiles.schema import Profile
 
-FAMILIES: dict[str, Family] = {"mms7": Mms7()}
+FAMILIES: dict[str, Callable[[Profile], Family]] = {
+    "mms7": lambda _: Mms7(),
+    **{
+        name: lambda profile, traits=traits: Cia402(profile, traits)  # type: ignore[misc]
+        for name, traits in TRAITS.items()
+    },
+}
 
 
 def make_device(
@@ -32,8 +40,8 @@ def make_device(
         ProfileError: the profile is missing or wrong.
     """
     profile = load_profile(drive) if isinstance(drive, str) else drive
-    family = FAMILIES.get(profile.drive)
-    if family is None:
+    build = FAMILIES.get(profile.drive)
+    if build is None:
         raise ValueError(f"no virtual {profile.drive!r}; there are: {', '.join(sorted(FAMILIES))}")
     if mechanics is None:
         mechanics = standard_mechanics()
@@ -41,7 +49,7 @@ def make_device(
         mechanics = MechanicsSpec.model_validate(dict(mechanics))
     return VirtualServo(
         profile,
-        family,
+        build(profile),
         mechanics,
         nvm_path=None if nvm_dir is None else nvm_dir / f"{profile.drive}-{station}.json",
         station=station,

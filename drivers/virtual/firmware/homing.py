@@ -44,6 +44,7 @@ class Homing:
         self._script: Generator[Until, None, None] | None = None
         self._waiting = Until(0)
         self.attained = False
+        self.was_attained = False
         self.failed = False
         self.deadline_step: float | None = None
 
@@ -88,7 +89,7 @@ class Homing:
         try:
             self._waiting = next(script)
         except StopIteration:
-            self.attained = True
+            self.attained = self.was_attained = True
             self._finish()
         except HomingFailed:
             self._fail()
@@ -185,12 +186,19 @@ class Homing:
             ramp = self._acceleration()
             self._axis.move(home, self._speed("6099:02", 65536), ramp, ramp)
             yield Until(k.EV_ARRIVED)
-        # The zero position lies the home offset beyond the home position (004:7231-7236).
-        self._core.zero_rad = (
-            home + self._core.number("607C:00") / self._core.units.position_per_rad
-        )
+        self._take(home)
         if method in (35, 37, -2, -3):
             self._axis.hold()
+
+    def _take(self, home: float) -> None:
+        """The zero position lies the home offset beyond the home position (004:7231-7236).
+
+        Some families show the offset as the position at home instead (001:687-691).
+        """
+        offset = self._core.number("607C:00") / self._core.units.position_per_rad
+        if self._core.family.traits.position_at_home_is_offset:
+            offset = -offset
+        self._core.zero_rad = home + offset
 
     def _by_torque(self, direction: int) -> Script:
         core = self._core

@@ -34,12 +34,13 @@ LOOP_OFF, LOOP_POSITION, LOOP_SPEED, LOOP_TORQUE, LOOP_IMPEDANCE = range(5)
 EV_FAULT, EV_STOPPED, EV_ARRIVED, EV_SIGNAL, EV_INDEX, EV_STALL, EV_ALARM_CLOCK = (
     1 << bit for bit in range(7)
 )  # fmt: skip
-# --- protections, as bits of the error status 200Bh:0Bh (004:6254-6282) ---------------------
+# --- protections: bits of the MMS7's error status 200Bh:0Bh (004:6254-6282), then those that
+#     other families have ------------------------------------------------------------------
 (
     F_OVER_CURRENT, F_UNDER_VOLTAGE, F_LOCKED, F_POWER_STAGE, F_OVERLOAD, F_POSITION_LIMIT,
     F_SENSOR, F_MEMORY, F_OVER_TEMPERATURE, F_OVER_VOLTAGE, F_OVER_SPEED, F_SPEED_ERROR,
-    F_WATCHDOG,
-) = (1 << bit for bit in range(13))  # fmt: skip
+    F_WATCHDOG, F_FOLLOWING,
+) = (1 << bit for bit in range(14))  # fmt: skip
 # --- switches, as bits of P_SIGNAL_* and S_SIGNALS ------------------------------------------
 SIG_NEGATIVE, SIG_POSITIVE, SIG_HOME = 1, 2, 4
 
@@ -64,9 +65,9 @@ SIG_NEGATIVE, SIG_POSITIVE, SIG_HOME = 1, 2, 4
     P_OTP_C, P_OVER_SPEED, P_SPEED_ERROR, P_SPEED_ERROR_S, P_RATED_NM,
     P_POSITION_WINDOW, P_SPEED_WINDOW, P_ZERO_SPEED, P_FOLLOWING_WINDOW, P_STALL_NM, P_STALL_S,
     P_STALL_SPEED, P_Z_KP, P_Z_KI, P_Z_KD, P_Z_FILTER, P_Z_LIMIT, P_LOAD_RATIO_S,
-    P_POWER_LIMIT_V, P_INDEX_RAD,
-) = range(100)  # fmt: skip
-P_NOTCHES = 100
+    P_POWER_LIMIT_V, P_INDEX_RAD, P_TORQUE_FILTER, P_FOLLOWING_S,
+) = range(102)  # fmt: skip
+P_NOTCHES = 102
 """Start of the notches: per notch a1, a2, b1, b2 of (z² + a1·z + a2)/(z² + b1·z + b2)."""
 P_SIZE = P_NOTCHES + 16
 
@@ -82,8 +83,9 @@ P_SIZE = P_NOTCHES + 16
     S_POSITION_T, S_SPEED_T, S_ZERO_T, S_FOLLOWING_T, S_STALL_T,
     S_IP_POSITION, S_IP_POSITION_INC, S_IP_SPEED, S_IP_SPEED_INC, S_IP_TORQUE, S_IP_TORQUE_INC,
     S_IP_LEFT, S_Z_INTEGRAL, S_Z_SPEED, S_SPARE_NORMAL, S_HAS_SPARE, S_LIMIT_ACTIVE, S_UQ,
-) = range(55)  # fmt: skip
-S_NOTCHES = 55
+    S_TORQUE_FILTERED,
+) = range(56)  # fmt: skip
+S_NOTCHES = 56
 """Start of the notch states, two per notch."""
 S_SIZE = S_NOTCHES + 8
 
@@ -325,6 +327,7 @@ def _control(p, s):  # type: ignore[no-untyped-def]
         s[S_FF_TORQUE] = 0.0
         s[S_TORQUE_COMMAND] = 0.0
         s[S_SATURATED] = 0.0
+        s[S_TORQUE_FILTERED] = 0.0
         s[S_SPEED_REFERENCE] = s[S_OMEGA]
         for i in range(8):
             s[S_NOTCHES + i] = 0.0
@@ -364,6 +367,8 @@ def _control(p, s):  # type: ignore[no-untyped-def]
             s[S_SPEED_LIMITED] = 1.0
             torque = _clamp(torque, lower, upper)
 
+    s[S_TORQUE_FILTERED] += p[P_TORQUE_FILTER] * (torque - s[S_TORQUE_FILTERED])
+    torque = s[S_TORQUE_FILTERED]
     for i in range(int(p[P_NOTCH_COUNT])):
         c, z = P_NOTCHES + 4 * i, S_NOTCHES + 2 * i
         out = torque + s[z]
@@ -396,7 +401,7 @@ def _beyond(p, x, size):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-untyped-def] # noqa: PLR0917
+def _step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-untyped-def]
     """One exact step of the linear chain, then friction and end stops on the velocity level."""
     size = x.shape[0]
     contact = 0
@@ -497,6 +502,8 @@ def _protect(p, s):  # type: ignore[no-untyped-def]
     s[S_SPEED_ERROR_T] = s[S_SPEED_ERROR_T] + STEP_S if away else 0.0
     if s[S_SPEED_ERROR_T] > p[P_SPEED_ERROR_S]:
         faults |= F_SPEED_ERROR
+    if loop == LOOP_POSITION and s[S_FOLLOWING_T] > p[P_FOLLOWING_S]:
+        faults |= F_FOLLOWING
     pushing = closed and powered and torque > p[P_RATED_NM]
     if pushing and loop == LOOP_POSITION:
         goal = p[P_TARGET] if int(p[P_GEN]) == GEN_POSITION else s[S_P_DEMAND]
@@ -544,7 +551,7 @@ def _monitor(p, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def run(  # type: ignore[no-untyped-def] # noqa: PLR0917
+def run(  # type: ignore[no-untyped-def]
     steps, p, s, x, a, b, gap_state, half_gap, scratch, random
 ):
     """Advance by up to ``steps``; ends early after a step that raised a masked event.

@@ -15,6 +15,17 @@ _TURN_INCREMENTS = 65536
 """Increments of the internal unit INC per motor revolution (004:6984-6986)."""
 
 
+_STANDARD_OF_ROLE = {
+    "error_code": "603F:00",
+    "status_word": "6041:00",
+    "mode_display": "6061:00",
+    "position_actual": "6064:00",
+    "velocity_actual": "606C:00",
+    "torque_actual": "6077:00",
+    "digital_inputs": "60FD:00",
+}
+
+
 def live_values(
     core: Core, control: DeviceControl, panel: Panel
 ) -> dict[str, Callable[[], Number]]:
@@ -44,10 +55,14 @@ def live_values(
         status_word()
         return panel.digital_inputs()
 
-    def current_ma() -> int:
-        return round(item(k.S_CURRENT) * 1e3)
+    def plain_inputs() -> int:
+        """CiA 402 bits 0 to 2 as the loop sees the switches."""
+        bits = int(item(k.S_SIGNALS)) & 7
+        if core.family.traits.limit_bits_swapped:
+            bits = bits & 4 | (bits & 1) << 1 | bits >> 1 & 1
+        return bits
 
-    return {
+    values: dict[str, Callable[[], Number]] = {
         "1001:00": lambda: control.error_register,
         "603F:00": lambda: control.error_code,
         "6041:00": status_word,
@@ -72,17 +87,14 @@ def live_values(
         "60BD:00": lambda: panel.latched("60BD:00"),
         "60F4:00": lambda: demand() - position(),
         "60FC:00": lambda: round((item(k.S_P_DEMAND) - core.zero_rad) * inc_per_rad),
-        "60FD:00": digital_inputs,
-        "200B:0B": lambda: core.axis.faults,
-        "200E:01": lambda: 0,
-        "200E:02": current_ma,
-        "200E:03": lambda: 0,
-        "200E:04": lambda: round(item(k.S_UQ) * 1e3),
-        "200E:05": lambda: round(item(k.S_TORQUE) * 1e3),
-        "200E:06": lambda: round(item(k.S_THETA) * inc_per_rad),
-        "200E:07": lambda: round(item(k.S_THETA_FILTERED) * inc_per_rad),
-        "200E:09": lambda: round(item(k.S_OMEGA) * inc_per_rad),
-        "200E:0B": lambda: round(item(k.S_LOAD_RATIO) * 1000),
-        "200E:0C": lambda: round(item(k.S_BRAKE_DUTY) * 100),
-        "2040:00": lambda: round(item(k.S_TEMPERATURE)),
+        "60FD:00": digital_inputs if core.family.traits.assigns_terminals else plain_inputs,
     }
+    if core.family.traits.error_status_key is not None:
+        values[core.family.traits.error_status_key] = lambda: core.axis.faults & 0x1FFF
+    values |= core.family.readings(core.axis)
+    # The same quantity under a number of the maker's own (2102h is DS_C's error code).
+    for role, standard in _STANDARD_OF_ROLE.items():
+        parameter = core.profile.by_role.get(role)
+        if parameter is not None and parameter.access == "ro":
+            values.setdefault(parameter.key, values[standard])
+    return values

@@ -82,7 +82,7 @@ class VirtualServo:
     def _power_on(self) -> None:
         od, axis = self.od, self.axis
         od.restore_defaults()
-        od.load(self._family.factory_values(self.mechanics, axis.motor))
+        self._load_factory()
         od.load(self.nvm.load())
         self.core = Core(self.profile, self._family, od, axis)
         self.core.zero_rad = self._zero_rad
@@ -95,6 +95,19 @@ class VirtualServo:
         self._connect()
         if self.nvm.damaged:
             self.control.raise_fault(k.F_MEMORY)
+
+    def _load_factory(self) -> None:
+        """Values the maker sets, and start values where the manual prints none."""
+        fallback = self._family.fallback_values(self.axis.motor)
+        printed = self.profile.by_key
+        self.od.load(
+            {
+                key: value
+                for key, value in fallback.items()
+                if key not in printed or printed[key].default_raw is None
+            }
+        )
+        self.od.load(self._family.factory_values(self.mechanics, self.axis.motor))
 
     def power_cycle(self, off_s: float = 0.0) -> None:
         """Off for a time and on again; the shaft coasts meanwhile, the absolute zero stays."""
@@ -152,8 +165,20 @@ class VirtualServo:
         if entry.parameter.settable == "stopped" and self.axis.powered:
             raise SdoAbort(ABORT_DEVICE_STATE)
         self.od.write_entry(entry, data)
+        self._autosave(entry)
         if entry.parameter.pdo in ("rx", "rxtx") and entry.key not in ("6040:00", "6060:00"):
             self._arrived()
+
+    def _autosave(self, entry: Entry) -> None:
+        """Families that store what is written: only this value, as their EEPROM does."""
+        index = entry.parameter.index
+        if index is None or entry.key in _VOLATILE:
+            return
+        for rule in self._family.traits.autosave:
+            inside = rule.first_index <= index <= rule.last_index
+            if inside and int(self.od.number(rule.key)) & rule.mask:
+                self._store(self.nvm.load() | {entry.key: entry.value})
+                return
 
     def read_register(self, register: int, count: int) -> list[int]:
         """Registers of the profile's table, 32-bit values in its word order."""
@@ -244,9 +269,10 @@ class VirtualServo:
             "6060:00": self._set_mode,
             "60FF:00": lambda _: self.control.modes.refresh(),
             "6071:00": lambda _: self.control.modes.refresh(),
-            "200D:00": self._special_command,
             "60B8:00": lambda value: self.panel.set_probe_function(int(value)),
         }
+        for key, actions in self._family.traits.commands.items():
+            special[key] = self._command_setter(key, actions)
         for entry in self.od:
             parameter = entry.parameter
             index = parameter.index or 0
@@ -278,23 +304,42 @@ class VirtualServo:
             raise SdoAbort(ABORT_VALUE_RANGE)
         self.control.set_mode(mode)
 
-    def _special_command(self, value: Raw) -> None:
-        """200Dh (table 29, 004:2390-2403)."""
-        actions: dict[int, Callable[[], None]] = {
-            0x65766173: self.save,
-            0x64616F6C: self.restore,
-            0x686F6F6D: self.zero_position,
-            0x11111120: self.control.history.clear,
-            0x626E6E74: self._schedule_reset,
-            0xAAB555AA: self.write_settings,
+    def _commands(self) -> dict[str, Callable[[], None]]:
+        return {
+            "save": self.save,
+            "restore": self.restore,
+            "zero": self.zero_position,
+            "clear_history": self.control.clear_history,
+            "reset": self._schedule_reset,
+            "write_settings": self.write_settings,
+            "fault_reset": self._reset_fault,
         }
-        if int(value) == 0:
-            return
-        action = actions.get(int(value))
-        if action is None:
-            raise SdoAbort(ABORT_VALUE_RANGE)
-        action()
-        self.od.put("200D:00", 0)
+
+    def _reset_fault(self) -> None:
+        self.control.reset_fault()
+
+    def _command_setter(self, key: str, actions: dict[int, str]) -> Callable[[Raw], None]:
+        """Writing one of the printed values to ``key`` carries out its command."""
+        commands = self._commands()
+        traits = self._family.traits
+
+        last = 0
+
+        def command(value: Raw) -> None:
+            nonlocal last
+            before, last = last, int(value)
+            # A trigger that stays acts on its change only (003:411-414).
+            if last == 0 or (not traits.self_clearing and last == before):
+                return
+            name = actions.get(int(value))
+            if name is None:
+                raise SdoAbort(ABORT_VALUE_RANGE)
+            commands[name]()
+            if traits.self_clearing:
+                last = 0
+                self.od.put(key, 0)
+
+        return command
 
     def _schedule_reset(self) -> None:
         """Reboot (004:2400), late enough that the wire can still answer the command."""
@@ -313,6 +358,9 @@ class VirtualServo:
             for entry in self.od
             if entry.parameter.access == "rw" and entry.key not in _VOLATILE
         }
+        self._store(values)
+
+    def _store(self, values: dict[str, Raw]) -> None:
         try:
             self.nvm.save(values)
         except OSError:
@@ -330,7 +378,7 @@ class VirtualServo:
         for entry in self.od:
             if entry.parameter.access != "ro" and entry.key not in _VOLATILE:
                 entry.value = entry.active = entry.default()
-        self.od.load(self._family.factory_values(self.mechanics, self.axis.motor))
+        self._load_factory()
         self.core.apply_settings()
 
     def zero_position(self) -> None:

@@ -61,6 +61,7 @@ class LoopSettings:
     inertia_kgm2: float = 1e-4
     viscous_nms: float = 0.0
     coulomb_nm: float = 0.0
+    torque_filter_s: float = 0.0
     notches: tuple[Biquad, ...] = ()
     speed_output_nm: float = math.inf
     position_output_rad_s: float = math.inf
@@ -87,6 +88,7 @@ class ProtectionSettings:
     over_speed_rad_s: float = math.inf
     speed_error_rad_s: float = math.inf
     speed_error_s: float = math.inf
+    following_error_s: float = math.inf
     holding_brake: bool = False
 
 
@@ -117,6 +119,8 @@ class MotorData:
     rated_speed_rad_s: float
     rated_torque_nm: float
     pole_pairs: int
+    rotor_inertia_kgm2: float
+    supply_v: float
 
     @staticmethod
     def of(spec: MechanicsSpec) -> MotorData:
@@ -134,4 +138,6 @@ class MotorData:
             rated_speed_rad_s=speed,
             rated_torque_nm=spec.motor.rated_torque_nm,
             pole_pairs=4,
+            rotor_inertia_kgm2=spec.motor.inertia_kgm2,
+            supply_v=spec.supply.voltage_v,
         )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Literal, Protocol
 
 from drivers.virtual.firmware import kernel as k
-from drivers.virtual.firmware.dictionary import ObjectDictionary
+from drivers.virtual.firmware.axis import VirtualAxis
+from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.settings import LoopSettings, MotorData, ProtectionSettings
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
@@ -54,14 +56,41 @@ class Wiring:
 
 
 @dataclass(frozen=True, slots=True)
+class Autosave:
+    """While ``key & mask`` is set, writes to these indices are stored at once."""
+
+    key: str
+    mask: int
+    first_index: int
+    last_index: int
+
+
+StatusStyle = Literal["cia402", "echo"]
+
+
+@dataclass(frozen=True, slots=True)
 class Traits:
-    """Documented behaviours that are a matter of yes or no."""
+    """Documented behaviours that are a matter of yes or no, or of one number.
+
+    ``commands`` names what writing a raw value to a parameter does: save, restore, reset, zero,
+    clear_history, write_settings, fault_reset. ``self_clearing`` commands read 0 afterwards.
+    """
 
     buffered_setpoints: bool = True
     limit_switch_faults: bool = True
     communication_fault: int = k.F_WATCHDOG
     faults: dict[int, FaultInfo] = field(default_factory=dict)
-    clockwise_is_negative: bool = True
+    commands: dict[str, dict[int, str]] = field(default_factory=dict)
+    self_clearing: bool = True
+    error_status_key: str | None = None
+    status: StatusStyle = "cia402"
+    home_found_bit: int | None = None
+    position_at_home_is_offset: bool = False
+    positive_limit_first: bool = False
+    limit_bits_swapped: bool = False
+    autosave: tuple[Autosave, ...] = ()
+    torque_speed_limit_key: str | None = None
+    assigns_terminals: bool = False
 
 
 class Family(Protocol):
@@ -71,7 +100,10 @@ class Family(Protocol):
     traits: Traits
 
     def factory_values(self, spec: MechanicsSpec, motor: MotorData) -> dict[str, Raw]:
-        """What the maker sets for this motor, beyond the printed defaults."""
+        """What the maker sets for this motor, whatever the manual prints."""
+
+    def fallback_values(self, motor: MotorData) -> dict[str, Raw]:
+        """Start values of parameters for which the manual prints none."""
 
     def units(self, od: ObjectDictionary, motor: MotorData) -> Units:
         """Units of the motion objects under the present gear settings."""
@@ -88,6 +120,9 @@ class Family(Protocol):
 
     def wiring(self, od: ObjectDictionary) -> Wiring:
         """How the switches reach the drive."""
+
+    def readings(self, axis: VirtualAxis) -> dict[str, Callable[[], Number]]:
+        """Measured objects of the maker's own, by key."""
 
 
 def inertia_kgm2(od: ObjectDictionary, key: str, fallback: float, scale: float = 1e-7) -> float:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from drivers.virtual.firmware import kernel as k
-from drivers.virtual.firmware.dictionary import ObjectDictionary
+from drivers.virtual.firmware.axis import VirtualAxis
+from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.families.base import (
     RPM,
     FaultInfo,
@@ -35,6 +37,19 @@ class Mms7:
     traits = Traits(
         # Bit 5 is "not used" and bit 4 alone takes a new target (004:3748-3752).
         buffered_setpoints=False,
+        # Table 29, 004:2390-2403.
+        commands={
+            "200D:00": {
+                0x65766173: "save",
+                0x64616F6C: "restore",
+                0x686F6F6D: "zero",
+                0x11111120: "clear_history",
+                0x626E6E74: "reset",
+                0xAAB555AA: "write_settings",
+            }
+        },
+        error_status_key="200B:0B",
+        assigns_terminals=True,
         # Codes 004:4705-4917; fixed reactions 004:4951-4955.
         faults={
             k.F_OVER_CURRENT: FaultInfo(0x2300, fixed=True, error_register=0x03),
@@ -66,6 +81,10 @@ class Mms7:
             "2001:08": round(motor.rated_current_a * 1e3),
             "2001:09": round(spec.motor.rated_speed_rpm),
         }
+
+    def fallback_values(self, motor: MotorData) -> dict[str, Raw]:  # noqa: ARG002 - the seam's
+        """Everything that matters has a printed default."""
+        return {}
 
     def units(self, od: ObjectDictionary, motor: MotorData) -> Units:
         """Gear ratio and feed constant (004:1853-1948), polarity (004:7261-7272)."""
@@ -178,6 +197,24 @@ class Mms7:
             speed_error_s=number("200B:0E", 10) * 1e-3,
             holding_brake=number("2108:01") == 1,
         )
+
+    def readings(self, axis: VirtualAxis) -> dict[str, Callable[[], Number]]:
+        """Servo internal information 200Eh and temperature (004:6407-6469, 004:6580)."""
+        item = axis.s.item
+        inc_per_rad = 65536 / TWO_PI
+        return {
+            "200E:01": lambda: 0,
+            "200E:02": lambda: round(item(k.S_CURRENT) * 1e3),
+            "200E:03": lambda: 0,
+            "200E:04": lambda: round(item(k.S_UQ) * 1e3),
+            "200E:05": lambda: round(item(k.S_TORQUE) * 1e3),
+            "200E:06": lambda: round(item(k.S_THETA) * inc_per_rad),
+            "200E:07": lambda: round(item(k.S_THETA_FILTERED) * inc_per_rad),
+            "200E:09": lambda: round(item(k.S_OMEGA) * inc_per_rad),
+            "200E:0B": lambda: round(item(k.S_LOAD_RATIO) * 1000),
+            "200E:0C": lambda: round(item(k.S_BRAKE_DUTY) * 100),
+            "2040:00": lambda: round(item(k.S_TEMPERATURE)),
+        }
 
     def wiring(self, od: ObjectDictionary) -> Wiring:
         """Terminal functions 2030h, polarity and simulation 2031h (004:6470-6579).

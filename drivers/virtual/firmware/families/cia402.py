@@ -1,0 +1,325 @@
+"""CiA 402 drives whose conventions the profile tells: gains, notches, units, faults.
+
+What a profile cannot tell is in `Traits` of each family; what no manual prints (thresholds of
+the power stage) is this virtual drive's own and said so below.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
+from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.axis import VirtualAxis
+from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
+from drivers.virtual.firmware.families.base import RPM, FaultInfo, Traits, Units, Wiring
+from drivers.virtual.firmware.settings import (
+    Biquad,
+    GainSet,
+    LoopSettings,
+    MotorData,
+    ProtectionSettings,
+    notch_biquad,
+)
+from drivers.virtual.mechanics import MechanicsSpec
+from profiles.schema import NotchSlot, Profile, Raw
+
+TWO_PI = 2 * math.pi
+_MS = 1e-3
+
+#: Names of faults as manuals print them, per protection, and the standard's code (CiA 402-2).
+_FAULT_WORDS: tuple[tuple[int, str, int], ...] = (
+    (k.F_OVER_CURRENT, r"over.?current", 0x2310),
+    (k.F_UNDER_VOLTAGE, r"under.?voltage", 0x3220),
+    (k.F_OVER_VOLTAGE, r"over.?voltage", 0x3210),
+    (k.F_OVER_TEMPERATURE, r"over.?(heat|temperature)|temperature.*(high|too)", 0x4310),
+    (k.F_LOCKED, r"lock(ed)?.?(rotor)?|rotor.?lock|stall", 0x7121),
+    (k.F_OVERLOAD, r"over.?load", 0x3230),
+    (k.F_SENSOR, r"encoder.*(disconnect|error|fault|communication|signal)|encoder", 0x7305),
+    (k.F_MEMORY, r"eeprom|memory|parameter.*(stor|read|writ)", 0x5530),
+    (k.F_OVER_SPEED, r"over.?speed", 0x8400),
+    (k.F_SPEED_ERROR, r"speed.*(deviation|error)", 0x8401),
+    (k.F_FOLLOWING, r"position.*(deviation|out.?of.?toler|error)|following", 0x8611),
+    (
+        k.F_WATCHDOG,
+        r"(bus|ethercat|can|communication).*(disconnect|lost|time.?out|abnormal)",
+        0x8130,
+    ),
+    (k.F_POSITION_LIMIT, r"(limit|over.?travel)", 0x8612),
+    (k.F_POWER_STAGE, r"(ipm|power.?(stage|module))", 0x5400),
+)
+
+
+class Cia402:
+    """A family described by its profile; see `drivers.virtual.firmware.families.base.Family`."""
+
+    def __init__(self, profile: Profile, traits: Traits | None = None) -> None:
+        self.name = profile.drive
+        self._profile = profile
+        base = traits or Traits()
+        self.traits = replace(base, faults=base.faults or faults_of(profile))
+
+    # --- values ----------------------------------------------------------------------------
+    def factory_values(self, spec: MechanicsSpec, motor: MotorData) -> dict[str, Raw]:
+        """Ratings where the profile names the objects, in the objects' own scale."""
+        known = {
+            "rated_torque": motor.rated_torque_nm,
+            "rated_current": motor.rated_current_a,
+            "rated_speed": spec.motor.rated_speed_rpm,
+            "motor_inertia": spec.motor.inertia_kgm2,
+        }
+        values: dict[str, Raw] = {}
+        for role, value in known.items():
+            parameter = self._profile.by_role.get(role)
+            if parameter is not None:
+                values[parameter.key] = parameter.to_raw(value * _si_factor(parameter.unit))
+        return values
+
+    def fallback_values(self, motor: MotorData) -> dict[str, Raw]:
+        """A moderate axis: 10 rev/s, 50 rev/s², windows of 1/360 revolution."""
+        units = self._units(1.0, motor)
+        turn = units.position_per_rad * TWO_PI
+        speed = units.speed_per_rad_s * TWO_PI
+        ramp = 200.0 if units.ramps_are_times_ms else units.acceleration_per_rad_s2 * TWO_PI * 50
+        window = round(turn / 360)
+        slow = round(speed)
+        fallback: dict[str, Raw] = {
+            "6065:00": round(turn), "6066:00": 100, "6067:00": window, "6068:00": 10,
+            "606D:00": min(slow, 65535), "606E:00": 10, "606F:00": min(slow, 65535), "6070:00": 10,
+            "6072:00": 3000, "6073:00": 3000, "60E0:00": 3000, "60E1:00": 3000,
+            "607D:01": -(2**31), "607D:02": 2**31 - 1,
+            "6081:00": round(10 * speed), "6083:00": round(ramp), "6084:00": round(ramp),
+            "6085:00": round(ramp), "609A:00": round(ramp), "6087:00": 3000,
+            "6099:01": round(2 * speed), "6099:02": max(1, round(speed / 4)),
+            "6091:01": 1, "6091:02": 1, "6092:01": round(turn), "6092:02": 1,
+            "60C2:01": 1, "60C2:02": -3, "605A:00": 2, "605D:00": 1, "605E:00": 2, "6007:00": 1,
+            "6502:00": sum(1 << (mode - 1) for mode in self._profile.supported_modes if mode > 0),
+        }  # fmt: skip
+        if self.traits.positive_limit_first:
+            fallback |= {"607D:01": 2**31 - 1, "607D:02": -(2**31)}
+        return fallback
+
+    # --- units -----------------------------------------------------------------------------
+    def units(self, od: ObjectDictionary, motor: MotorData) -> Units:
+        """Default increments per revolution, scaled by how far the gear differs from default."""
+        spec = self._profile.units
+        factor = self._ratio(od, spec.gear_denominator, spec.gear_numerator)
+        factor *= self._ratio(od, spec.feed, spec.feed_revolutions)
+        polarity = int(od.number("607E:00"))
+        return self._units(
+            factor, motor, -1.0 if polarity & 0x80 else 1.0, -1.0 if polarity & 0x40 else 1.0
+        )
+
+    def _ratio(self, od: ObjectDictionary, above: str | None, below: str | None) -> float:
+        """(above/below) now over (above/below) by default."""
+        result = 1.0
+        for key, power in ((above, 1.0), (below, -1.0)):
+            parameter = self._profile.by_key.get(key or "")
+            if key is None or parameter is None:
+                continue
+            printed = parameter.default_raw
+            default = float(printed) if isinstance(printed, (int, float)) and printed else None
+            now = float(od.number(key, default or 1.0))
+            if default is not None and now > 0:
+                result *= (now / default) ** power
+        return result
+
+    def _units(
+        self, factor: float, motor: MotorData, position_sign: float = 1.0, speed_sign: float = 1.0
+    ) -> Units:
+        spec = self._profile.units
+        turn = float(spec.counts_per_rev or spec.encoder_counts_per_rev or 10000) * factor
+        per_rad = turn / TWO_PI
+        speed = _per_rad_s(spec.velocity, per_rad)
+        times = spec.acceleration.strip().startswith("ms")
+        reference = spec.ramp_reference_rpm or motor.rated_speed_rad_s / RPM
+        return Units(
+            position_per_rad=per_rad * position_sign,
+            speed_per_rad_s=speed * speed_sign,
+            acceleration_per_rad_s2=1.0 if times else _per_rad_s(spec.acceleration, per_rad),
+            torque_per_nm=1000.0 / motor.rated_torque_nm,
+            ramps_are_times_ms=times,
+            ramp_reference_rad_s=reference * RPM,
+        )
+
+    # --- loops -----------------------------------------------------------------------------
+    def loops(
+        self,
+        od: ObjectDictionary,
+        profile: Profile,
+        motor: MotorData,
+        units: Units,  # noqa: ARG002 - the seam's signature
+    ) -> LoopSettings:
+        """Gains by the profile's convention; without one, 40 Hz speed and 6 Hz position loop."""
+        gains = profile.gains
+        inertia = self._inertia(od, motor)
+
+        def value(key: str | None, default: float) -> float:
+            parameter = profile.by_key.get(key or "")
+            if parameter is None or key is None:
+                return default
+            return float(parameter.to_value(od.number(key))) or default
+
+        if gains is None or gains.convention == "unit":
+            hertz, integral_ms, position = 40.0, 20.0, 40.0
+            current_hz, torque_ms = 1000.0, 0.0
+        else:
+            hertz = value(gains.speed, 40.0)
+            integral_ms = value(gains.integral, 20.0)
+            position = value(gains.position, 40.0)
+            unit = profile.by_key[gains.position].unit if gains.position else ""
+            if "Hz" in unit or gains.convention == "bandwidth":
+                position *= TWO_PI
+            current_hz = value(gains.current_bandwidth, 1000.0)
+            torque_ms = value(gains.torque_filter, 0.0)
+        kp = TWO_PI * hertz * inertia
+        first = GainSet(position, kp, kp / (integral_ms * _MS))
+        return LoopSettings(
+            first=first,
+            second=first,
+            homing=None,
+            current_loop_hz=current_hz if current_hz >= 100.0 else 1000.0,
+            inertia_kgm2=inertia,
+            torque_filter_s=torque_ms * _MS,
+            notches=self._notches(od),
+            speed_output_nm=3.0 * motor.rated_torque_nm,
+            torque_mode_speed_rad_s=self._torque_mode_speed(od, motor),
+            brake_speed_rad_s=10 * RPM,
+            brake_torque_nm=motor.rated_torque_nm,
+        )
+
+    def _torque_mode_speed(self, od: ObjectDictionary, motor: MotorData) -> float:
+        key = self.traits.torque_speed_limit_key
+        rpm = od.number(key) if key is not None else 0
+        return rpm * RPM if rpm else 1.2 * motor.rated_speed_rad_s
+
+    def _inertia(self, od: ObjectDictionary, motor: MotorData) -> float:
+        gains = self._profile.gains
+        rotor = motor.rotor_inertia_kgm2
+        parameter = self._profile.by_key.get(gains.inertia or "") if gains else None
+        if gains is None or parameter is None:
+            return rotor
+        number = float(parameter.to_value(od.number(parameter.key)))
+        if gains.inertia_meaning == "ratio_percent":
+            return rotor * (1 + number / 100)
+        if gains.inertia_meaning == "ratio":
+            return rotor * (1 + number)
+        total = number / _si_factor(parameter.unit)
+        return max(total + (rotor if gains.inertia_meaning == "load" else 0.0), rotor * 0.1)
+
+    def _notches(self, od: ObjectDictionary) -> tuple[Biquad, ...]:
+        spec = self._profile.notch
+        if spec is None:
+            return ()
+        found = (self._notch(od, spec.encoding, slot) for slot in spec.slots)
+        return tuple(notch for notch in found if notch is not None)[:4]
+
+    def _notch(self, od: ObjectDictionary, encoding: str, slot: NotchSlot) -> Biquad | None:
+        def value(key: str | None) -> float:
+            parameter = self._profile.by_key.get(key or "")
+            return 0.0 if parameter is None else float(parameter.to_value(od.number(parameter.key)))
+
+        if slot.enable_key is not None:
+            flags = int(od.number(slot.enable_key))
+            on = flags if slot.enable_bit is None else flags >> slot.enable_bit & 1
+            if not on:
+                return None
+        centre, width, depth = (
+            value(slot.frequency_key), value(slot.width_key), value(slot.depth_key),
+        )  # fmt: skip
+        if encoding == "hz_levels":
+            # No formula is printed: width level/20 of the centre, depth level in percent of the
+            # amplitude that is left (0 is deepest). 4000 Hz switches the notch off.
+            if centre >= 4000:
+                return None
+            width, depth = centre * max(width, 1) / 20, 20 * math.log10(max(depth, 1) / 100)
+        elif encoding == "hz_width":
+            depth = -40.0
+        if not 0 < centre < 0.4 / k.STEP_S or width <= 0:
+            return None
+        return notch_biquad(centre, width, -abs(depth), k.STEP_S)
+
+    def protections(
+        self,
+        od: ObjectDictionary,
+        motor: MotorData,
+        units: Units,  # noqa: ARG002 - the seam's signature
+    ) -> ProtectionSettings:
+        """Own thresholds, in shares of the supply and of the ratings; following error by 6065h."""
+        supply = motor.supply_v
+        window = od.number("6065:00", 2**32 - 1)
+        limited = k.F_FOLLOWING in self.traits.faults and window not in (0, 2**32 - 1)
+        return ProtectionSettings(
+            over_current_a=3.5 * math.sqrt(2) * motor.rated_current_a,
+            under_voltage_v=0.6 * supply,
+            over_voltage_v=1.3 * supply,
+            brake_on_v=1.2 * supply,
+            brake_off_v=1.15 * supply,
+            brake_enabled=True,
+            locked_s=math.inf,
+            overload_nm=1.5 * motor.rated_torque_nm,
+            overload_s=10.0,
+            over_temperature_c=100.0,
+            over_speed_rad_s=1.3 * motor.rated_speed_rad_s,
+            following_error_s=od.number("6066:00", 100) * _MS if limited else math.inf,
+        )
+
+    def readings(self, axis: VirtualAxis) -> dict[str, Callable[[], Number]]:
+        """Objects that a profile tells by role but that CiA 402 has no number for."""
+        item = axis.s.item
+        sources: dict[str, tuple[int, float]] = {
+            "dc_voltage": (k.S_VOLTAGE, 1.0),
+            "temperature": (k.S_TEMPERATURE, 1.0),
+            "load_ratio": (k.S_LOAD_RATIO, 100.0),
+        }
+        values: dict[str, Callable[[], Number]] = {}
+        for role, (state, factor) in sources.items():
+            parameter = self._profile.by_role.get(role)
+            if parameter is not None:
+                scale = _volt_factor(parameter.unit) * factor / parameter.scale
+                values[parameter.key] = lambda s=state, f=scale: round(item(s) * f)  # type: ignore[misc]
+        return values
+
+    def wiring(self, od: ObjectDictionary) -> Wiring:  # noqa: ARG002 - the seam's signature
+        """All switches reach the drive, active high: the terminals' default functions."""
+        return Wiring()
+
+
+def faults_of(profile: Profile) -> dict[int, FaultInfo]:
+    """The profile's codes for the protections, found by the printed names."""
+    found: dict[int, FaultInfo] = {}
+    for bit, words, standard in _FAULT_WORDS:
+        match = next(
+            (
+                fault.code_raw
+                for fault in profile.faults
+                if fault.kind == "fault"
+                and fault.code_raw is not None
+                and re.search(words, fault.name, re.IGNORECASE)
+            ),
+            standard,
+        )
+        found[bit] = FaultInfo(match, fixed=bit in (k.F_OVER_CURRENT, k.F_SENSOR, k.F_POWER_STAGE))
+    return found
+
+
+def _per_rad_s(unit: str, position_per_rad: float) -> float:
+    """Raw units per rad/s (or rad/s²) of ``inc/s``, ``rpm``, ``0.1 rpm``, ``rpm/s``."""
+    match = re.match(r"\s*([\d.]*)\s*(rpm|r/min)", unit)
+    if match is None:
+        return position_per_rad
+    return 1 / RPM / float(match.group(1) or 1)
+
+
+def _volt_factor(unit: str) -> float:
+    return 1e3 if unit == "mV" else 1.0
+
+
+def _si_factor(unit: str) -> float:
+    """Engineering units per SI unit for the ratings that profiles print."""
+    return {
+        "mNm": 1e3, "Nm": 1.0, "mA": 1e3, "A": 1.0, "rpm": 1.0, "kg·m²": 1.0, "g·cm²": 1e7,
+        "kg·cm²": 1e4, "1e-7 kg·m²": 1e7,
+    }.get(unit, 1.0)  # fmt: skip

@@ -1,0 +1,66 @@
+"""Traits of the families that are otherwise told by their profiles, with manual lines."""
+
+from __future__ import annotations
+
+from drivers.virtual.firmware.families.base import Autosave, Traits
+
+#: Megmeet M6-L: parameters of the bus go to the EEPROM while P17.24 is 1 (000:3669-3673), saving
+#: and restoring by P17.26 (000:3675), history and defaults by P02.22 (000:3254).
+M6L = Traits(
+    commands={
+        "2011:1B": {1: "restore", 2: "save"},
+        "2002:17": {1: "clear_history", 2: "restore"},
+    },
+    autosave=(Autosave("2011:19", 1, 0x2000, 0x6FFF),),
+)
+
+#: Rtelligent R6L: 200Ch (002:11782 on); what 2008h:0C permits is stored when written.
+R6L = Traits(
+    commands={
+        "200C:01": {1: "restore", 2: "clear_history"},
+        "200C:08": {1: "reset"},
+        "200C:09": {1: "fault_reset"},
+    },
+    autosave=(
+        Autosave("2008:0C", 2, 0x2000, 0x2FFF),
+        Autosave("2008:0C", 4, 0x6000, 0x6FFF),
+    ),
+    limit_bits_swapped=True,
+)
+
+#: Maxsine EP3E: 1010h:01 saves and restores (001:1209); 6041h bit 15 (001:372); the home offset
+#: is the position at home (001:687-691).
+EP3E = Traits(
+    commands={"1010:01": {0x45534554: "save", 0x45444546: "restore"}},
+    home_found_bit=15,
+    position_at_home_is_offset=True,
+)
+
+#: Xinlichuan DS_C: 2200h to 2203h are triggers that stay until they are written back to 0
+#: (003:411-422); own status word (003:298-308); 607Dh:01 is the positive limit.
+DS_C = Traits(
+    commands={
+        "2200:00": {1: "zero"},
+        "2201:00": {1: "save"},
+        "2202:00": {1: "restore"},
+        "2203:00": {1: "fault_reset"},
+    },
+    self_clearing=False,
+    status="echo",
+    home_found_bit=8,
+    positive_limit_first=True,
+    torque_speed_limit_key="2406:00",
+)
+
+#: Any other CiA 402 drive: 1010h and 1011h with the texts of CiA 301.
+GENERIC = Traits(
+    commands={"1010:01": {0x65766173: "save"}, "1011:01": {0x64616F6C: "restore"}},
+)
+
+TRAITS: dict[str, Traits] = {
+    "m6l": M6L,
+    "r6l": R6L,
+    "ep3e": EP3E,
+    "ds_c": DS_C,
+    "generic402": GENERIC,
+}

@@ -1,0 +1,314 @@
+"""Families other than MMS7: conventions from profiles, traits from their manuals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.virtual.device import SdoAbort
+from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware import make_device
+from drivers.virtual.firmware.servo import VirtualServo
+from drivers.virtual.mechanics import MechanicsSpec, TravelSpec
+from profiles.loader import load_profile
+from profiles.schema import (
+    Fault,
+    GainSpec,
+    Identity,
+    NotchSlot,
+    NotchSpec,
+    Parameter,
+    Profile,
+    Signal,
+    UnitSpec,
+)
+
+from .servo_bench import ROWS, TURN, Bench, rigid
+
+REV = 10000
+
+
+def parameter(key: str, kind: str, default: Any = None, **more: Any) -> Parameter:
+    return Parameter(
+        key=key, name=key, group="t", type=kind, default_raw=default, source="000:1", **more
+    )  # type: ignore[arg-type]
+
+
+def family_profile(drive: str, *extra: Parameter, **fields: Any) -> Profile:
+    """The standard 6xxx objects without defaults, plus a family's own parameters."""
+    own = {p.key for p in extra}
+    standard = [
+        parameter(row[0], row[1], access=row[2], pdo=row[3])
+        for row in ROWS
+        if row[0].startswith("6") and row[0] not in own
+    ]
+    fields = {
+        "units": UnitSpec(counts_per_rev=REV),
+        "supported_modes": (1, 3, 4, 6, 8, 9, 10),
+        **fields,
+    }
+    return Profile(
+        drive=drive, title=drive, manual="000", identity=Identity(maker="m", model=drive), links=(),
+        parameters=(*standard, *extra), **fields,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def family() -> Callable[..., Bench]:
+    def build(
+        profile: Profile, spec: MechanicsSpec | None = None, folder: Path | None = None
+    ) -> Bench:
+        device = make_device(profile, spec or rigid(), folder)
+        assert isinstance(device, VirtualServo)
+        return Bench(device)
+
+    return build
+
+
+M6L_GAINS = (
+    parameter("2008:01", "UINT16", 400, unit="Hz", scale=0.1),
+    parameter("2008:02", "UINT16", 500, unit="ms", scale=0.1),
+    parameter("2008:03", "UINT16", 60, unit="rad/s"),
+    parameter("2008:04", "UINT16", 2, unit="ms", scale=0.1),
+    parameter("2009:27", "UINT16", 300, scale=0.01),
+    parameter("2009:0B", "UINT16", 0, unit="Hz"),
+    parameter("2009:0C", "UINT16", 100, unit="Hz"),
+    parameter("2011:19", "UINT16", 1),
+    parameter("2011:1B", "UINT16", 0),
+)
+M6L = family_profile(
+    "m6l",
+    *M6L_GAINS,
+    gains=GainSpec(
+        convention="gain", position="2008:03", speed="2008:01", integral="2008:02",
+        torque_filter="2008:04", inertia="2009:27", inertia_meaning="ratio", source="000:3390",
+    ),
+    notch=NotchSpec(
+        encoding="hz_width", slots=(NotchSlot(frequency_key="2009:0B", width_key="2009:0C"),),
+        source="000:3429",
+    ),
+    faults=(
+        Fault(code="Er.032", name="Excessive position deviation", code_raw=0xFF20, source="000:1"),
+        Fault(code="Er.027", name="Servo motor overspeed", code_raw=0xFF1B, source="000:3905"),
+    ),
+)  # fmt: skip
+
+
+def test_gains_in_hz_ms_and_rad_per_s(family) -> None:
+    """Speed gain 40 Hz, integral time 50 ms, position gain 60 /s, load ratio 3.00."""
+    p = family(M6L).servo.axis.p
+    inertia = 5e-5 * 4
+    assert p[k.P_KP_POSITION_1] == 60
+    assert p[k.P_KP_SPEED_1] == pytest.approx(TURN * 40 * inertia)
+    assert p[k.P_KI_SPEED_1] == pytest.approx(TURN * 40 * inertia / 0.05)
+    assert p[k.P_TORQUE_FILTER] == pytest.approx(1 - math.exp(-50e-6 / 0.2e-3))
+
+
+def test_every_cia402_mode_moves_a_family_without_printed_defaults(family) -> None:
+    b = family(M6L)
+    b.set("2009:27", 0)
+    b.enable(1)
+    b.set("607A:00", 5 * REV)
+    b.set("6040:00", 0x1F)
+    b.run(1.5)
+    assert b.get("6064:00") == pytest.approx(5 * REV, abs=REV / 360)
+    b.set("6060:00", 3)
+    b.set("60FF:00", 10 * REV)
+    b.run(0.8)
+    assert b.get("606C:00") == pytest.approx(10 * REV, rel=0.02)
+
+
+def test_set_points_are_buffered_unless_bit_5_says_at_once(family) -> None:
+    """CiA 402-2 "single set-point" and "set of set-points"."""
+    b = family(M6L)
+    b.set("2009:27", 0)
+    b.enable(1)
+    b.set("607A:00", REV)
+    b.set("6040:00", 0x1F)
+    b.set("6040:00", 0x0F)
+    b.run(0.1)
+    b.set("607A:00", 3 * REV)
+    b.set("6040:00", 0x1F)
+    assert b.status & 1 << 12
+    b.set("6040:00", 0x0F)
+    assert b.status & 1 << 12  # still full
+    b.run(0.15)
+    assert b.servo.axis.p[k.P_TARGET] == pytest.approx(TURN)
+    b.run(1.5)
+    assert not b.status & 1 << 12
+    assert b.get("6064:00") == pytest.approx(3 * REV, abs=REV / 360)
+
+
+def test_following_error_is_a_fault_with_the_maker_s_code(family) -> None:
+    b = family(M6L)
+    b.set("6065:00", 100)
+    b.set("6066:00", 20)
+    b.enable(8)
+    rx = b.servo.map_process_data([0x60400010, 0x607A0020], "rx")
+    for cycle in range(1, 100):
+        rx.unpack((15).to_bytes(2, "little") + (cycle * 100).to_bytes(4, "little"))
+        b.run(1e-3)
+    assert b.get("603F:00") == 0xFF20
+
+
+def test_hz_width_notch_removes_its_centre(family) -> None:
+    b = family(M6L)
+    b.set("2009:0B", 500)
+    b.servo.core.apply_settings()
+    p = b.servo.axis.p
+    assert p[k.P_NOTCH_COUNT] == 1
+    a1, a2, b1, b2 = p[k.P_NOTCHES : k.P_NOTCHES + 4]
+    z = complex(math.cos(TURN * 500 * 50e-6), math.sin(TURN * 500 * 50e-6))
+    gain = abs((z * z + a1 * z + a2) / (z * z + b1 * z + b2))
+    assert gain < 0.15
+    one = abs((1 + a1 + a2) / (1 + b1 + b2))
+    assert one == pytest.approx(1.0)
+
+
+def test_m6l_stores_every_write_until_p17_24_is_off(family, tmp_path: Path) -> None:
+    b = family(M6L, None, tmp_path)
+    b.set("2008:01", 333)
+    b.set("2011:19", 0)
+    b.set("2008:03", 99)
+    again = family(M6L, None, tmp_path)
+    assert again.get("2008:01") == 333
+    assert again.get("2008:03") == 60
+    b.set("2011:1B", 2)
+    assert family(M6L, None, tmp_path).get("2008:03") == 99
+    b.set("2011:1B", 1)
+    assert family(M6L, None, tmp_path).get("2008:03") == 60
+
+
+def test_r6l_stores_what_its_mask_permits(family, tmp_path: Path) -> None:
+    profile = family_profile(
+        "r6l", parameter("2001:01", "UINT16", 250), parameter("2008:0C", "UINT16", 0)
+    )
+    b = family(profile, None, tmp_path)
+    b.set("2001:01", 111)
+    assert family(profile, None, tmp_path).get("2001:01") == 250
+    b.set("2008:0C", 2)
+    b.set("2001:01", 222)
+    b.set("6081:00", 7777)
+    again = family(profile, None, tmp_path)
+    assert again.get("2001:01") == 222
+    assert again.get("6081:00") != 7777
+
+
+def test_r6l_swaps_the_limit_bits(family) -> None:
+    profile = family_profile("r6l")
+    b = family(profile, rigid(travel=TravelSpec(min_rev=-0.2, max_rev=5)))
+    b.run(1e-3)
+    assert b.get("60FD:00") == 2  # negative limit in bit 1
+
+
+def test_ep3e_saves_by_1010_and_shows_home_in_bit_15(family, tmp_path: Path) -> None:
+    profile = family_profile("ep3e", parameter("1010:01", "UINT32", 0))
+    b = family(profile, None, tmp_path)
+    b.set("6081:00", 4321)
+    b.set("1010:01", 0x45534554)
+    assert b.get("1010:01") == 0
+    assert family(profile, None, tmp_path).get("6081:00") == 4321
+    b.set("607C:00", 500)
+    b.set("6098:00", 35)
+    b.enable(6)
+    b.set("6040:00", 0x1F)
+    b.run(0.01)
+    assert b.status & 1 << 15
+    assert b.get("6064:00") == pytest.approx(500, abs=1)
+
+
+DS_C = family_profile(
+    "ds_c",
+    *(parameter(f"{index:04X}:00", "UINT16", 0) for index in (0x2200, 0x2201, 0x2202, 0x2203)),
+    parameter("2102:00", "UINT16", 0, access="ro"),
+    parameter("2300:00", "UINT16", 1),
+    parameter("2301:00", "UINT16", 1),
+    units=UnitSpec(
+        counts_per_rev=REV, velocity="rpm", acceleration="ms", ramp_reference_rpm=1000,
+        gear_numerator="2300:00", gear_denominator="2301:00",
+    ),
+    supported_modes=(1, 3, 4, 6),
+    signals=(Signal(role="error_code", key="2102:00"),),
+    faults=(Fault(code="1007", name="Overload", code_raw=1007, source="003:1"),),
+)  # fmt: skip
+
+
+def test_ds_c_status_word_speeds_and_ramps(family) -> None:
+    b = family(DS_C)
+    for word, echo in ((0, 0), (6, 1), (7, 3), (15, 7)):
+        b.set("6060:00", 3)
+        b.set("6040:00", word)
+        b.run(0.01)
+        assert b.status & 7 == echo
+    b.set("6083:00", 500)
+    b.set("60FF:00", 600)
+    b.run(0.15)
+    # 500 ms for 1000 rpm: 300 rpm after 150 ms.
+    assert b.get("606C:00") == pytest.approx(300, abs=12)
+    assert not b.status & 1 << 10
+    b.run(0.5)
+    assert b.get("606C:00") == pytest.approx(600, abs=2)
+    b.servo.inject("overload")
+    assert b.status & 1 << 7
+    assert b.get("2102:00") == b.get("603F:00") == 1007
+
+
+def test_ds_c_position_bits(family) -> None:
+    b = family(DS_C)
+    b.set("6060:00", 1)
+    for word in (6, 7, 15):
+        b.set("6040:00", word)
+    b.set("6081:00", 600)
+    b.set("607A:00", 2 * REV)
+    b.set("6040:00", 31)
+    assert b.status & 1 << 12
+    assert not b.status & 1 << 15
+    b.run(1.5)
+    assert b.status & 1 << 15
+    assert b.get("6064:00") == pytest.approx(2 * REV, abs=REV / 300)
+
+
+def test_ds_c_triggers_stay_and_act_on_change(family) -> None:
+    b = family(DS_C)
+    b.servo.axis._x[0] = TURN
+    b.run(1e-3)
+    b.set("2200:00", 1)
+    assert abs(b.get("6064:00")) <= 1
+    assert b.get("2200:00") == 1
+    b.servo.axis._x[0] = 2 * TURN
+    b.run(1e-3)
+    b.set("2200:00", 1)
+    assert b.get("6064:00") == pytest.approx(REV, abs=1)
+    b.set("2200:00", 0)
+    b.set("2200:00", 1)
+    assert abs(b.get("6064:00")) <= 1
+
+
+def test_ds_c_electronic_gear(family) -> None:
+    """Numerator 2: one pulse is worth twice as much, a turn has half the pulses."""
+    b = family(DS_C)
+    b.set("2300:00", 2)
+    b.servo.axis._x[0] = TURN
+    b.run(1e-3)
+    assert b.get("6064:00") == pytest.approx(REV / 2, abs=1)
+
+
+def test_ds_c_has_no_cyclic_modes(family) -> None:
+    with pytest.raises(SdoAbort):
+        family(DS_C).set("6060:00", 8)
+
+
+@pytest.mark.parametrize(("option", "bits"), [(0, 0x27), (1, 0x08), (2, 0x40), (3, 0x07)])
+def test_generic_drive_obeys_6007h(family, option: int, bits: int) -> None:
+    b = family(load_profile("generic402"))
+    b.set("6007:00", option)
+    b.enable(3)
+    b.set("60FF:00", 10 * REV)
+    b.run(0.5)
+    b.set("605E:00", 0)
+    b.servo.communication_lost("heartbeat")
+    assert b.status & 0x6F == bits
