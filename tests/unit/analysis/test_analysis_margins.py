@@ -1,0 +1,151 @@
+"""Margins, rational fit, steps and spectra against closed forms, python-control and scipy."""
+
+import control
+import numpy as np
+import pytest
+
+from backend.analysis.fit import fit_rational, resonance_table
+from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
+from backend.analysis.spectrum import amplitude_spectrum, measure, power_density, spectrogram
+from backend.analysis.step import move_metrics, step_metrics
+
+TURN = 2 * np.pi
+F = np.geomspace(0.1, 3000.0, 3000)
+
+
+def response(system, f=F):
+    return system(2j * np.pi * f)
+
+
+LOOPS = {
+    "third order": control.tf([4e6], [1, 300, 2e4, 0]) * 0.2,
+    "pi on inertia with lag": control.tf([1, 60.0], [1, 0]) * control.tf([300.0], [1, 0]) * control.tf([6283.0], [1, 6283.0]),
+    "resonant": control.tf([200.0], [1, 0]) * control.tf([1, 20, 4e5], [1, 30, 6e5]) * control.tf([3000.0], [1, 3000.0]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_margins_agree_with_python_control(name):
+    system = LOOPS[name]
+    found = margins(F, response(system))
+    gm, pm, sm, wpc, wgc, _ = control.stability_margins(system)
+    assert found.phase_margin_deg == pytest.approx(pm, abs=0.2)
+    assert found.phase_margin_hz == pytest.approx(wgc / TURN, rel=2e-3)
+    assert found.ms == pytest.approx(1 / sm, rel=5e-3)
+    if np.isfinite(gm) and gm > 1:
+        assert found.gain_margin_db == pytest.approx(20 * np.log10(gm), abs=0.05)
+        assert found.gain_margin_hz == pytest.approx(wpc / TURN, rel=2e-3)
+    else:
+        assert found.gain_margin_db is None
+
+
+@pytest.mark.parametrize("gain", [0.05, 0.2, 0.9, 1.1, 2.0, 10.0])
+@pytest.mark.parametrize("name", LOOPS)
+def test_stability_agrees_with_the_closed_loop_poles(name, gain):
+    system = LOOPS[name] * gain * (1.5 if name == "third order" else 30.0)
+    poles = control.feedback(system).poles()
+    f = np.geomspace(0.01, 1e5, 6000)
+    assert margins(f, response(system, f)).stable == bool(np.all(poles.real < 0))
+
+
+def test_open_and_closed_are_inverse():
+    loop = response(LOOPS["resonant"])
+    assert np.allclose(open_from_closed(closed_from_open(loop)), loop)
+
+
+def test_bandwidth_of_a_damped_second_order_system():
+    # ζ = 1/√2: -3 dB exactly at the natural frequency, -90° there as well
+    w = TURN * 40.0
+    closed = response(control.tf([w**2], [1, np.sqrt(2) * w, w**2]))
+    found = bandwidth(F, closed)
+    assert found.minus_3db_hz == pytest.approx(40.0, rel=1e-3)
+    assert found.minus_90deg_hz == pytest.approx(40.0, rel=1e-3)
+    assert bandwidth(F[:100], closed[:100]).minus_3db_hz is None
+
+
+def test_rational_fit_recovers_resonances_of_a_known_system():
+    w1, w2, wz = TURN * 57.0, TURN * 210.0, TURN * 40.0
+    system = (
+        control.tf([1.0], [1, 2.0])
+        * control.tf([1, 2 * 0.03 * wz, wz**2], [1, 2 * 0.02 * w1, w1**2])
+        * control.tf([1e6], [1, 2 * 0.04 * w2, w2**2])
+    )
+    f = np.geomspace(2.0, 600.0, 250)
+    rng = np.random.default_rng(0)
+    noise = 1 + 0.01 * (rng.normal(size=f.size) + 1j * rng.normal(size=f.size))
+    fit = fit_rational(f, response(system, f) * noise, 5)
+    table = resonance_table(fit.poles, fit.zeros(), (2.0, 600.0))
+    peaks = [(r.frequency_hz, r.damping) for r in table if r.kind == "resonance"]
+    valleys = [(r.frequency_hz, r.damping) for r in table if r.kind == "antiresonance"]
+    assert peaks[0] == pytest.approx((57.0, 0.02), rel=0.05)
+    assert peaks[1] == pytest.approx((210.0, 0.04), rel=0.05)
+    assert valleys[0] == pytest.approx((40.0, 0.03), rel=0.08)
+    assert peaks[0][0] == pytest.approx(57.0, rel=0.002)
+    grid = np.geomspace(3.0, 500.0, 999)
+    error = np.abs(fit.response(grid) / response(system, grid) - 1)
+    assert np.median(error) < 0.01
+    with pytest.raises(ValueError, match="too few"):
+        fit_rational(f[:6], response(system, f[:6]), 5)
+
+
+def test_step_metrics_of_a_second_order_step():
+    zeta, wn = 0.3, TURN * 10.0
+    t = np.linspace(0.0, 1.0, 100_001)
+    _, y = control.step_response(control.tf([wn**2], [1, 2 * zeta * wn, wn**2]), t)
+    m = step_metrics(t, 5.0 * y + 2.0, target=7.0, initial=2.0)
+    assert m.overshoot_percent == pytest.approx(
+        100 * np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2)), abs=0.01
+    )
+    assert m.peak_time_s == pytest.approx(np.pi / (wn * np.sqrt(1 - zeta**2)), rel=1e-3)
+    info = control.step_info(control.tf([wn**2], [1, 2 * zeta * wn, wn**2]), T=t)
+    assert m.rise_s == pytest.approx(info["RiseTime"], rel=2e-3)
+    assert m.settling_s == pytest.approx(info["SettlingTime"], rel=2e-3)
+    assert step_metrics(t[:2000], 5 * y[:2000], target=5.0).settling_s is None
+    with pytest.raises(ValueError, match="size zero"):
+        step_metrics(t, y, target=0.0, initial=0.0)
+
+
+def test_move_metrics_of_a_lagging_axis():
+    t = np.arange(0, 2.0, 1e-3)
+    demand = np.clip(t, 0.0, 1.0)
+    actual = demand - 0.05 * np.exp(-np.maximum(t - 1.0, 0.0) / 0.1) * (t > 0)
+    m = move_metrics(t, demand, actual, window=0.01, torque=np.full(t.size, -2.0))
+    assert m.following_peak == pytest.approx(0.05, rel=1e-3)
+    assert m.settling_s == pytest.approx(0.1 * np.log(5.0), abs=2e-3)
+    assert (m.torque_peak, m.torque_rms) == (2.0, 2.0)
+    assert m.overshoot == pytest.approx(0.0, abs=1e-9)
+
+
+def test_amplitude_spectrum_reads_peak_and_mean():
+    t = np.arange(2000) / 1000.0
+    s = amplitude_spectrum(1.5 + 0.7 * np.sin(TURN * 50.0 * t), 1000.0)
+    assert s.value[0] == pytest.approx(1.5)
+    assert s.frequency_hz[np.argmax(s.value[1:]) + 1] == pytest.approx(50.0)
+    assert np.max(s.value[1:]) == pytest.approx(0.7, rel=1e-6)
+
+
+def test_density_of_white_noise_integrates_to_its_power():
+    x = np.random.default_rng(1).normal(0, 2.0, 40_000)
+    s = power_density(x, 1000.0)
+    assert np.mean(s.value[1:-1]) == pytest.approx(4.0 / 500.0, rel=0.03)
+    g = spectrogram(x, 1000.0)
+    assert g.value.shape == (g.frequency_hz.size, g.time_s.size)
+    assert np.mean(g.value[2:-1]) == pytest.approx(4.0 / 500.0, rel=0.03)
+
+
+def test_cursor_read_outs_of_a_noisy_sine():
+    t = np.arange(4000) / 4000.0
+    x = 1.0 + 3.0 * np.sin(TURN * 17.0 * t) + np.random.default_rng(2).normal(0, 0.05, t.size)
+    m = measure(x, 4000.0)
+    assert m.mean == pytest.approx(1.0, abs=0.01)
+    assert m.rms == pytest.approx(np.sqrt(1 + 4.5 + 0.0025), rel=0.01)
+    assert m.peak_to_peak == pytest.approx(6.0, abs=0.4)
+    assert m.frequency_hz == pytest.approx(17.0, rel=2e-3)
+    flat = measure(np.ones(10), 1000.0)
+    assert flat.frequency_hz is None
+    assert flat.rise_s is None
+
+
+def test_cursor_rise_time_of_a_ramp():
+    x = np.concatenate([np.zeros(100), np.linspace(0, 1, 201), np.ones(100)])
+    assert measure(x, 1000.0).rise_s == pytest.approx(0.160, abs=1e-6)
