@@ -13,12 +13,14 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
+from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.faults import active_faults, fault_keys
 from backend.units import AxisUnits, read_units
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
+from drivers.link import OwnsPowerState
 from profiles.schema import Fault, Raw
 
 #: Longest time that one change of the power state may take (brake and bus included).
@@ -54,6 +56,8 @@ class Axis:
         self._enable_pause_s = ((pause.milliseconds if pause else None) or 0.0) / 1000.0
         #: The last control word written, for edges.
         self.control_word = 0
+        #: The running cyclic exchange of the axis' bus, which then writes the control word.
+        self.session: CyclicSession | None = None
         #: STOP was pressed: no word that enables may be sent until a new command is given.
         self.stopped = False
 
@@ -84,6 +88,12 @@ class Axis:
         Raises:
             NotAllowed: STOP was pressed and the word would enable the axis again.
         """
+        if self.cyclic_power() is not None:
+            raise NotAllowed(
+                f"{self.drive.name}: the cyclic exchange writes the control word",
+                drive=self.drive.name,
+                remedy="end the cyclic exchange, or use a cyclic mode",
+            )
         enables = word & cia402.ENABLE_OPERATION == cia402.ENABLE_OPERATION
         if self.stopped and enables:
             raise NotAllowed(
@@ -104,12 +114,46 @@ class Axis:
 
     # --- power state ------------------------------------------------------------------
 
+    def cyclic_power(self) -> OwnsPowerState | None:
+        """The cyclic loop, while it runs and owns this axis' control word."""
+        session = self.session
+        return session.power() if session is not None and session.running else None
+
+    async def go_to_cyclic(
+        self, session: CyclicSession, goal: State, mode: Mode | None, timeout_s: float
+    ) -> None:
+        """Let the loop walk the state machine.
+
+        Raises:
+            NotAllowed: the drive stays where it is, with the cause that is known; or STOP.
+        """
+        power = session.power()
+        if power is None:
+            if mode is not None:
+                await self.set_mode(mode)
+            await self.go_to(goal, timeout_s)
+            return
+        if self.stopped and goal is State.OPERATION_ENABLED:
+            raise NotAllowed(f"{self.drive.name}: STOP was pressed", drive=self.drive.name)
+        station = session.station(self.drive)
+        if goal is State.OPERATION_ENABLED and await self.state() is State.FAULT:
+            raise await self._refused(State.FAULT, goal)
+        await power.drive_to(station, goal, None if mode is None else int(mode))
+        deadline = time.monotonic() + timeout_s
+        while (state := await self.state()) is not goal:
+            if state is State.FAULT or time.monotonic() > deadline:
+                raise await self._refused(state, goal)
+            await asyncio.sleep(_POLL_S)
+
     async def go_to(self, goal: State, timeout_s: float = STATE_TIMEOUT_S) -> State:
         """Walk the state machine to ``goal``, one transition after the other.
 
         Raises:
             NotAllowed: the drive stays where it is; the message gives the cause that is known.
         """
+        if self.session is not None and self.cyclic_power() is not None:
+            await self.go_to_cyclic(self.session, goal, None, timeout_s)
+            return goal
         deadline = time.monotonic() + timeout_s
         state = await self.state()
         while (word := cia402.next_control_word(state, goal, self.control_word)) is not None or (
@@ -171,6 +215,15 @@ class Axis:
         Raises:
             NotAllowed: the fault is still present.
         """
+        power = self.cyclic_power()
+        if power is not None and self.session is not None:
+            await power.reset_fault(self.session.station(self.drive))
+            deadline = time.monotonic() + STATE_TIMEOUT_S
+            while (state := await self.state()) is State.FAULT:
+                if time.monotonic() > deadline:
+                    raise await self._refused(state, State.SWITCH_ON_DISABLED)
+                await asyncio.sleep(_POLL_S)
+            return state
         await self.control(cia402.DISABLE_VOLTAGE)
         return await self.go_to(State.SWITCH_ON_DISABLED)
 
@@ -210,6 +263,9 @@ class Axis:
 
     async def quick_stop(self) -> None:
         """Stop now, by one write; harmless when nothing moves."""
+        if self.session is not None and self.cyclic_power() is not None:
+            await self.session.cyclic.halt(self.session.station(self.drive))
+            return
         await self.control(cia402.QUICK_STOP)
 
     async def halt_and_wait(self, timeout_s: float) -> None:
@@ -288,6 +344,13 @@ class Axis:
             NotAllowed: the axis cannot be enabled, with the cause.
         """
         drive = self.drive
+        if self.cyclic_power() is not None:
+            raise NotAllowed(
+                f"{drive.name}: profile and homing modes are not possible while the cyclic "
+                "exchange runs",
+                drive=drive.name,
+                remedy="end the cyclic exchange, or use CSP, CSV or CST",
+            )
         self.stopped = False
         before = await self.state()
         if before is State.OPERATION_ENABLED and not await self.standstill(0.5):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -12,6 +13,7 @@ from typing import Literal
 
 from backend.access import Leases
 from backend.axis import Axis
+from backend.cyclic import CyclicSession
 from backend.drive import Drive, Port, Reading
 from backend.files import write_atomically
 from backend.jobs import Job, JobRunner, Progress
@@ -84,6 +86,7 @@ class Bench:
         self.sets = SetLibrary(state_folder / "sets")
         self.members: dict[str, Member] = {}
         self.links: dict[str, Link] = {}
+        self.sessions: dict[str, CyclicSession] = {}
         self.on_snapshot: list[Callable[[str, Snapshot], None]] = []
         self.on_readings: list[Callable[[str, list[Reading]], None]] = []
         self.on_job: list[Callable[[Job], None]] = []
@@ -167,6 +170,59 @@ class Bench:
         if drive is not None and event.kind in ("boot", "back"):
             self._returned(drive.id)
 
+    # --- cyclic exchange --------------------------------------------------------------
+
+    async def start_cyclic(self, url: str, cycle_s: float) -> CyclicSession:
+        """Exchange process data with all drives of a bus.
+
+        Raises:
+            NotAllowed: no drives, no cyclic data on this bus, or a drive refuses.
+            Busy: it runs already, or a drive is moving.
+        """
+        link = await self.link(url)
+        users = [m for m in self.members.values() if any(p.link is link for p in m.drive.ports)]
+        if not users:
+            raise NotAllowed(f"{url} has no connected drives", remedy="connect a drive first")
+        for member in users:
+            self.require_idle(member)
+        if (old := self.sessions.get(url)) is not None:
+            if old.running:
+                raise Busy(f"{url}: the cyclic exchange runs already", remedy="end it first")
+            await self.stop_cyclic(url)
+        session = CyclicSession(link, [m.drive for m in users])
+        await session.start(cycle_s)
+        self.sessions[url] = session
+        for member in users:
+            member.axis.session = session
+        self.journal.add(f"{url}: cyclic exchange every {cycle_s * 1e3:g} ms")
+        self._drives_changed()
+        return session
+
+    async def stop_cyclic(self, url: str) -> None:
+        """End the exchange of a bus; what moves is braked. Does nothing where none runs."""
+        session = self.sessions.pop(url, None)
+        if session is None:
+            return
+        for member in self.members.values():
+            if member.axis.session is session:
+                member.axis.session = None
+        await session.stop()
+        self.journal.add(f"{url}: cyclic exchange ended")
+        self._drives_changed()
+
+    def require_idle(self, member: Member) -> None:
+        """Nothing moves this axis.
+
+        Raises:
+            Busy: a job does.
+        """
+        if (job := self.jobs.moving(member.drive.id)) is not None:
+            raise Busy(
+                f"{member.drive.name} is moved by {job.title!r}",
+                drive=member.drive.name,
+                remedy="wait for it to end, or stop it",
+            )
+
     # --- drives -----------------------------------------------------------------------
 
     def member(self, drive_id: str) -> Member:
@@ -234,12 +290,10 @@ class Bench:
             Busy: it is moving.
         """
         member = self.member(drive_id)
-        if (job := self.jobs.moving(drive_id)) is not None:
-            raise Busy(
-                f"{member.drive.name} is moved by {job.title!r}",
-                drive=member.drive.name,
-                remedy="stop it first",
-            )
+        self.require_idle(member)
+        for url, session in list(self.sessions.items()):
+            if member.drive in session.drives:
+                await self.stop_cyclic(url)
         del self.members[drive_id]
         await member.monitor.close()
         self._save()
@@ -361,6 +415,9 @@ class Bench:
         """Stop what moves, then let go of every bus."""
         await self.jobs.close()
         await self.scope.close()
+        for url in list(self.sessions):
+            with contextlib.suppress(DriveError):
+                await self.stop_cyclic(url)
         await asyncio.gather(*(m.monitor.close() for m in self.members.values()))
         await asyncio.gather(
             *(link.close() for link in self.links.values()), return_exceptions=True

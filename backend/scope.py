@@ -45,10 +45,17 @@ class Subscription:
     rows: list[list[float]] = field(default_factory=list)
     times: list[float] = field(default_factory=list)
     since: float = 0.0
+    synchronous: bool = False
+    leave: Callable[[], None] | None = None
+
+    def take(self, block: ScopeBlock) -> None:
+        """A block of the cyclic exchange."""
+        self.put(block.samples, block.t0_s, block.dt_s, None, block.dropped, block.valid)
 
     def put(self, samples: np.ndarray[tuple[int, int], np.dtype[np.float64]], t0_s: float,
             dt_s: float, times_s: np.ndarray[tuple[int], np.dtype[np.float64]] | None,
-            lost: int = 0) -> None:  # fmt: skip
+            lost: int = 0,
+            valid: np.ndarray[tuple[int], np.dtype[np.bool_]] | None = None) -> None:  # fmt: skip
         """Queue a block, or count it as dropped."""
         self.dropped += lost
         if len(self.queue) >= QUEUE_BLOCKS:
@@ -64,6 +71,7 @@ class Subscription:
                 samples=samples,
                 dropped=self.dropped,
                 times_s=times_s,
+                valid=valid,
             )
         )
         self.dropped = 0
@@ -84,8 +92,13 @@ class ScopeHub:
         self._axis_of = axis_of
         self._samplers: dict[str, _Sampler] = {}
 
-    def subscribe(self, drive: str, keys: Sequence[str], period_s: float) -> Subscription:
+    def subscribe(
+        self, drive: str, keys: Sequence[str], period_s: float
+    ) -> list[tuple[Subscription, tuple[int, ...]]]:
         """Begin to sample ``keys`` of a drive, at least ``period_s`` apart (0: as fast as it goes).
+
+        Returns streams with the positions in ``keys`` that each carries: what the cyclic exchange
+        of the bus carries comes with every cycle, the rest is polled.
 
         Raises:
             NotAllowed: a key that the drive does not have or that no port carries.
@@ -93,6 +106,20 @@ class ScopeHub:
         axis = self._axis_of(drive)
         for key in keys:
             axis.drive.port_for(axis.drive.parameter(key))
+        session = axis.session
+        cyclic = [n for n, k in enumerate(keys) if session and session.carries(axis.drive, k)]
+        polled = [n for n in range(len(keys)) if n not in cyclic]
+        streams: list[tuple[Subscription, tuple[int, ...]]] = []
+        if cyclic and session is not None:
+            stream = Subscription(drive, tuple(keys[n] for n in cyclic), 0.0, synchronous=True)
+            stream.leave = session.subscribe(axis.drive, stream.keys, stream.take)
+            streams.append((stream, tuple(cyclic)))
+        if polled:
+            wanted = [keys[n] for n in polled]
+            streams.append((self._poll(axis, drive, wanted, period_s), tuple(polled)))
+        return streams
+
+    def _poll(self, axis: Axis, drive: str, keys: Sequence[str], period_s: float) -> Subscription:
         subscription = Subscription(drive, tuple(keys), period_s)
         sampler = self._samplers.get(drive)
         if sampler is None:
@@ -102,6 +129,9 @@ class ScopeHub:
 
     async def unsubscribe(self, subscription: Subscription) -> None:
         """End a stream; the sampler ends with its last one."""
+        if subscription.leave is not None:
+            subscription.leave()
+            return
         sampler = self._samplers.get(subscription.drive)
         if sampler is not None and sampler.remove(subscription):
             del self._samplers[subscription.drive]

@@ -15,6 +15,7 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
+from drivers.cia402 import State
 from drivers.errors import DriveError
 from profiles.schema import DataType, LinkKind, Profile
 
@@ -138,9 +139,9 @@ class ScopeBlock:
     """A run of equally spaced samples.
 
     ``samples`` has shape [n, k] for k ``channels`` in raw units scaled by nobody; ``t0_s`` is the
-    time of the first sample on the link's clock (monotonic), ``dt_s`` the spacing. ``dropped`` counts
-    samples lost since the previous block of this stream; ``valid`` [n] is False where the working
-    counter or the timing says that a sample cannot be trusted.
+    time of the first sample on the link's clock (monotonic), ``dt_s`` the spacing. ``dropped``
+    counts samples lost since the previous block of this stream; ``valid`` [n] is False where the
+    working counter or the timing says that a sample cannot be trusted.
     """
 
     sequence: int
@@ -220,3 +221,21 @@ class Cyclic(Protocol):
 
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
         """Deliver samples on the event loop's thread."""
+
+
+@runtime_checkable
+class OwnsPowerState(Protocol):
+    """A cyclic exchange whose loop writes the control word, so that nobody else may."""
+
+    @property
+    def running(self) -> bool:
+        """Whether process data are exchanged."""
+
+    async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
+        """Head for a power state; the axis brakes before it leaves Operation enabled."""
+
+    async def reset_fault(self, station: int) -> None:
+        """Reset a fault once; the axis stays disabled."""
+
+    def axis_state(self, station: int) -> tuple[str, str, str]:
+        """Power state, phase of the setpoints, and why the last motion was ended by force."""

@@ -15,7 +15,7 @@ from backend.parameter_set import Difference
 from backend.tools.procedures import describe
 from drivers import cia402
 from drivers.cia402 import Mode
-from drivers.link import Found, LinkQuality
+from drivers.link import Found, Link, LinkQuality
 from profiles.schema import ConfirmStep, Fault, Parameter, Procedure
 
 
@@ -38,6 +38,27 @@ def quality(now: LinkQuality) -> models.Quality:
         wkc_errors=now.wkc_errors,
         round_trip_ms=now.round_trip_ms,
         details=now.details,
+    )
+
+
+def bus(bench: Bench, url: str, link: Link) -> models.Bus:
+    """An opened bus."""
+    session = bench.sessions.get(url)
+    info = None
+    if session is not None and session.state is not None:
+        info = models.CyclicInfo(
+            running=session.running,
+            cycle_us=session.state.cycle_s * 1e6,
+            dc=session.state.dc,
+            channels=list(session.state.channels),
+            left_over=dict(session.state.left_over),
+        )
+    return models.Bus(
+        url=url,
+        kind=link.kind,
+        quality=quality(link.quality()),
+        cyclic_possible=link.cyclic is not None,
+        cyclic=info,
     )
 
 

@@ -45,12 +45,14 @@ from backend.api.live_messages import (
     WatchValues,
     from_page,
 )
+from backend.axis import Axis
 from backend.bench import Bench
 from backend.drive import Reading
-from backend.jobs import Job
+from backend.jobs import Job, JobResult, Progress
 from backend.journal import Entry
 from backend.monitor import Snapshot
 from backend.scope import Subscription
+from backend.tools.cyclic_motion import jog_cyclic
 from backend.tools.jog import Hold, JogSettings, jog
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock
@@ -333,7 +335,7 @@ class Connection:
             job = bench.jobs.start(
                 "jog",
                 f"Jog {member.drive.name}",
-                lambda progress: jog(member.axis, settings, hold, progress),
+                lambda progress: _jog_work(member.axis, settings, hold, progress),
                 drive=request.drive,
                 motion=True,
                 person=self.person,
@@ -370,8 +372,8 @@ class Connection:
             for drive, numbers in columns.items():
                 keys = [request.channels[n].key for n in numbers]
                 self._bench.member(drive)
-                stream = self._bench.scope.subscribe(drive, keys, request.period_s)
-                streams.append((stream, tuple(numbers)))
+                for stream, places in self._bench.scope.subscribe(drive, keys, request.period_s):
+                    streams.append((stream, tuple(numbers[place] for place in places)))
         except DriveError as error:
             for stream, _ in streams:
                 await self._bench.scope.unsubscribe(stream)
@@ -380,16 +382,18 @@ class Connection:
             )
             return
         self._scopes[request.subscription] = streams
-        self.send(ScopeInfo(subscription=request.subscription, channels=self._described(request)))
+        synchronous = {n for stream, numbers in streams if stream.synchronous for n in numbers}
+        described = self._described(request, synchronous)
+        self.send(ScopeInfo(subscription=request.subscription, channels=described))
         count = len(request.channels)
         self._scope_tasks[request.subscription] = [
             asyncio.create_task(self._pump(request.subscription, stream, numbers, count))
             for stream, numbers in streams
         ]
 
-    def _described(self, request: ScopeStart) -> list[ScopeChannelInfo]:
+    def _described(self, request: ScopeStart, synchronous: set[int]) -> list[ScopeChannelInfo]:
         result = []
-        for channel in request.channels:
+        for number, channel in enumerate(request.channels):
             drive = self._bench.member(channel.drive).drive
             parameter = drive.parameter(channel.key)
             result.append(
@@ -398,7 +402,7 @@ class Connection:
                     key=parameter.key,
                     name=parameter.name,
                     unit=parameter.unit,
-                    synchronous=False,
+                    synchronous=number in synchronous,
                 )
             )
         return result
@@ -417,6 +421,13 @@ class Connection:
             while True:
                 block = await stream.next()
                 await send(encode_block(subscription, block, numbers, count))
+
+
+async def _jog_work(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress) -> JobResult:
+    """Through the cyclic exchange where it runs, else as a moving target."""
+    if axis.session is not None and axis.session.running:
+        return await jog_cyclic(axis, axis.session, settings, hold, progress)
+    return await jog(axis, settings, hold, progress)
 
 
 def encode_block(

@@ -92,12 +92,31 @@ class Quality(Message):
     details: dict[str, float | int | str]
 
 
+class CyclicInfo(Message):
+    """The running cyclic exchange of a bus."""
+
+    running: bool
+    cycle_us: float
+    dc: bool | None = Field(description="distributed clocks in use; None where there are none")
+    channels: list[str] = Field(description="drive/key of what comes with every cycle")
+    left_over: dict[str, str] = Field(description="what did not fit, and why; it is polled")
+
+
+class CyclicRequest(Message):
+    """Begin to exchange process data with all drives of a bus."""
+
+    url: str
+    cycle_us: int = Field(default=1000, ge=250, le=10000)
+
+
 class Bus(Message):
     """An opened bus."""
 
     url: str
     kind: str
     quality: Quality
+    cyclic_possible: bool
+    cyclic: CyclicInfo | None
 
 
 class ScanRequest(Message):
@@ -414,6 +433,21 @@ class SequenceRequest(Message):
     dwell_s: float = Field(default=0.5, ge=0, le=60)
     count: int = Field(default=5, ge=1, le=100000)
     travel_limit: float = Field(gt=0)
+    torque_limit: float = Field(gt=0, le=400)
+
+
+class GenerateRequest(Message):
+    """A test signal in a cyclic mode; amplitude in rev (CSP), rpm (CSV) or % (CST)."""
+
+    mode: Literal["CSP", "CSV", "CST"]
+    shape: Literal["step", "ramp", "trapezoid", "sine", "chirp"]
+    amplitude: float
+    duration_s: float = Field(gt=0, le=120)
+    frequency_hz: float = Field(default=1.0, gt=0, le=2000)
+    frequency_end_hz: float = Field(default=10.0, gt=0, le=2000)
+    acceleration: float = Field(default=10.0, gt=0)
+    travel_limit: float = Field(gt=0)
+    speed_limit: float = Field(gt=0)
     torque_limit: float = Field(gt=0, le=400)
 
 

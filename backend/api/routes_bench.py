@@ -14,6 +14,7 @@ from backend.api.interfaces import list_interfaces
 from backend.api.models import (
     Bus,
     ConnectRequest,
+    CyclicRequest,
     DriveSummary,
     DriveUpdate,
     Health,
@@ -26,6 +27,7 @@ from backend.api.models import (
     StopRequest,
     StopResult,
 )
+from backend.bench import Bench
 from backend.jobs import Job, JobResult, Progress
 from drivers.link import Found
 from profiles import load_all
@@ -71,10 +73,34 @@ async def profiles() -> list[ProfileInfo]:
 @router.get("/buses")
 async def buses(bench: TheBench) -> list[Bus]:
     """Opened buses with their counters."""
-    return [
-        Bus(url=url, kind=link.kind, quality=convert.quality(link.quality()))
-        for url, link in bench.links.items()
-    ]
+    return [convert.bus(bench, url, link) for url, link in bench.links.items()]
+
+
+@router.post("/buses/cyclic")
+async def start_cyclic(
+    bench: TheBench, request: CyclicRequest, connection: Connection = None
+) -> Bus:
+    """Exchange process data with all drives of a bus."""
+    _require_bus(bench, request.url, connection)
+    await bench.start_cyclic(request.url, request.cycle_us / 1e6)
+    return convert.bus(bench, request.url, bench.links[request.url])
+
+
+@router.delete("/buses/cyclic", status_code=204)
+async def stop_cyclic(
+    bench: TheBench, url: Annotated[str, Query()], connection: Connection = None
+) -> Response:
+    """End the cyclic exchange of a bus; what moves is braked."""
+    _require_bus(bench, url, connection)
+    await bench.stop_cyclic(url)
+    return Response(status_code=204)
+
+
+def _require_bus(bench: Bench, url: str, connection: str | None) -> None:
+    """Control of every drive of a bus."""
+    for member in bench.members.values():
+        if any(bench.url_of(port) == url for port in member.drive.ports):
+            bench.leases.require(member.drive.id, connection)
 
 
 @router.delete("/buses", status_code=204)

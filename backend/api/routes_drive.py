@@ -10,6 +10,7 @@ from backend.api.errors import NotFound, problem_of
 from backend.api.models import (
     ActiveFault,
     AxisState,
+    GenerateRequest,
     HomeRequest,
     HomingMethodInfo,
     JobInfo,
@@ -29,9 +30,9 @@ from backend.api.models import (
 from backend.axis import Envelope
 from backend.bench import Member
 from backend.drive import Reading
-from backend.tools import homing, move, parameters, procedures
+from backend.tools import cyclic_motion, homing, move, parameters, procedures
 from drivers.cia402 import Mode, State
-from drivers.errors import Busy, DriveError, NotAllowed, OutOfRange
+from drivers.errors import DriveError, NotAllowed, OutOfRange
 
 router = APIRouter(prefix="/drives/{drive_id}")
 
@@ -54,7 +55,7 @@ async def faults(member: TheMember) -> list[ActiveFault]:
 @router.post("/transition")
 async def transition(bench: TheBench, member: Controlled, request: TransitionRequest) -> AxisState:
     """Drive the power state machine. Enabling aims the set-point at where the axis stands."""
-    _require_idle(bench, member)
+    bench.require_idle(member)
     goal = State(request.goal)
     axis = member.axis
     axis.stopped = False
@@ -78,15 +79,6 @@ def _mode(member: Member, number: int) -> Mode:
             limit=", ".join(str(mode) for mode in member.drive.profile.supported_modes),
             remedy="choose one of its modes",
         ) from error
-
-
-def _require_idle(bench: TheBench, member: Member) -> None:
-    if (job := bench.jobs.moving(member.drive.id)) is not None:
-        raise Busy(
-            f"{member.drive.name} is moved by {job.title!r}",
-            drive=member.drive.name,
-            remedy="wait for it to end, or stop it",
-        )
 
 
 @router.post("/fault-reset")
@@ -168,7 +160,7 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
         )
     parameter = drive.parameter(key)
     if bench.jobs.moving(drive.id) is not None and drive.commands_motion(parameter.key):
-        _require_idle(bench, member)
+        bench.require_idle(member)
     old = drive.readings.get(parameter.key)
     if request.raw is not None:
         reading = await drive.write(key, request.raw)
@@ -207,7 +199,7 @@ async def run_procedure(
             value=name,
             remedy="see GET …/procedures",
         )
-    _require_idle(bench, member)
+    bench.require_idle(member)
     job = bench.jobs.start(
         "procedure",
         f"{known.title}: {member.drive.name}",
@@ -236,7 +228,7 @@ async def read_all(bench: TheBench, member: TheMember, request: ReadAllRequest) 
 @router.post("/jobs/load_set", status_code=202)
 async def load_set(bench: TheBench, member: Controlled, request: LoadSetRequest) -> JobInfo:
     """Write chosen rows of a parameter set, each read back."""
-    _require_idle(bench, member)
+    bench.require_idle(member)
     content = bench.sets.load(request.file)
     job = bench.jobs.start(
         "load_set",
@@ -300,6 +292,38 @@ async def start_sequence(bench: TheBench, member: Controlled, request: SequenceR
         "sequence",
         f"Back and forth: {member.drive.name}",
         lambda progress: move.sequence(member.axis, settings, progress),
+        drive=member.drive.id,
+        motion=True,
+    )
+    return convert.job(job)
+
+
+@router.post("/jobs/generate", status_code=202)
+async def start_generator(bench: TheBench, member: Controlled, request: GenerateRequest) -> JobInfo:
+    """Play a test signal in a cyclic mode, one value per cycle."""
+    session = member.axis.session
+    if session is None or not session.running:
+        raise NotAllowed(
+            f"{member.drive.name}: the cyclic exchange does not run",
+            drive=member.drive.name,
+            remedy="start it on the Connect page",
+        )
+    settings = cyclic_motion.GeneratorSettings(
+        mode=request.mode,
+        shape=request.shape,
+        amplitude=request.amplitude,
+        duration_s=request.duration_s,
+        envelope=Envelope(
+            request.travel_limit, request.speed_limit, request.torque_limit, request.duration_s
+        ),
+        frequency_hz=request.frequency_hz,
+        frequency_end_hz=request.frequency_end_hz,
+        acceleration=request.acceleration,
+    )
+    job = bench.jobs.start(
+        "generate",
+        f"{request.shape} in {request.mode}: {member.drive.name}",
+        lambda progress: cyclic_motion.generate(member.axis, session, settings, progress),
         drive=member.drive.id,
         motion=True,
     )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from datetime import datetime
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -11,7 +13,8 @@ from profiles import drive_names, load_profile
 from profiles.check import check as check_profile
 from profiles.check import coverage
 from profiles.export import show as shown
-from profiles.loader import ProfileError
+from profiles.importer import ImportFailed, export_eds, import_file, write_profile
+from profiles.loader import ProfileError, user_folder
 
 app = typer.Typer(help="Drive profiles: show, check, import.")
 
@@ -35,6 +38,48 @@ def show(
             f"{parameter.key}{number}  {parameter.name}  [{parameter.type} {parameter.access}"
             f"{' ' + parameter.unit if parameter.unit else ''}]  {parameter.source}"
         )
+
+
+@app.command("import")
+def import_description(
+    file: Annotated[Path, typer.Argument(help="ESI (.xml), EDS or DCF file", exists=True)],
+    name: Annotated[str | None, typer.Option(help="name of the new profile")] = None,
+    product_code: Annotated[
+        str | None, typer.Option(help="which device of an ESI file, e.g. 0x190")
+    ] = None,
+    folder: Annotated[
+        Path | None, typer.Option(help="where profiles lie; your own folder if left out")
+    ] = None,
+) -> None:
+    """Make a generic profile from a maker's description file."""
+    try:
+        code = None if product_code is None else int(product_code, 0)
+        imported = import_file(file.read_bytes(), file.name, drive=name, product_code=code)
+        if folder is None and imported.profile.drive in drive_names():
+            raise ImportFailed(
+                f"there is a profile {imported.profile.drive!r} already: choose another with --name"
+            )
+        target = write_profile(imported.profile, folder or user_folder())
+    except (ImportFailed, OSError, ValueError) as error:
+        raise typer.BadParameter(str(error)) from error
+    for finding in imported.report.findings:
+        print(f"  {finding}")
+    print(f"{imported.profile.title}: {len(imported.profile.parameters)} parameters, "
+          f"{imported.report.summary()}")  # fmt: skip
+    print(f"written to {target}; use it as {imported.profile.drive}")
+
+
+@app.command("export-eds")
+def export_description(
+    drive: str, out: Annotated[Path, typer.Argument(help="the EDS file to write")]
+) -> None:
+    """Write a profile's objects as a CANopen EDS file."""
+    try:
+        profile = load_profile(drive)
+    except ProfileError as error:
+        raise typer.BadParameter(str(error)) from error
+    out.write_bytes(export_eds(profile, datetime.now(), out.name).encode("utf-8"))
+    print(f"{out} written")
 
 
 @app.command("check")

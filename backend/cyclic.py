@@ -1,0 +1,159 @@
+"""Process data of one bus: which signals are mapped, and delivering them in units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.drive import Drive, Port, address_of
+from drivers.errors import Busy, NotAllowed
+from drivers.link import Cyclic, CyclicSignal, Link, OwnsPowerState, ScopeBlock, Unsubscribe
+
+#: Signals mapped as far as they fit, the important ones first.
+INPUT_ROLES = (
+    "status_word", "position_actual", "velocity_actual", "torque_actual", "mode_display",
+    "following_error", "error_code", "digital_inputs", "velocity_demand", "position_demand",
+)  # fmt: skip
+OUTPUT_ROLES = (
+    "control_word", "mode", "position_target", "velocity_target", "torque_target",
+    "position_offset", "velocity_offset", "torque_offset",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class CyclicState:
+    """What the page shows of an exchange."""
+
+    cycle_s: float
+    dc: bool | None
+    channels: tuple[str, ...]
+    left_over: tuple[tuple[str, str], ...]
+
+
+class CyclicSession:
+    """The running exchange of one bus, between `start` and `stop`."""
+
+    def __init__(self, link: Link, drives: Sequence[Drive]) -> None:
+        if link.cyclic is None:
+            raise NotAllowed(
+                f"{link.url} has no cyclic process data", remedy="use an EtherCAT or CANopen bus"
+            )
+        self.link = link
+        self.cyclic: Cyclic = link.cyclic
+        self.drives = tuple(drives)
+        self.state: CyclicState | None = None
+
+    async def start(self, cycle_s: float) -> CyclicState:
+        """Map the signals of all drives and begin.
+
+        Raises:
+            NotAllowed: a drive refuses; the reason is in words.
+            Busy: it runs already.
+        """
+        if self.state is not None:
+            raise Busy(f"{self.link.url}: the cyclic exchange runs already")
+        inputs, outputs = [], []
+        for drive in self.drives:
+            port = self._port(drive)
+            inputs += _signals(drive, port, INPUT_ROLES, ("tx", "rxtx"))
+            outputs += _signals(drive, port, OUTPUT_ROLES, ("rx", "rxtx"))
+        outputs = _fitting_outputs(self.drives, outputs)
+        mapped = await self.cyclic.configure(inputs, outputs, cycle_s)
+        await self.cyclic.start()
+        left = {s.channel for s in [*inputs, *outputs]} - {s.channel for s in mapped}
+        reasons = {s.channel: why for s, why in getattr(self.cyclic, "left_over", ())}
+        self.state = CyclicState(
+            cycle_s=cycle_s,
+            dc=getattr(self.cyclic, "dc", None),
+            channels=tuple(signal.channel for signal in mapped),
+            left_over=tuple((c, reasons.get(c, "does not fit")) for c in sorted(left)),
+        )
+        return self.state
+
+    async def stop(self) -> None:
+        """Brake what moves and end the exchange."""
+        self.state = None
+        await self.cyclic.stop()
+
+    @property
+    def running(self) -> bool:
+        """Whether process data are exchanged."""
+        if self.state is None:
+            return False
+        return not isinstance(self.cyclic, OwnsPowerState) or self.cyclic.running
+
+    def power(self) -> OwnsPowerState | None:
+        """The loop, where it owns the control words."""
+        return self.cyclic if isinstance(self.cyclic, OwnsPowerState) else None
+
+    def _port(self, drive: Drive) -> Port:
+        return next(port for port in drive.ports if port.link is self.link)
+
+    def station(self, drive: Drive) -> int:
+        """Station of a drive on this bus."""
+        return self._port(drive).station
+
+    def carries(self, drive: Drive, key: str) -> bool:
+        """Whether this signal comes with every cycle."""
+        return (
+            self.running and self.state is not None and channel(drive, key) in self.state.channels
+        )
+
+    def subscribe(
+        self, drive: Drive, keys: Sequence[str], deliver: Callable[[ScopeBlock], None]
+    ) -> Unsubscribe:
+        """Deliver blocks of these keys only, in the parameters' units."""
+        names = tuple(channel(drive, key) for key in keys)
+        parameters = [drive.parameter(key) for key in keys]
+        scale = np.array([p.scale for p in parameters])
+        offset = np.array([p.offset for p in parameters])
+
+        def take(block: ScopeBlock) -> None:
+            columns = [block.channels.index(name) for name in names if name in block.channels]
+            if len(columns) != len(names):
+                return
+            deliver(
+                ScopeBlock(
+                    sequence=block.sequence,
+                    t0_s=block.t0_s,
+                    dt_s=block.dt_s,
+                    channels=tuple(keys),
+                    samples=block.samples[:, columns] * scale + offset,
+                    dropped=block.dropped,
+                    valid=block.valid,
+                )
+            )
+
+        return self.cyclic.blocks(take)
+
+
+def channel(drive: Drive, key: str) -> str:
+    """Name of a signal in the blocks of a bus."""
+    return f"{drive.id}/{key}"
+
+
+def _signals(
+    drive: Drive, port: Port, roles: Sequence[str], directions: Sequence[str]
+) -> list[CyclicSignal]:
+    found = []
+    for role in roles:
+        parameter = drive.profile.by_role.get(role)
+        if parameter is not None and parameter.pdo in directions:
+            found.append(
+                CyclicSignal(port.station, address_of(parameter), channel(drive, parameter.key))
+            )
+    return found
+
+
+def _fitting_outputs(drives: Sequence[Drive], wanted: list[CyclicSignal]) -> list[CyclicSignal]:
+    """Outputs are all or nothing on the bus, so what exceeds a drive's limit is left out here."""
+    room = {drive.id: drive.profile.pdo.max_entries if drive.profile.pdo else 8 for drive in drives}
+    kept = []
+    for signal in wanted:
+        drive_id = signal.channel.split("/", 1)[0]
+        if room[drive_id] > 0:
+            room[drive_id] -= 1
+            kept.append(signal)
+    return kept

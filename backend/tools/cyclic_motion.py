@@ -1,0 +1,284 @@
+"""Motion with one set-point per cycle: jog, and the signal generator for CSP, CSV and CST.
+
+A trajectory is computed beforehand and checked against the envelope; the loop plays it, watches
+the envelope every cycle, and brakes by itself when the renewals stop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.axis import Axis, Envelope, shielded
+from backend.cyclic import CyclicSession
+from backend.drive import address_of
+from backend.jobs import JobResult, Progress
+from backend.tools.jog import Hold, JogSettings
+from drivers import link as bus
+from drivers.cia402 import Mode, State
+from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
+
+_RENEW_S = 0.05
+_STATE_TIMEOUT_S = 5.0
+_MAX_S = 120.0
+
+Signal = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class GeneratorSettings:
+    """A test signal around the present position (CSP), standstill (CSV) or zero torque (CST).
+
+    ``amplitude`` in rev, rpm or % of rated. ``frequency_hz`` for sine; start and end of a chirp
+    with ``frequency_end_hz``. Ramps and trapezoids use ``acceleration`` (rev/s², rpm/s, %/s).
+    """
+
+    mode: Literal["CSP", "CSV", "CST"]
+    shape: Literal["step", "ramp", "trapezoid", "sine", "chirp"]
+    amplitude: float
+    duration_s: float
+    envelope: Envelope
+    frequency_hz: float = 1.0
+    frequency_end_hz: float = 10.0
+    acceleration: float = 10.0
+
+
+def signal(settings: GeneratorSettings, cycle_s: float) -> Signal:
+    """The test signal, shape [n], in the unit of the amplitude; begins and ends at zero.
+
+    Raises:
+        OutOfRange: duration or frequencies that make no sense at this cycle time.
+    """
+    if not 0 < settings.duration_s <= _MAX_S:
+        raise OutOfRange(
+            f"a duration of {settings.duration_s:g} s is outside 0 to {_MAX_S:g} s",
+            value=settings.duration_s,
+            limit=f"0…{_MAX_S:g} s",
+        )
+    nyquist = 0.5 / cycle_s
+    highest = max(settings.frequency_hz, settings.frequency_end_hz)
+    if settings.shape in ("sine", "chirp") and not 0 < highest < nyquist / 2:
+        raise OutOfRange(
+            f"{highest:g} Hz cannot be played at a cycle of {cycle_s * 1e3:g} ms",
+            value=highest,
+            limit=f"below {nyquist / 2:g} Hz",
+            remedy="lower the frequency or shorten the cycle",
+        )
+    count = max(2, round(settings.duration_s / cycle_s))
+    t: Signal = np.arange(count, dtype=np.float64) * np.float64(cycle_s)
+    match settings.shape:
+        case "step":
+            wave = np.where((t > 0) & (t < settings.duration_s / 2), 1.0, 0.0)
+            values = settings.amplitude * wave
+        case "ramp" | "trapezoid":
+            values = _trapezoid(settings, t)
+        case "sine":
+            values = settings.amplitude * np.sin(2 * math.pi * settings.frequency_hz * t)
+            values *= _fade(t, settings.duration_s)
+        case "chirp":
+            values = settings.amplitude * np.sin(_chirp_phase(settings, t))
+            values *= _fade(t, settings.duration_s)
+    values[0] = values[-1] = 0.0
+    return np.asarray(values)
+
+
+def _trapezoid(settings: GeneratorSettings, t: Signal) -> Signal:
+    """Up to the amplitude and back: a linear ramp, or a move with limited speed change."""
+    size, half = abs(settings.amplitude), settings.duration_s / 2
+    sign = math.copysign(1.0, settings.amplitude)
+    mirrored = np.where(t <= half, t, settings.duration_s - t)
+    if settings.shape == "ramp":
+        return sign * np.minimum(settings.acceleration * mirrored, size)
+    # Fastest move of this size: accelerate, then brake (CSP); for CSV and CST a limited slope.
+    if settings.mode != "CSP":
+        return sign * np.minimum(settings.acceleration * mirrored, size)
+    turn = math.sqrt(size / settings.acceleration)
+    up = 0.5 * settings.acceleration * mirrored**2
+    down = size - 0.5 * settings.acceleration * np.maximum(2 * turn - mirrored, 0.0) ** 2
+    move = np.where(mirrored < turn, up, down)
+    return sign * np.minimum(move, size)
+
+
+def _fade(t: Signal, duration_s: float) -> Signal:
+    """Raised-cosine fade over the first and last tenth."""
+    edge = duration_s / 10
+    inside = np.minimum(np.minimum(t, duration_s - t) / edge, 1.0)
+    return np.asarray(0.5 - 0.5 * np.cos(math.pi * np.clip(inside, 0.0, 1.0)))
+
+
+def _chirp_phase(settings: GeneratorSettings, t: Signal) -> Signal:
+    """Logarithmic chirp (constant time per octave)."""
+    ratio = settings.frequency_end_hz / settings.frequency_hz
+    if ratio == 1.0:
+        return 2 * math.pi * settings.frequency_hz * t
+    rate = math.log(ratio) / settings.duration_s
+    return np.asarray(2 * math.pi * settings.frequency_hz * np.expm1(rate * t) / rate)
+
+
+async def generate(
+    axis: Axis, session: CyclicSession, settings: GeneratorSettings, progress: Progress
+) -> JobResult:
+    """Play a test signal once.
+
+    Raises:
+        OutOfRange: the signal leaves the envelope; nothing has moved.
+        NotAllowed: the loop ended the motion; the reason is in words.
+    """
+    units, drive = await axis.units(), axis.drive
+    cycle_s = _cycle(session)
+    values = signal(settings, cycle_s)
+    mode = Mode[settings.mode]
+    async with _enabled(axis, session, mode):
+        start = await axis.position_raw()
+        if settings.mode == "CSP":
+            raw = start + np.round(values * units.position_raw(1.0)).astype(np.int64)
+            role = "position_target"
+        elif settings.mode == "CSV":
+            raw = np.round(values * units.velocity_raw(1000.0) / 1000.0).astype(np.int64)
+            role = "velocity_target"
+        else:
+            raw = np.round(values * units.torque_raw(100.0) / 100.0).astype(np.int64)
+            role = "torque_target"
+        target = address_of(drive.profile.by_role[role])
+        trajectory = bus.Trajectory(
+            session.station(drive), target, raw, await _limits(axis, settings.envelope, start)
+        )
+        await _play(session, trajectory, len(raw) * cycle_s, progress)
+        end = await axis.position_raw()
+    return {"cycles": len(raw), "moved_rev": units.position(end - start)}
+
+
+async def jog_cyclic(
+    axis: Axis, session: CyclicSession, settings: JogSettings, hold: Hold, progress: Progress
+) -> JobResult:
+    """Hold-to-run jog in CSP: a trapezoid to the travel limit, left early on release.
+
+    Raises:
+        NotAllowed: as `generate`.
+    """
+    units, drive = await axis.units(), axis.drive
+    cycle_s = _cycle(session)
+    progress(0.0, "enabling")
+    async with _enabled(axis, session, Mode.CSP):
+        start = await axis.position_raw()
+        speed = units.velocity(units.velocity_raw(settings.speed_rpm)) / 60.0
+        slope = settings.acceleration_rpm_s / 60.0
+        travel = run_up(settings.travel_rev, speed, slope, cycle_s)
+        raw = start + np.round(settings.direction * travel * units.position_raw(1.0)).astype(
+            np.int64
+        )
+        envelope = Envelope(
+            settings.travel_rev, settings.speed_rpm, settings.torque_percent, _MAX_S
+        )
+        station = session.station(drive)
+        await session.cyclic.play(
+            [
+                bus.Trajectory(
+                    station,
+                    address_of(drive.profile.by_role["position_target"]),
+                    raw,
+                    await _limits(axis, envelope, start),
+                )
+            ]
+        )
+        progress(0.0, "moving")
+        reason = await _while_held(session, station, hold)
+        await session.cyclic.halt(station)
+        if not await axis.standstill(2.0):
+            raise LinkTimeout(
+                f"{drive.name} still moves 2 s after the jog was released",
+                drive=drive.name,
+                remedy="use the machine's emergency stop",
+            )
+        moved = units.position(await axis.position_raw() - start)
+    return {"reason": reason, "moved_rev": moved}
+
+
+def run_up(travel: float, speed: float, slope: float, cycle_s: float) -> Signal:
+    """Positions of a trapezoid over ``travel`` with ``speed`` and ``slope``, one per cycle."""
+    ramp = min(speed / slope, math.sqrt(travel / slope))
+    peak = slope * ramp
+    cruise = max(0.0, (travel - peak * ramp) / peak)
+    total = 2 * ramp + cruise
+    t = np.arange(min(math.ceil(total / cycle_s) + 1, round(_MAX_S / cycle_s))) * cycle_s
+    rising = 0.5 * slope * t**2
+    level = 0.5 * peak * ramp + peak * (t - ramp)
+    falling = travel - 0.5 * slope * np.maximum(total - t, 0.0) ** 2
+    return np.asarray(np.where(t < ramp, rising, np.where(t < ramp + cruise, level, falling)))
+
+
+async def _while_held(session: CyclicSession, station: int, hold: Hold) -> str:
+    while not (reason := hold.ended()):
+        await session.cyclic.renew(station)
+        _raise_if_ended(session, station)
+        await asyncio.sleep(_RENEW_S)
+    return reason
+
+
+def _cycle(session: CyclicSession) -> float:
+    if session.state is None:
+        raise NotAllowed(
+            f"{session.link.url}: the cyclic exchange does not run",
+            remedy="start it on the Connect page",
+        )
+    return session.state.cycle_s
+
+
+async def _limits(axis: Axis, envelope: Envelope, start: int) -> bus.Envelope:
+    units = await axis.units()
+    travel = units.position_raw(envelope.travel_rev)
+    return bus.Envelope(
+        position_min=start - travel,
+        position_max=start + travel,
+        speed_max=units.velocity_raw(envelope.speed_rpm * 1.2 + 20.0),
+        torque_max=units.torque_raw(envelope.torque_percent),
+    )
+
+
+async def _play(
+    session: CyclicSession,
+    trajectory: bus.Trajectory,
+    duration_s: float,
+    progress: Progress,
+) -> None:
+    await session.cyclic.play([trajectory])
+    began = time.monotonic()
+    while (elapsed := time.monotonic() - began) < duration_s:
+        await session.cyclic.renew(trajectory.station)
+        _raise_if_ended(session, trajectory.station)
+        progress(elapsed / duration_s, "playing")
+        await asyncio.sleep(min(_RENEW_S, duration_s - elapsed))
+
+
+def _raise_if_ended(session: CyclicSession, station: int) -> None:
+    power = session.power()
+    if power is not None and (reason := power.axis_state(station)[2]):
+        raise NotAllowed(
+            f"station {station}: {reason}", remedy="see the Alarms page; check the envelope"
+        )
+
+
+@asynccontextmanager
+async def _enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterator[None]:
+    """Operation enabled through the loop; disabled again on every way out."""
+    axis.stopped = False
+    try:
+        await axis.go_to_cyclic(session, State.OPERATION_ENABLED, mode, _STATE_TIMEOUT_S)
+        yield
+    finally:
+        await shielded(lambda: _leave(axis, session), _STATE_TIMEOUT_S, axis.drive.name)
+
+
+async def _leave(axis: Axis, session: CyclicSession) -> None:
+    station = session.station(axis.drive)
+    await session.cyclic.halt(station)
+    await axis.standstill(2.0)
+    await axis.go_to_cyclic(session, State.SWITCH_ON_DISABLED, None, _STATE_TIMEOUT_S)
