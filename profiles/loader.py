@@ -31,9 +31,16 @@ class ProfileError(Exception):
     """A profile file is wrong; the message names the file or drive, the place and the remedy."""
 
 
+def user_folder() -> Path:
+    """Where the user's own and imported profiles lie; it need not exist."""
+    chosen = os.environ.get("SERVODECK_PROFILES")
+    return Path(chosen) if chosen else Path(platformdirs.user_data_dir("servodeck")) / "profiles"
+
+
 def drive_names() -> tuple[str, ...]:
-    """Names of all families that have a folder, sorted."""
-    return tuple(sorted(p.parent.name for p in _HERE.glob("*/profile.yaml")))
+    """Names of all families that have a folder here or in the user's folder, sorted."""
+    folders = (_HERE, user_folder())
+    return tuple(sorted({p.parent.name for f in folders for p in f.glob("*/profile.yaml")}))
 
 
 @cache
@@ -44,6 +51,8 @@ def load_profile(drive: str) -> Profile:
         ProfileError: unknown drive, broken YAML, or a record that the schema refuses.
     """
     folder = _HERE / drive
+    if not (folder / "profile.yaml").exists():
+        folder = user_folder() / drive
     files = sorted(folder.glob("*.yaml"))
     if drive not in drive_names():
         raise ProfileError(f"no profile named {drive!r}; there are: {', '.join(drive_names())}")

@@ -55,12 +55,15 @@ def import_description(
     try:
         code = None if product_code is None else int(product_code, 0)
         imported = import_file(file.read_bytes(), file.name, drive=name, product_code=code)
-        if folder is None and imported.profile.drive in drive_names():
-            raise ImportFailed(
-                f"there is a profile {imported.profile.drive!r} already: choose another with --name"
-            )
-        target = write_profile(imported.profile, folder or user_folder())
     except (ImportFailed, OSError, ValueError) as error:
+        raise typer.BadParameter(str(error)) from error
+    if folder is None and imported.profile.drive in drive_names():
+        raise typer.BadParameter(
+            f"there is a profile {imported.profile.drive!r} already: choose another with --name"
+        )
+    try:
+        target = write_profile(imported.profile, folder or user_folder())
+    except (ImportFailed, OSError) as error:
         raise typer.BadParameter(str(error)) from error
     for finding in imported.report.findings:
         print(f"  {finding}")

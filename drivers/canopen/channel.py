@@ -183,12 +183,8 @@ class SdoChannel:
             yield 0x1000, self._tag
 
     def _discard_strays(self) -> None:
-        while True:
-            try:
-                answer = self._answers.get_nowait()
-            except Empty:
-                return
-            if not isinstance(answer, DriveError):
+        while not self._answers.empty():
+            if not isinstance(self._answers.get_nowait(), DriveError):
                 self.strays += 1
 
     def read(self, index: int, subindex: int, timeout_s: float) -> bytes:

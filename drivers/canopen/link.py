@@ -70,6 +70,7 @@ class CanopenLink:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._workers: ThreadPoolExecutor | None = None
         self._listeners: list[Callable[[LinkEvent], None]] = []
+        self._used: set[int] = set()
         self._strays_told = dict.fromkeys(range(1, 128), 0)
         self._cyclic = CanopenCyclic(
             self._port, self._settings, self._sdo_read, self._sdo_write, self._in_worker
@@ -256,8 +257,10 @@ class CanopenLink:
         self._channel(station).write(index, subindex, data, timeout_s)
 
     def _in_use(self, station: int) -> None:
-        with self._watch_lock:
-            self._watch.record(station).in_use = True
+        if station not in self._used:
+            with self._watch_lock:
+                self._watch.record(station).in_use = True
+            self._used.add(station)
 
     async def _in_worker(self, work: Callable[[], T]) -> T:
         if self._workers is None:

@@ -127,13 +127,15 @@ class Wires:
         parsed = parse_url(url)
         place = parsed.place.removeprefix("slcan/")
         path = self._folder / f"can{number}" if parsed.is_virtual else Path(place)
-        bitrate = int(dict(parsed.options).get("bitrate", "1000000"))
+        options = dict(parsed.options)
+        bitrate = int(options.get("bitrate", "1000000"))
+        wire_bitrate = int(options["wire_bitrate"]) if "wire_bitrate" in options else None
         nodes = [
             CanopenNode(self._device(axis, station), station, time.monotonic_ns)
             for axis, station in self._bench.on(url)
         ]
         side = SlcanSide(path)
-        wire = CanWire(side, nodes)
+        wire = CanWire(side, nodes, wire_bitrate)
         wire.start()
         self._can_wires[url] = (wire, side)
         self.real_urls[url] = f"canopen://slcan/{path}?bitrate={bitrate}"

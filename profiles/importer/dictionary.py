@@ -48,6 +48,7 @@ def describe_dictionary(
     Raises:
         ImportFailed: it says nothing.
     """
+    file = f"dictionary of {tidy(name)}"
     found: list[DescribedEntry] = []
     seen: set[tuple[int, int]] = set()
     for entry in entries:
@@ -63,11 +64,11 @@ def describe_dictionary(
         if len(found) >= MAX_ENTRIES:
             report.left_out(place, "the drive lists more entries than any drive has")
             break
-        found.append(_described(entry, report))
+        found.append(_described(entry, file, report))
     if not found:
         raise ImportFailed(f"{name} lists no objects: it may not offer the SDO information service")
     return Description(
-        file=f"dictionary of {name}",
+        file=file,
         link=link,
         maker="unknown maker",
         model=tidy(name),
@@ -78,7 +79,7 @@ def describe_dictionary(
     )
 
 
-def _described(entry: DictionaryEntry, report: ImportReport) -> DescribedEntry:
+def _described(entry: DictionaryEntry, file: str, report: ImportReport) -> DescribedEntry:
     place = f"{entry.index:04X}:{entry.subindex:02X}"
     data_type = TYPE_BY_CODE.get(entry.type_code)
     if data_type is None:
@@ -102,5 +103,5 @@ def _described(entry: DictionaryEntry, report: ImportReport) -> DescribedEntry:
         access=access,
         pdo=pdo,
         unit=unit,
-        source=f"the drive's dictionary: {place}",
+        source=f"{file}:{place}",
     )

@@ -113,7 +113,7 @@ def test_makers_use_many_encodings(encoding: str, text: str) -> None:
 
 @pytest.mark.parametrize("data", [b"", b"hello", b"[2000]\nx=y\n", b"\0" * 1000, b"PK\x03\x04"])
 def test_what_is_no_eds_file_is_refused_with_a_reason(data: bytes) -> None:
-    with pytest.raises(ImportFailed, match="file|known type"):
+    with pytest.raises(ImportFailed, match=r"file|known type"):
         import_file(data, "x.eds")
 
 
