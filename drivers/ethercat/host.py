@@ -72,7 +72,8 @@ class Host:
             operations.use_spare_time()
         else:
             worked = any(operations.lanes.step() for _ in range(8))
-            self._commands(0.0 if worked else self._idle_s(now))
+            self._flush()
+            self._commands(0.0 if worked or self._outgoing else self._idle_s(now))
         operations.housekeeping(now)
         if now >= self._next_status:
             self._next_status = now + _STATUS_S

@@ -118,7 +118,6 @@ class Mailbox:
     on_emergency: Callable[[bytes], None]
     timeout_s: float = 1.0
     counter: int = field(default=1, init=False)
-    repeat: int = field(default=0, init=False)
     unsettled: bool = field(default=False, init=False)
     """A request timed out: its answer may still come and must not answer the next one."""
     repeats: int = field(default=0, init=False)
@@ -145,14 +144,14 @@ class Mailbox:
         deadline = self.clock() + (self.timeout_s if timeout_s is None else timeout_s)
         self._next_counter()
         mail = frame(protocol, self.counter, payload, self.out_size)
-        delivered = yield from self._send(mail, deadline)
+        delivered = yield from self._send(mail)
         return (yield from self._wait(mail, delivered, matches, deadline))
 
     def post(self, protocol: int, payload: bytes) -> Steps[None]:
         """Send a mail that nobody answers."""
         self._next_counter()
         mail = frame(protocol, self.counter, payload, self.out_size)
-        yield from self._send(mail, self.clock() + self.timeout_s)
+        yield from self._send(mail)
 
     def receive(self, matches: Callable[[Mail], bool], timeout_s: float) -> Steps[bytes]:
         """Wait for one more mail, as within a file transfer."""
@@ -171,27 +170,18 @@ class Mailbox:
     def _next_counter(self) -> None:
         self.counter = self.counter + 1 if self.counter < 7 else 2
 
-    def _send(self, mail: bytes, deadline: float) -> Steps[bool]:
-        """True when the slave certainly has the mail; False when a lost frame leaves it open."""
-        dead = 0
-        while True:
+    def _send(self, mail: bytes) -> Steps[bool]:
+        """True when the slave certainly has the mail.
+
+        False where a lost frame or a mailbox that is still full leaves it open: `_wait` sends it
+        again. What lies in the other mailbox is left alone, it may already be the answer.
+        """
+        for _ in range(_DEAD_READS):
             if (yield Write(self.out_address, mail)) is not None:
                 return True
-            status = yield Read(SM0_STATUS, 1)
-            dead = dead + 1 if status is None else 0
-            if dead >= _DEAD_READS:
-                raise _lost()
-            if status is not None and not status[0] & _FULL:
+            if (yield Read(SM0_STATUS, 1)) is not None:
                 return False
-            if self.clock() > deadline:
-                self.unsettled = True
-                raise LinkTimeout(
-                    "the drive does not empty its mailbox",
-                    remedy="switch the drive off and on; its communication processor hangs",
-                )
-            # Full: an earlier mail is still there. Its answer may be what blocks the slave.
-            yield from self.drain()
-            yield Pause(0.0005)
+        raise _lost()
 
     def _wait(
         self, mail: bytes, delivered: bool, matches: Callable[[Mail], bool], deadline: float
@@ -235,15 +225,23 @@ class Mailbox:
             data = yield Read(self.in_address, self.in_size)
             if data is not None:
                 return parse(data)
-            self.repeat ^= 0x02
-            self.repeats += 1
-            yield Write(SM1_ACTIVATE, bytes([0x01 | self.repeat]))
-            for _ in range(20):
-                acknowledged = yield Read(SM1_PDI, 1)
-                if acknowledged is not None and acknowledged[0] & 0x02 == self.repeat:
-                    break
-                yield Pause(0.0005)
+            yield from self._ask_again()
         return None
+
+    def _ask_again(self) -> Steps[None]:
+        """Toggle the repeat bit and wait for the slave's answer to it (ETG.1000.4 clause 5.6)."""
+        self.repeats += 1
+        wanted: int | None = None
+        for _ in range(40):
+            if wanted is None:
+                now = yield Read(SM1_ACTIVATE, 1)
+                wanted = None if now is None else now[0] ^ 0x02
+            else:
+                yield Write(SM1_ACTIVATE, bytes([wanted]))
+                told = yield Read(SM1_PDI, 1)
+                if told is not None and (told[0] ^ wanted) & 0x02 == 0:
+                    return
+            yield Pause(0.0005)
 
     def _is_emergency(self, mail: Mail) -> bool:
         """True for a CoE emergency (ETG.1000.6 clause 5.6.4), which is reported."""

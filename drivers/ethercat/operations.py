@@ -48,6 +48,8 @@ class Operations:
         self._next_watch = 0.0
         self._next_open = 0.0
         self._starved = 0
+        self._new_aliases: set[int] = set()
+        self._search_due = False
         self._managers: dict[int, bytes] = {}
         self._emergencies: dict[int, tuple[bytes, float]] = {}
         self._handlers: dict[str, Callable[[Message, Done], None]] = {
@@ -120,6 +122,8 @@ class Operations:
         if self.segment.replaced():
             self._interface_gone()
             return
+        if self._search_due:
+            self._search_again(now)
         for station in self.stations:
             if not self.lanes.busy(station.number, "register"):
                 self.lanes.submit(station.number, "register", self._watch(station), _ignore)
@@ -130,6 +134,18 @@ class Operations:
                 and not self.lanes.busy(station.number, "mailbox")
             ):
                 self.lanes.submit(station.number, "mailbox", station.box.drain(), _ignore)
+
+    def _search_again(self, now: float) -> None:
+        if now < self._next_open or self.loop is not None:
+            return
+        self._next_open = now + _REOPEN_S
+        before = len(self.stations)
+        self._attach_and_identify()
+        if len(self.stations) == before:
+            self._search_due = False
+            for number in self._new_aliases:
+                self._event("back", number, f"station {number} was switched on again")
+            self._new_aliases.clear()
 
     def _interface_gone(self) -> None:
         why = f"the interface {self.segment.interface} is gone"
@@ -189,6 +205,9 @@ class Operations:
             self.exchange.station_lost(station.number)
         if self.segment.recover(station.number):
             self._returned(station, restarted=True)
+        elif station.number in self._new_aliases and self.loop is None:
+            # SOEM knows a slave by its old alias and refuses it with the new one.
+            self._search_due = True
 
     def _returned(self, station: Station, *, restarted: bool) -> None:
         station.lost = False
@@ -208,6 +227,8 @@ class Operations:
         return words
 
     def _event(self, kind: str, station: int | None, text: str, code: int | None = None) -> None:
+        # The figures go first, so that who looks at them on hearing of it sees the same.
+        self._send({"event": "status"} | self.status())
         self._send({"event": "link", "kind": kind, "station": station, "text": text, "code": code})
 
     def _emergency(self, number: int) -> Callable[[bytes], None]:
@@ -246,6 +267,12 @@ class Operations:
         self.stations = [self._make_station(n + 1) for n in range(len(self.segment.slaves))]
         self._attached = True
 
+    def _attach_and_identify(self) -> None:
+        self._attach()
+        for found in self.stations:
+            steps = transactions.identify(found, time.monotonic)
+            self.lanes.submit(found.number, "mailbox", steps, _ignore)
+
     def _make_station(self, number: int) -> Station:
         slave = self.segment.slaves[number - 1]
         station = Station(number, slave.man, slave.id, slave.rev, slave.name)
@@ -265,11 +292,7 @@ class Operations:
         """The station a message is about; searches the segment if that was not done yet."""
         number = int(message["station"])
         if not self._attached:
-            self._attach()
-            for found in self.stations:
-                self.lanes.submit(
-                    found.number, "mailbox", transactions.identify(found, time.monotonic), _ignore
-                )
+            self._attach_and_identify()
         if not 1 <= number <= len(self.stations):
             self._attached = self._attached and bool(self.stations)
             raise LinkLost(
@@ -434,6 +457,7 @@ class Operations:
         self.segment.forget_errors()
         if told != alias:
             raise ProtocolError(f"the alias reads back as {told}, {alias} was written")
+        self._new_aliases.add(station.number)
         done({"alias": told}, None)
 
     def _foe(self, message: Message, done: Done) -> None:

@@ -193,7 +193,6 @@ def restore_mailbox(station: Station, managers: bytes, clock: Callable[[], float
     for number in (0, 1):
         yield Write(SYNC_MANAGERS + 8 * number, managers[8 * number : 8 * number + 8])
     yield from change_state(station, AlState.PREOP, clock)
-    station.box.repeat = 0
     station.box.unsettled = False
 
 

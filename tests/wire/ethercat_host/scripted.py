@@ -92,8 +92,8 @@ class ScriptedSlave:
             return b"\0"
         if step.register == 0x80D:
             return b"\x08" if ready else b"\0"
-        if step.register == 0x80F:
-            return bytes([self.repeat])
+        if step.register in (0x80E, 0x80F):
+            return bytes([self.repeat | 1])
         assert step == Read(IN, self.size)
         if not ready:
             return None

@@ -20,7 +20,7 @@ _BRAKE = 2_000_000.0
 
 
 def servo_profile(*, remappable: bool = True, dc: bool = True) -> Profile:
-    base = make_profile(dc=dc)
+    base = make_profile(dc=dc, foe=True)
     kept = [p for p in base.parameters if p.index is not None and p.index < 0x6000]
     spec = PdoSpec(
         sets=(
