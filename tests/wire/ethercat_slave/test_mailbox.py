@@ -163,6 +163,16 @@ def test_emergencies_come_by_themselves_and_wait_for_a_free_box(wire: Wire) -> N
     assert payload == b"\x00\x10" + b"\x05\x73" + b"\x01" + b"\x01\x02\x03\x04\x05"
 
 
+def test_a_flood_of_emergencies_does_not_grow_without_end(wire: Wire) -> None:
+    for _ in range(1000):
+        wire.device.inject("emergency", 0x7305)
+    wire.clock.time_ns += 2_000_000
+    taken = 0
+    while wire.read(MBX_IN, MBX_SIZE).wkc:
+        taken += 1
+    assert taken == 17  # one in the box and 16 waiting
+
+
 def test_a_mailbox_that_another_fmmu_reports(wire: Wire) -> None:
     """FMMU2 is mapped to the mailbox status (004:947): one bit of 80Dh in the process image."""
     raw = struct.pack("<IHBBHBBB3x", 0x400, 1, 0, 0, 0x080D, 3, 1, 1)

@@ -218,6 +218,30 @@ def test_complete_access_download_of_a_mapping(wire: Wire) -> None:
     assert wire.slaves[0].dictionary.assigned("rx") == (0x60400010, 0x60600008, 0x607A0020)
 
 
+# -- slaves that do not keep to the standard ---------------------------------------------------
+
+
+def test_complete_access_without_the_pad_byte(wire: Wire) -> None:
+    wire.slaves[0].coe.oddities.unpadded_count = True
+    answer = wire.sdo(struct.pack("<BHBI", 0x50, 0x2001, 0, 0))
+    assert answer[4:] == struct.pack("<I", 8) + b"\x03\x22\x11\x33wfUD"
+
+
+def test_aborts_with_more_bits_in_the_command(wire: Wire) -> None:
+    wire.slaves[0].coe.oddities.abort_command = 0x8F
+    answer = wire.coe(2, struct.pack("<BHBI", 0x40, 0x5555, 0, 0))
+    assert abort_of(answer) == (0x8F, 0x5555, 0, 0x06020000)
+
+
+def test_more_segments_than_announced(wire: Wire) -> None:
+    wire.device.values[0x2002, 0] = DATA
+    wire.slaves[0].coe.oddities.endless_segments = True
+    wire.sdo(struct.pack("<BHBI", 0x40, 0x2002, 0, 0))
+    for n in range(10):
+        part = wire.sdo(bytes([0x60 | (n & 1) << 4]) + bytes(7))
+        assert part[0] & 0x01 == 0
+
+
 # -- mapping rules (004:1131-1145, ETG.1000.6 clause 5.6.7.4) ----------------------------------
 
 

@@ -247,6 +247,17 @@ def test_slowness_and_silence_by_command() -> None:
     assert wire.slaves[0].al.refusals == {}
 
 
+def test_odd_slaves_by_command() -> None:
+    wire = Wire(1)
+    channel = Channel(wire)
+    channel("odd", slave=0, abort_command=0x8F, unpadded_count=True, endless_segments=True)
+    oddities = wire.slaves[0].coe.oddities
+    assert (oddities.abort_command, oddities.unpadded_count) == (0x8F, True)
+    assert oddities.endless_segments
+    channel("odd", slave=0)
+    assert not wire.slaves[0].coe.oddities.unpadded_count
+
+
 def test_a_busy_eeprom_by_command() -> None:
     wire = Wire(1)
     wire.number()

@@ -40,6 +40,18 @@ class MailboxError(Exception):
 
 
 @dataclass(slots=True)
+class Oddities:
+    """Behaviour of real slaves that do not keep to the standard; all off by default."""
+
+    unpadded_count: bool = False
+    """Complete access without the pad byte behind subindex 0."""
+    abort_command: int = _ABORT_COMMAND
+    """Command byte of an abort; some slaves set more than the three bits that count."""
+    endless_segments: bool = False
+    """Segmented uploads go on after the announced size, never marking the last segment."""
+
+
+@dataclass(slots=True)
 class _Transfer:
     """A segmented transfer under way."""
 
@@ -61,6 +73,7 @@ class CoeServer:
         self._complete_access = complete_access
         self._capacity = capacity
         self._transfer: _Transfer | None = None
+        self.oddities = Oddities()
         self.segments_answered = 0
         """Segments of the running or last segmented transfer, for injected trouble."""
 
@@ -106,7 +119,7 @@ class CoeServer:
             # An abort is an SDO *request* with command exactly 80h (ETG.1000.6 table 39).
             return [
                 _header(_SDO_REQUEST)
-                + struct.pack("<BHBI", _ABORT_COMMAND, index, subindex, abort.code)
+                + struct.pack("<BHBI", self.oddities.abort_command, index, subindex, abort.code)
             ]
         return [_header(_SDO_RESPONSE) + answer]
 
@@ -149,7 +162,8 @@ class CoeServer:
         room = self._capacity - 2 - 1
         part = bytes(transfer.data[transfer.sent : transfer.sent + room])
         transfer.sent += len(part)
-        last = transfer.sent >= transfer.size
+        last = transfer.sent >= transfer.size and not self.oddities.endless_segments
+        part = part or bytes(room)
         unused = max(0, 7 - len(part))
         reply = transfer.toggle | unused << 1 | int(last)
         transfer.toggle ^= _TOGGLE
@@ -232,7 +246,10 @@ class CoeServer:
                 if info.readable
                 else bytes((info.bit_length + 7) // 8)
             )
-            packed.append(value, 16 if subindex == 0 else info.bit_length or len(value) * 8)
+            bits = info.bit_length or len(value) * 8
+            if subindex == 0 and not self.oddities.unpadded_count:
+                bits = 16
+            packed.append(value, bits)
         return packed.data()
 
     def _write_all(self, index: int, first: int, data: bytes) -> None:

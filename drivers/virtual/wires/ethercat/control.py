@@ -13,6 +13,7 @@ from typing import IO, Any
 
 from drivers.virtual.device import SdoAbort
 from drivers.virtual.wires.ethercat import registers as reg
+from drivers.virtual.wires.ethercat.coe import Oddities
 from drivers.virtual.wires.ethercat.registers import AlState
 from drivers.virtual.wires.ethercat.segment import Segment, register
 from drivers.virtual.wires.ethercat.slave import Slave
@@ -55,6 +56,7 @@ class Control:
             "mute": self._mute,
             "die_in_transfer": self._die_in_transfer,
             "refuse": self._refuse,
+            "odd": self._odd,
             "inject": self._inject,
             "read": self._read,
             "write": self._write,
@@ -219,6 +221,19 @@ class Control:
             refusals[target] = code
         else:
             refusals.pop(target, None)
+
+    def _odd(
+        self,
+        slave: int,
+        *,
+        unpadded_count: bool = False,
+        abort_command: int = 0x80,
+        endless_segments: bool = False,
+    ) -> None:
+        """Behave like slaves that do not keep to the standard; without arguments, keep to it."""
+        self._slave(slave).coe.oddities = Oddities(
+            unpadded_count, abort_command & 0xFF, endless_segments
+        )
 
     def _inject(self, slave: int, what: str, value: float = 1.0) -> None:
         self._segment.settle()

@@ -19,6 +19,10 @@ _ERROR, _COE, _FOE = 0, 3, 4
 _UNSUPPORTED, _INVALID_SIZE = 0x02, 0x08
 
 
+_QUEUE_LIMIT = 16
+"""Messages that wait for a free mailbox; a drive's memory for them is small, too."""
+
+
 class FileServer(Protocol):
     """A file service behind the mailbox (FoE)."""
 
@@ -99,8 +103,8 @@ class Mailbox:
         self._outbox.repeat_ack = self._outbox.repeat_request
 
     def emergency(self, code: int, register: int, data: bytes) -> None:
-        """Queue an emergency; without an open mailbox it is lost, as in a drive."""
-        if self.open and not self.muted:
+        """Queue an emergency; without an open mailbox or with a full queue it is lost."""
+        if self.open and not self.muted and len(self._queue) < _QUEUE_LIMIT:
             self._post(_COE, CoeServer.emergency(code, register, data))
 
     # -- requests -------------------------------------------------------------------------------
