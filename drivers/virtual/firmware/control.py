@@ -143,6 +143,7 @@ class DeviceControl:
         self._halted = False
         self.modes.end()
         self._axis.power_off()
+        self._core.od.activate("stopped")
 
     def _disable(self, state: State) -> None:
         self._switch_off()

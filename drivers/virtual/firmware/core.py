@@ -16,7 +16,8 @@ class Core:
     """Dictionary and axis with the conversions between user units and SI units.
 
     ``zero_rad`` is the encoder angle at which the user's position is zero; homing and zeroing
-    move it, and like an absolute encoder's zero it survives a power cycle.
+    move it, and like an absolute encoder's zero it survives a power cycle. ``torque_cap_nm`` is a
+    limit below those of the parameters (homing against a stop).
     """
 
     def __init__(
@@ -28,6 +29,7 @@ class Core:
         self.axis = axis
         self.motor = axis.motor
         self.zero_rad = 0.0
+        self.torque_cap_nm = math.inf
         self.units: Units = family.units(od, axis.motor)
 
     def number(self, key: str, default: Number = 0) -> Number:
@@ -92,7 +94,7 @@ class Core:
         )
         self.apply_motion()
 
-    def apply_motion(self, torque_limit_nm: float = math.inf) -> None:
+    def apply_motion(self) -> None:
         """Windows and limits of the motion objects, which act at once."""
         per_rad = abs(self.units.position_per_rad)
         per_rad_s = abs(self.units.speed_per_rad_s)
@@ -107,5 +109,5 @@ class Core:
         sides = (
             self.torque_of(min(largest, self.number(key, 3000))) for key in ("60E0:00", "60E1:00")
         )
-        positive, negative = (min(side, torque_limit_nm) for side in sides)
+        positive, negative = (min(side, self.torque_cap_nm) for side in sides)
         self.axis.set_limits(positive, negative, self.max_speed())

@@ -119,6 +119,8 @@ class ObjectDictionary:
     def __init__(self, profile: Profile, station: int) -> None:
         self.entries: dict[int, Entry] = {}
         self.numbered: dict[str, Entry] = {}
+        self.writes = 0
+        """Counts accesses that wrote, so that process data notice them."""
         for parameter in profile.parameters:
             self._add(parameter)
         for parameter in _standard_objects(profile, station):
@@ -201,9 +203,9 @@ class ObjectDictionary:
             raise SdoAbort(ABORT_UNSUPPORTED) from None
         self.assign(entry, value)
 
-    @staticmethod
-    def assign(entry: Entry, value: Raw) -> None:
+    def assign(self, entry: Entry, value: Raw) -> None:
         """Store a checked value and tell whoever reacts to it."""
+        self.writes += 1
         before, before_active = entry.value, entry.active
         entry.value = value
         if entry.parameter.effective == "now":
@@ -242,12 +244,6 @@ class ObjectDictionary:
                 except SdoAbort:
                     continue
             entry.value = entry.active = value
-
-    def restore_defaults(self) -> None:
-        """All writable values back to what the manual prints."""
-        for entry in self:
-            if entry.parameter.access != "ro":
-                entry.value = entry.active = entry.default()
 
     def activate(self, *effective: str) -> None:
         """Written values of these effective classes come into use."""

@@ -110,6 +110,7 @@ class Homing:
         self._axis.watch_signals(0)
         self._axis.watch_stall(0.0, math.inf, 0.0)
         self._axis.p[k.P_LIMIT_STOPS] = float(self._core.family.traits.limit_switch_faults)
+        self._core.torque_cap_nm = math.inf
         self._core.apply_motion()
 
     # --- building blocks -------------------------------------------------------------------
@@ -203,7 +204,8 @@ class Homing:
     def _by_torque(self, direction: int) -> Script:
         core = self._core
         torque = core.torque_of(core.number("2070:01", 500))
-        core.apply_motion(torque_limit_nm=torque)
+        core.torque_cap_nm = torque
+        core.apply_motion()
         self._axis.watch_stall(
             0.95 * torque, core.number("2070:02", 500) * 1e-3, float(self._axis.p[k.P_STOP_SPEED])
         )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.families.base import Wiring
 
 _INPUTS = 4
 _PROBE_FUNCTION = 4  # of DI1 (probe 1) and DI2 (probe 2), 004:6480, 004:6492
@@ -19,6 +18,7 @@ class Panel:
         self.external = [False] * _INPUTS
         self.target_reached = False
         self.alarm = False
+        self._resetting = False
         self._probe_levels = [False, False]
         self._probe_status = 0
         self._probe_function = 0
@@ -80,12 +80,13 @@ class Panel:
             word |= on << output
         return word
 
-    def wiring(self) -> Wiring:
-        """Switch signals for the 50 µs loop."""
-        return self._core.family.wiring(self._core.od)
+    def update(self) -> bool:
+        """Something at the terminals may have changed; True asks for a fault reset (DI3)."""
+        self._update_probes()
+        before, self._resetting = self._resetting, self._alarm_reset_input()
+        return self._resetting and not before
 
-    def alarm_reset_input(self) -> bool:
-        """DI3 as alarm reset."""
+    def _alarm_reset_input(self) -> bool:
         return self._function(2) == _ALARM_RESET and self.terminal_valid(2, simulated=True)
 
     # --- touch probe -----------------------------------------------------------------------
@@ -103,8 +104,7 @@ class Panel:
             return False
         return self.terminal_valid(probe, simulated=True)
 
-    def update_probes(self) -> None:
-        """Look for edges; called whenever a terminal can have changed."""
+    def _update_probes(self) -> None:
         position = round(self._core.position_of(self._core.axis.angle_rad))
         for probe, shift, keys in ((0, 0, ("60BA:00", "60BB:00")), (1, 8, ("60BC:00", "60BD:00"))):
             level = self._probe_level(probe)

@@ -86,12 +86,16 @@ def _reader(entry: Entry) -> Callable[[], Raw]:
 class OutputImage:
     """Master to drive. Values out of range are limited, as a drive does with process data."""
 
-    def __init__(self, parts: Sequence[Entry | int], arrived: Callable[[], None]) -> None:
+    def __init__(
+        self, parts: Sequence[Entry | int], od: ObjectDictionary, arrived: Callable[[], None]
+    ) -> None:
         self._struct = _layout(parts)
         self.size = self._struct.size
         self._entries = [part for part in parts if isinstance(part, Entry)]
+        self._od = od
         self._arrived = arrived
         self._last: tuple[Number, ...] | None = None
+        self._writes = -1
 
     def pack(self) -> bytes:
         """The outputs as they stand in the dictionary."""
@@ -100,20 +104,29 @@ class OutputImage:
     def unpack(self, data: bytes) -> None:
         """Take over one cycle's outputs; set-points first, the control word last."""
         values = self._struct.unpack(data)
-        if values != self._last:
-            previous, self._last = self._last, values
-            changed: list[tuple[Entry, Number]] = []
-            for position, (entry, value) in enumerate(zip(self._entries, values, strict=True)):
-                if previous is not None and previous[position] == value and entry.value == value:
-                    continue
-                changed.append((entry, _limited(entry, value)))
-            changed.sort(key=lambda item: _ORDER.get(item[0].key, 0))
-            for entry, value in changed:
-                entry.value = entry.active = value
-            for entry, value in changed:
-                if entry.setter is not None:
-                    entry.setter(value)
+        # Process data overrule what another access wrote in between.
+        if values != self._last or self._writes != self._od.writes:
+            self._last, self._writes = values, self._od.writes
+            self._take(values)
         self._arrived()
+
+    def _take(self, values: tuple[Number, ...]) -> None:
+        changed = [
+            (entry, limited, entry.value)
+            for entry, value in zip(self._entries, values, strict=True)
+            if (limited := _limited(entry, value)) != entry.value
+        ]
+        changed.sort(key=lambda item: _ORDER.get(item[0].key, 0))
+        for entry, value, _ in changed:
+            entry.value = entry.active = value
+        for entry, value, before in changed:
+            if entry.setter is None:
+                continue
+            try:
+                entry.setter(value)
+            except SdoAbort:
+                # There is nobody to tell: what the drive refuses has no effect.
+                entry.value = entry.active = before
 
 
 #: The mode must act before the control word, and both after the set-points of the same cycle.

@@ -360,3 +360,67 @@ def test_unknown_family() -> None:
     profile = small_profile().model_copy(update={"drive": "teapot"})
     with pytest.raises(ValueError, match="teapot"):
         make_device(profile, None)
+
+
+def test_process_data_overrule_an_sdo_write(bench) -> None:
+    b = bench()
+    rx = b.servo.map_process_data([0x60400010], "rx")
+    rx.unpack(struct.pack("<H", 6))
+    b.set("6040:00", 0)
+    assert b.status & 0x6F == 0x40
+    rx.unpack(struct.pack("<H", 6))
+    assert b.status & 0x6F == 0x21
+
+
+def test_process_data_with_an_unknown_mode_change_nothing(bench) -> None:
+    b = bench()
+    rx = b.servo.map_process_data([0x60400010, 0x60600008], "rx")
+    rx.unpack(struct.pack("<Hb", 6, 3))
+    rx.unpack(struct.pack("<Hb", 6, 7))
+    assert b.get("6061:00") == b.get("6060:00") == 3
+
+
+def test_parameters_that_act_when_stopped_or_enabled_wait_for_it() -> None:
+    profile = small_profile()
+    classes = {"2005:01": "stopped", "2005:03": "reenable"}
+    profile = profile.model_copy(
+        update={
+            "parameters": tuple(
+                p.model_copy(update={"effective": classes.get(p.key, p.effective)})
+                for p in profile.parameters
+            )
+        }
+    )
+    b = Bench(VirtualServo(profile, Mms7(), rigid()))
+    p = b.servo.axis.p
+    b.set("2005:01", 100)
+    assert p[k.P_KP_POSITION_1] == pytest.approx(TURN * 10)
+    b.enable(1)
+    speed_gain = p[k.P_KP_SPEED_1]
+    b.set("2005:01", 300)
+    b.set("2005:03", 1000)
+    assert p[k.P_KP_POSITION_1] == pytest.approx(TURN * 10)
+    assert p[k.P_KP_SPEED_1] == speed_gain
+    b.set("6040:00", 6)
+    b.set("6040:00", 15)
+    assert p[k.P_KP_POSITION_1] == pytest.approx(TURN * 30)
+    assert p[k.P_KP_SPEED_1] == pytest.approx(speed_gain / 2)
+
+
+def test_parameters_for_standstill_are_refused_while_enabled() -> None:
+    profile = small_profile()
+    profile = profile.model_copy(
+        update={
+            "parameters": tuple(
+                p.model_copy(update={"settable": "stopped"}) if p.key == "2005:01" else p
+                for p in profile.parameters
+            )
+        }
+    )
+    b = Bench(VirtualServo(profile, Mms7(), rigid()))
+    b.set("2005:01", 100)
+    b.enable(1)
+    with pytest.raises(SdoAbort) as refused:
+        b.set("2005:01", 200)
+    assert refused.value.code == 0x08000022
+    assert b.get("2005:01") == 100

@@ -158,7 +158,6 @@ def test_following_error_is_a_fault_with_the_maker_s_code(family) -> None:
 def test_hz_width_notch_removes_its_centre(family) -> None:
     b = family(M6L)
     b.set("2009:0B", 500)
-    b.servo.core.apply_settings()
     p = b.servo.axis.p
     assert p[k.P_NOTCH_COUNT] == 1
     a1, a2, b1, b2 = p[k.P_NOTCHES : k.P_NOTCHES + 4]

@@ -1,0 +1,94 @@
+"""Where parameter values come from at power-on and where they are saved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from drivers.virtual.device import ABORT_STORE, SdoAbort
+from drivers.virtual.firmware.dictionary import Entry, ObjectDictionary
+from drivers.virtual.firmware.families.base import Family
+from drivers.virtual.firmware.nvm import Nvm
+from drivers.virtual.firmware.settings import MotorData
+from drivers.virtual.mechanics import MechanicsSpec
+from profiles.schema import Profile, Raw
+
+#: Set-points and commands, which no drive stores.
+VOLATILE: Final = frozenset(
+    f"{index:04X}:00"
+    for index in (0x6040, 0x6060, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2, 0x60B8)
+) | {"60FE:01", "60FE:02"}
+
+
+class Storage:
+    """Printed defaults, the maker's values for this motor, and the NVM over both."""
+
+    def __init__(
+        self,
+        profile: Profile,
+        family: Family,
+        od: ObjectDictionary,
+        mechanics: MechanicsSpec,
+        motor: MotorData,
+        nvm_path: Path | None,
+    ) -> None:
+        self._printed = profile.by_key
+        self._family = family
+        self._od = od
+        self._mechanics = mechanics
+        self._motor = motor
+        self._volatile = VOLATILE | set(family.traits.commands)
+        self.nvm = Nvm(nvm_path)
+
+    def power_on(self) -> None:
+        """Every value as after switching on."""
+        for entry in self._od:
+            entry.value = entry.active = entry.default()
+        self._load_factory()
+        self._od.load(self.nvm.load())
+
+    def _load_factory(self) -> None:
+        fallback = self._family.fallback_values(self._motor)
+        self._od.load(
+            {
+                key: value
+                for key, value in fallback.items()
+                if key not in self._printed or self._printed[key].default_raw is None
+            }
+        )
+        self._od.load(self._family.factory_values(self._mechanics, self._motor))
+
+    def save(self) -> None:
+        """All writable parameters to the NVM. Raises SdoAbort if it cannot be written."""
+        self._store(
+            {
+                entry.key: entry.value
+                for entry in self._od
+                if entry.parameter.access == "rw" and entry.key not in self._volatile
+            }
+        )
+
+    def restore(self) -> None:
+        """Factory values, in use and in the NVM. Raises SdoAbort if it cannot be written."""
+        self._store({})
+        for entry in self._od:
+            if entry.parameter.access != "ro" and entry.key not in self._volatile:
+                entry.value = entry.active = entry.default()
+        self._load_factory()
+
+    def autosave(self, entry: Entry) -> None:
+        """Families that store what is written: only this value, as their EEPROM does."""
+        index = entry.parameter.index
+        if index is None or entry.key in self._volatile or entry.parameter.access != "rw":
+            return
+        for rule in self._family.traits.autosave:
+            inside = rule.first_index <= index <= rule.last_index
+            if inside and int(self._od.number(rule.key)) & rule.mask:
+                self._store(self.nvm.load() | {entry.key: entry.value})
+                return
+
+    def _store(self, values: dict[str, Raw]) -> None:
+        try:
+            self.nvm.save(values)
+        except OSError:
+            raise SdoAbort(ABORT_STORE) from None

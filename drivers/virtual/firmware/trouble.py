@@ -1,0 +1,52 @@
+"""Trouble made on purpose, for tests and training."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.control import DeviceControl
+from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.panel import Panel
+
+_FAULTS: Final = {
+    "over_current": k.F_OVER_CURRENT, "under_voltage": k.F_UNDER_VOLTAGE,
+    "locked_rotor": k.F_LOCKED, "power_stage": k.F_POWER_STAGE, "overload": k.F_OVERLOAD,
+    "position_limit": k.F_POSITION_LIMIT, "sensor": k.F_SENSOR, "memory": k.F_MEMORY,
+    "over_temperature": k.F_OVER_TEMPERATURE, "over_voltage": k.F_OVER_VOLTAGE,
+    "over_speed": k.F_OVER_SPEED, "speed_error": k.F_SPEED_ERROR, "watchdog": k.F_WATCHDOG,
+    "following_error": k.F_FOLLOWING,
+}  # fmt: skip
+_PHYSICS: Final = {
+    "supply_v": k.P_SUPPLY_V, "ambient_c": k.P_AMBIENT, "load_nm": k.P_GRAVITY,
+    "coulomb_nm": k.P_COULOMB, "encoder_loss": k.P_ENCODER_DEAD,
+}  # fmt: skip
+
+
+def make_trouble(core: Core, control: DeviceControl, panel: Panel, what: str, value: float) -> None:
+    """One trouble by name; see `VirtualServo.inject`.
+
+    Raises:
+        ValueError: this drive knows no such trouble.
+    """
+    if what in _PHYSICS:
+        core.axis.p[_PHYSICS[what]] = value
+    elif what == "temperature_c":
+        core.axis.s[k.S_TEMPERATURE] = value
+    elif what in _FAULTS:
+        control.raise_fault(_FAULTS[what])
+    elif what in ("di1", "di2", "di3", "di4"):
+        panel.external[int(what[2]) - 1] = value > 0
+    else:
+        control.raise_fault(_fault_by_code(core, what))
+
+
+def _fault_by_code(core: Core, what: str) -> int:
+    try:
+        code = int(what, 0)
+    except ValueError:
+        raise ValueError(f"a virtual drive knows no trouble named {what!r}") from None
+    for bit, info in core.family.traits.faults.items():
+        if info.code == code:
+            return bit
+    raise ValueError(f"{core.profile.drive} has no fault with code {what}")
