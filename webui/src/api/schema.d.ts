@@ -28,6 +28,30 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/buses/cyclic": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Cyclic
+         * @description Exchange process data with all drives of a bus.
+         */
+        post: operations["start_cyclic"];
+        /**
+         * Stop Cyclic
+         * @description End the cyclic exchange of a bus; what moves is braked.
+         */
+        delete: operations["stop_cyclic"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives": {
         parameters: {
             query?: never;
@@ -156,6 +180,26 @@ export interface paths {
         get: operations["homing_methods"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/jobs/generate": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Generator
+         * @description Play a test signal in a cyclic mode, one value per cycle.
+         */
+        post: operations["start_generator"];
         delete?: never;
         options?: never;
         head?: never;
@@ -774,6 +818,9 @@ export interface components {
          * @description An opened bus.
          */
         Bus: {
+            cyclic: components["schemas"]["CyclicInfo"] | null;
+            /** Cyclic Possible */
+            cyclic_possible: boolean;
             /** Kind */
             kind: string;
             quality: components["schemas"]["Quality"];
@@ -794,6 +841,46 @@ export interface components {
             profile: string;
             /** Station */
             station: number;
+            /** Url */
+            url: string;
+        };
+        /**
+         * CyclicInfo
+         * @description The running cyclic exchange of a bus.
+         */
+        CyclicInfo: {
+            /**
+             * Channels
+             * @description drive/key of what comes with every cycle
+             */
+            channels: string[];
+            /** Cycle Us */
+            cycle_us: number;
+            /**
+             * Dc
+             * @description distributed clocks in use; None where there are none
+             */
+            dc: boolean | null;
+            /**
+             * Left Over
+             * @description what did not fit, and why; it is polled
+             */
+            left_over: {
+                [key: string]: string;
+            };
+            /** Running */
+            running: boolean;
+        };
+        /**
+         * CyclicRequest
+         * @description Begin to exchange process data with all drives of a bus.
+         */
+        CyclicRequest: {
+            /**
+             * Cycle Us
+             * @default 1000
+             */
+            cycle_us: number;
             /** Url */
             url: string;
         };
@@ -966,6 +1053,47 @@ export interface components {
             url: string;
             /** Vendor Id */
             vendor_id: number | null;
+        };
+        /**
+         * GenerateRequest
+         * @description A test signal in a cyclic mode; amplitude in rev (CSP), rpm (CSV) or % (CST).
+         */
+        GenerateRequest: {
+            /**
+             * Acceleration
+             * @default 10
+             */
+            acceleration: number;
+            /** Amplitude */
+            amplitude: number;
+            /** Duration S */
+            duration_s: number;
+            /**
+             * Frequency End Hz
+             * @default 10
+             */
+            frequency_end_hz: number;
+            /**
+             * Frequency Hz
+             * @default 1
+             */
+            frequency_hz: number;
+            /**
+             * Mode
+             * @enum {string}
+             */
+            mode: "CSP" | "CSV" | "CST";
+            /**
+             * Shape
+             * @enum {string}
+             */
+            shape: "step" | "ramp" | "trapezoid" | "sine" | "chirp";
+            /** Speed Limit */
+            speed_limit: number;
+            /** Torque Limit */
+            torque_limit: number;
+            /** Travel Limit */
+            travel_limit: number;
         };
         /**
          * Health
@@ -2061,12 +2189,15 @@ export type ActiveFault = components['schemas']['ActiveFault'];
 export type AxisState = components['schemas']['AxisState'];
 export type Bus = components['schemas']['Bus'];
 export type ConnectRequest = components['schemas']['ConnectRequest'];
+export type CyclicInfo = components['schemas']['CyclicInfo'];
+export type CyclicRequest = components['schemas']['CyclicRequest'];
 export type Diff = components['schemas']['Diff'];
 export type DiffRow = components['schemas']['DiffRow'];
 export type DriveSummary = components['schemas']['DriveSummary'];
 export type DriveUpdate = components['schemas']['DriveUpdate'];
 export type DrivesChanged = components['schemas']['DrivesChanged'];
 export type FoundDrive = components['schemas']['FoundDrive'];
+export type GenerateRequest = components['schemas']['GenerateRequest'];
 export type Health = components['schemas']['Health'];
 export type Hello = components['schemas']['Hello'];
 export type HomeRequest = components['schemas']['HomeRequest'];
@@ -2203,6 +2334,162 @@ export interface operations {
                 url: string;
             };
             header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_cyclic: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CyclicRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Bus"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    stop_cyclic: {
+        parameters: {
+            query: {
+                url: string;
+            };
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -2912,6 +3199,88 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HomingMethodInfo"][];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_generator: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["GenerateRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
                 };
             };
             /** @description No such thing */

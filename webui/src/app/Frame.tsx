@@ -51,7 +51,9 @@ export function Frame({ children }: { children: ReactNode }) {
           <LinkBadge />
           <ControlBadge />
         </div>
-        <Preferences />
+        <div className="wide-only">
+          <Preferences />
+        </div>
       </header>
       <StopButton />
       <ConnectionLost />
@@ -66,6 +68,9 @@ export function Frame({ children }: { children: ReactNode }) {
         zIndex={250}
       >
         <Pages />
+        <div className="narrow-only">
+          <Preferences />
+        </div>
       </Drawer>
       <main id="main" tabIndex={-1}>
         <Refused />
@@ -214,7 +219,8 @@ function LinkBadge() {
     >
       <Icon name="link" size={16} />
       <span>
-        {t(`link.${look.word}`)}
+        <span className="long">{t(`link.${look.word}`)}</span>
+        <span className="short">{t(`link.short.${look.word}`)}</span>
         {trip !== null && look.word !== 'lost' && (
           <small className="num wide-only"> {trip.toFixed(1)} ms</small>
         )}
@@ -242,7 +248,10 @@ function ControlBadge() {
       onClick={() => live.send({ type: 'lease', drive: drive.id, take: !mine })}
     >
       <Icon name={mine || holder ? 'lock' : 'unlock'} size={16} />
-      <span>{words}</span>
+      <span className="long">{words}</span>
+      <span className="short">
+        {mine ? t('control.short.mine') : (holder ?? t('control.short.free'))}
+      </span>
     </button>
   )
 }

@@ -24,9 +24,23 @@ const steel: MantineColorsTuple = [
   '#083653',
 ]
 
+/** Blue-grey instead of the library's neutral grey, from text to ground. */
+const dark: MantineColorsTuple = [
+  '#e9eef3',
+  '#c9d3dc',
+  '#a9b6c3',
+  '#7f90a1',
+  '#4a5a69',
+  '#313d48',
+  '#222c35',
+  '#161d24',
+  '#10161b',
+  '#0d1216',
+]
+
 /** Dense and calm; targets of 44 px, system fonts only. */
 export const theme = createTheme({
-  colors: { steel },
+  colors: { steel, dark },
   primaryColor: 'steel',
   primaryShade: { light: 7, dark: 6 },
   defaultRadius: 3,

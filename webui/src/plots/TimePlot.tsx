@@ -26,6 +26,8 @@ export interface PlotHandle {
   width(): number
 }
 
+/** Scale of the traces that have no unit. */
+const NO_UNIT = '–'
 const GRAB_PX = 14
 const WHEEL_ZOOM = 1.25
 
@@ -104,7 +106,7 @@ export function TimePlot({
   return <div ref={box} className="time-plot" role="img" aria-label={label} />
 }
 
-const units = (series: PlotSeries[]) => [...new Set(series.map((each) => each.unit || '–'))]
+const units = (series: PlotSeries[]) => [...new Set(series.map((each) => each.unit || NO_UNIT))]
 
 /** Range of a unit's scale over what is in sight, with some air, never of no height. */
 function yRange(
@@ -116,14 +118,14 @@ function yRange(
   let min = Number.POSITIVE_INFINITY
   let max = Number.NEGATIVE_INFINITY
   for (const [i, each] of series.entries()) {
-    if ((each.unit || '–') !== unit || plot.series[i + 1]?.show === false) continue
+    if ((each.unit || NO_UNIT) !== unit || plot.series[i + 1]?.show === false) continue
     for (const value of frame.columns[i + 1] ?? []) {
       if (typeof value !== 'number') continue
       if (value < min) min = value
       if (value > max) max = value
     }
   }
-  if (frame.level && (frame.level.unit || '–') === unit) {
+  if (frame.level && (frame.level.unit || NO_UNIT) === unit) {
     min = Math.min(min, frame.level.value)
     max = Math.max(max, frame.level.value)
   }
@@ -142,7 +144,7 @@ function options(
   const style = getComputedStyle(document.documentElement)
   const text = style.getPropertyValue('--dim')
   const grid = style.getPropertyValue('--line')
-  const font = `12px ${style.fontFamily || 'sans-serif'}`
+  const font = `12px ${getComputedStyle(document.body).fontFamily}`
   const axis = (extra: Partial<uPlot.Axis>): uPlot.Axis => ({
     stroke: text,
     font,
@@ -165,8 +167,7 @@ function options(
       ...names.map((name, i) =>
         axis({
           scale: name,
-          label: name,
-          labelSize: 18,
+          ...(name === NO_UNIT ? {} : { label: name, labelSize: 18 }),
           size: 60,
           side: i % 2 === 0 ? 3 : 1,
           grid: { show: i === 0, stroke: grid, width: 1 },
@@ -177,7 +178,7 @@ function options(
       {},
       ...series.map((each) => ({
         label: each.label,
-        scale: each.unit || '–',
+        scale: each.unit || NO_UNIT,
         stroke: each.color,
         width: 1.5,
         spanGaps: true,
@@ -216,7 +217,7 @@ function drawMarks(plot: uPlot, frame: PlotFrame | null, color: string): void {
     ctx.fillText('AB'[i] ?? '', x + 4, bbox.top + 16 * devicePixelRatio)
   }
   if (frame.level) {
-    const y = plot.valToPos(frame.level.value, frame.level.unit || '–', true)
+    const y = plot.valToPos(frame.level.value, frame.level.unit || NO_UNIT, true)
     ctx.strokeStyle = frame.level.color
     ctx.setLineDash([2, 4])
     line(ctx, bbox.left, y, bbox.left + bbox.width, y)

@@ -8,10 +8,20 @@ import { duration } from './format'
 import { ProblemNote } from './ProblemNote'
 import { useAction } from './useAction'
 
+/** How long the good end of a job is told. */
+const DONE_MS = 6000
+
 /** Progress of a job: step, elapsed and remaining time, cancel; then how it ended. */
 export function JobNote({ id, onClose }: { id: string | null; onClose?: () => void }) {
   const t = useT()
   const job = useJob(id)
+  const done = job?.state === 'done'
+  useEffect(() => {
+    if (!done || !onClose) return
+    const timer = setTimeout(onClose, DONE_MS)
+    return () => clearTimeout(timer)
+    // Counted from the end of the job, not from the last render.
+  }, [done, id])
   const now = useNow(job?.state === 'running')
   const cancel = useAction()
   if (!job) return null

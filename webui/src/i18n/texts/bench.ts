@@ -21,6 +21,7 @@ export const bench = {
   'connect.stations': ['Stations', '站号'],
   'connect.stationsAll': ['all', '全部'],
   'connect.stationsBad': ['numbers such as 1-5, 9', '请输入如 1-5, 9 的站号'],
+  'connect.early': ['Stop at the first drive found', '找到第一台驱动器后停止'],
   'connect.scan': ['Scan', '扫描'],
   'connect.results': ['What was found', '扫描结果'],
   'connect.found': ['Found: {count}', '找到：{count}'],

@@ -1,4 +1,4 @@
-import { Button, NativeSelect, TextInput } from '@mantine/core'
+import { Button, Checkbox, NativeSelect, TextInput } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { FoundDrive, ProfileInfo } from '../../api/schema'
@@ -7,25 +7,13 @@ import { setJob, useDrives, useJob } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
-
-/** `1-5, 9` as station numbers; null where it is not such a list. */
-export function parseStations(text: string): number[] | null {
-  const stations: number[] = []
-  for (const part of text.split(',').map((each) => each.trim())) {
-    const match = /^(\d{1,5})(?:\s*[-–]\s*(\d{1,5}))?$/.exec(part)
-    if (!match) return null
-    const first = Number(match[1])
-    const last = Number(match[2] ?? match[1])
-    if (last < first || last > 65535 || last - first > 1000) return null
-    for (let station = first; station <= last; station++) stations.push(station)
-  }
-  return stations
-}
+import { parseStations } from './stations'
 
 export function Scan({ url }: { url: string }) {
   const t = useT()
   const [stations, setStations] = useState('')
   const [id, setId] = useState<string | null>(null)
+  const [early, setEarly] = useState(true)
   const scan = useAction()
   const job = useJob(id)
   const list = stations.trim() === '' ? null : parseStations(stations)
@@ -35,7 +23,7 @@ export function Scan({ url }: { url: string }) {
   const start = () =>
     scan.run(async () => {
       const begun = await ask(
-        api.POST('/api/v1/scan', { body: { url, stations: list, stop_after_first: false } }),
+        api.POST('/api/v1/scan', { body: { url, stations: list, stop_after_first: early } }),
       )
       setJob(begun)
       setId(begun.id)
@@ -60,6 +48,11 @@ export function Scan({ url }: { url: string }) {
           {t('connect.scan')}
         </Button>
       </div>
+      <Checkbox
+        label={t('connect.early')}
+        checked={early}
+        onChange={(event) => setEarly(event.currentTarget.checked)}
+      />
       <ProblemNote problem={scan.problem} onClose={scan.clear} />
       <JobNote id={id} onClose={() => setId(null)} />
       {job?.state === 'done' && (

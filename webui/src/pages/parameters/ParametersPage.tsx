@@ -19,7 +19,11 @@ async function readAfresh(drive: string): Promise<void> {
   const running = [...contents.jobs.values()].some(
     (job) => job.kind === 'read_all' && job.drive === drive && job.state === 'running',
   )
-  const known = contents.rows.get(drive)?.some((row) => row.reading.time !== null)
+  const readable = (contents.rows.get(drive) ?? []).filter(
+    (row) => row.access !== 'wo' && row.reachable,
+  )
+  // The state monitor has read a few of them; a whole read leaves hardly any out.
+  const known = readable.filter((row) => row.reading.time !== null).length > readable.length / 2
   if (running || known) return
   setJob(
     await ask(

@@ -70,10 +70,11 @@ export function ScopePage() {
     const owner = drives?.find((drive) => drive.id === channel?.drive)?.name ?? ''
     return `${owner} ${described[i]?.name ?? channel?.key ?? ''}`.trim()
   }
+  const palette = TRACE_COLORS[dark ? 'dark' : 'light']
   const series = known.map((_, i) => ({
     label: name(i),
     unit: described[i]?.unit ?? '',
-    color: TRACE_COLORS[i % TRACE_COLORS.length] as string,
+    color: palette[i % palette.length] as string,
   }))
   const trigger: TriggerSettings | null =
     choice.mode === 'off'

@@ -7,17 +7,11 @@ export interface Channel {
   key: string
 }
 
-/** Distinct on light and on dark ground, also for the colour-blind (after Okabe and Ito). */
-export const TRACE_COLORS = [
-  '#0072b2',
-  '#d55e00',
-  '#009e73',
-  '#b5679d',
-  '#a8861b',
-  '#3a9bd4',
-  '#8c564b',
-  '#7a7a7a',
-]
+/** Distinct also for the colour-blind (after Okabe and Ito), on light and on dark ground. */
+export const TRACE_COLORS = {
+  light: ['#0072b2', '#c24a00', '#00805e', '#a04a8a', '#80650c', '#2b86b8', '#7a4a3f', '#666666'],
+  dark: ['#56b4e9', '#ff9248', '#2fd0a0', '#e79ad0', '#f0d850', '#9fc5ff', '#d0a090', '#b8b8b8'],
+}
 export const GREATEST_CHANNELS = 16
 
 const STORED = 'servodeck.scope.channels'

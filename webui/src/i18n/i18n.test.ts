@@ -1,0 +1,121 @@
+import { readdirSync, readFileSync } from 'node:fs'
+import { join } from 'node:path'
+import ts from 'typescript'
+import { describe, expect, it } from 'vitest'
+import { catalogue } from './catalogue'
+import { translate } from './index'
+
+const SOURCE = new URL('..', import.meta.url).pathname
+/** Written the same in both languages: names of things, not words. */
+const SAME = new Set([
+  'language.en',
+  'language.zh',
+  'connect.kind.can',
+  'help.ethercat.title',
+  'help.can.title',
+  'scope.csv',
+])
+/** Attributes that a person reads or hears. */
+const SPOKEN = new Set([
+  'label',
+  'title',
+  'placeholder',
+  'aria-label',
+  'description',
+  'error',
+  'alt',
+  'help',
+])
+/** Text that is no language: the product's name, signs and units. */
+const NEUTRAL = /^(servodeck|[^\p{L}]*|[AB]|B−A|ms|s|Hz|0x|rpm|\/s|1\/Δt)$/u
+
+const entries = Object.entries(catalogue)
+
+function sources(folder: string): string[] {
+  return readdirSync(folder, { withFileTypes: true }).flatMap((entry) =>
+    entry.isDirectory()
+      ? sources(join(folder, entry.name))
+      : entry.name.endsWith('.tsx')
+        ? [join(folder, entry.name)]
+        : [],
+  )
+}
+
+/** Words in the markup that do not come from the catalogue. */
+function bareStrings(file: string, code: string): string[] {
+  const tree = ts.createSourceFile(file, code, ts.ScriptTarget.ES2022, true, ts.ScriptKind.TSX)
+  const found: string[] = []
+  const check = (text: string, node: ts.Node) => {
+    if (
+      text
+        .trim()
+        .split(/\s+/)
+        .every((word) => NEUTRAL.test(word))
+    )
+      return
+    const { line } = tree.getLineAndCharacterOfPosition(node.getStart())
+    found.push(`${file}:${line + 1}: ${text.trim()}`)
+  }
+  const visit = (node: ts.Node) => {
+    if (ts.isJsxText(node)) check(node.text, node)
+    if (ts.isJsxAttribute(node) && SPOKEN.has(node.name.getText())) {
+      const value = node.initializer
+      if (value && ts.isStringLiteral(value)) check(value.text, node)
+      if (
+        value &&
+        ts.isJsxExpression(value) &&
+        value.expression &&
+        ts.isStringLiteral(value.expression)
+      ) {
+        check(value.expression.text, node)
+      }
+    }
+    if (ts.isJsxExpression(node) && node.expression && !ts.isJsxAttribute(node.parent)) {
+      const strings = (part: ts.Node) => {
+        if (ts.isStringLiteral(part) && /^[A-Z]\p{L}+ /u.test(part.text)) check(part.text, part)
+        if (!ts.isCallExpression(part) && !ts.isJsxElement(part)) ts.forEachChild(part, strings)
+      }
+      strings(node.expression)
+    }
+    ts.forEachChild(node, visit)
+  }
+  visit(tree)
+  return found
+}
+
+describe('the catalogue', () => {
+  it('has both languages for every key', () => {
+    for (const [key, texts] of entries) {
+      expect(texts, key).toHaveLength(2)
+      for (const text of texts) expect(text.trim(), key).not.toBe('')
+    }
+  })
+  it('has the same variables in both languages', () => {
+    const variables = (text: string) => (text.match(/\{\w+\}/g) ?? []).toSorted()
+    for (const [key, [en, zh]] of entries) expect(variables(zh), key).toEqual(variables(en))
+  })
+  it('is translated: Chinese has Chinese signs, English has none', () => {
+    for (const [key, [en, zh]] of entries) {
+      if (SAME.has(key)) continue
+      expect(/\p{Script=Han}/u.test(zh), `${key}: ${zh}`).toBe(true)
+      expect(/\p{Script=Han}/u.test(en), `${key}: ${en}`).toBe(false)
+    }
+  })
+  it('fills variables in, and leaves unknown ones standing', () => {
+    expect(translate('en', 'job.elapsed', { time: '3 s' })).toBe('3 s so far')
+    expect(translate('zh', 'job.elapsed', {})).toContain('{time}')
+  })
+})
+
+describe('the markup', () => {
+  it('has no words of its own', () => {
+    const found = sources(SOURCE).flatMap((file) => bareStrings(file, readFileSync(file, 'utf-8')))
+    expect(found).toEqual([])
+  })
+  it('would be caught with one', () => {
+    expect(bareStrings('x.tsx', '<p>Hello there</p>')).toHaveLength(1)
+    expect(bareStrings('x.tsx', '<input placeholder="Name" />')).toHaveLength(1)
+    expect(bareStrings('x.tsx', '<p>{ok ? "All good here" : ""}</p>')).toHaveLength(1)
+    expect(bareStrings('x.tsx', '<p>{t("close")} · 3 ms</p>')).toEqual([])
+  })
+})
