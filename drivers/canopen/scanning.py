@@ -54,10 +54,11 @@ def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) ->
 
     return Found(
         station=channel.node,
-        vendor_id=number(0x1018, 1),
+        # 0 is no vendor and no serial number: a drive that says so has none to tell.
+        vendor_id=number(0x1018, 1) or None,
         product_code=number(0x1018, 2),
         revision=number(0x1018, 3),
-        serial=number(0x1018, 4),
+        serial=number(0x1018, 4) or None,
         name=text(0x1008),
         hardware=text(0x1009),
         firmware=text(0x100A),

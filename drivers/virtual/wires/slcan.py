@@ -15,6 +15,7 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from drivers.canopen.frames import Frame
+from drivers.errors import LinkLost
 
 _BUS_ERROR_FLAGS = b"FA4\r"
 _NO_FLAGS = b"F00\r"
@@ -22,7 +23,11 @@ _BEL = b"\a"
 
 
 class SlcanSide:
-    """The adapter. ``path`` becomes a symbolic link to the pty; it must not exist yet."""
+    """The adapter. ``path`` becomes a symbolic link to the pty.
+
+    Raises:
+        LinkLost: something that is not a link is already at the path.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -45,10 +50,21 @@ class SlcanSide:
         self._wanted.put(self._unplug)
 
     def _plug(self) -> None:
+        if self._master >= 0:
+            return
+        if self.path.exists() and not self.path.is_symlink():
+            raise LinkLost(
+                f"{self.path} exists and is no virtual wire",
+                remedy="choose another path, or remove the file",
+            )
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)  # the slave end stays open, or reading would fail with no client
         os.set_blocking(self._master, False)
-        self.path.symlink_to(os.ttyname(self._slave))
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        fresh = self.path.with_name(f".{self.path.name}.{os.getpid()}")
+        fresh.unlink(missing_ok=True)
+        fresh.symlink_to(os.ttyname(self._slave))
+        fresh.replace(self.path)  # at once: a client never sees half a wire
 
     def _unplug(self) -> None:
         self._opened = False
@@ -56,8 +72,10 @@ class SlcanSide:
         self._buffer.clear()
         master, slave = self._master, self._slave
         self._master = self._slave = -1
-        with contextlib.suppress(FileNotFoundError):
-            self.path.unlink()
+        if slave >= 0 and self.path.is_symlink():
+            # A wire that was made later at the same path is not ours to remove.
+            if str(self.path.readlink()) == os.ttyname(slave):
+                self.path.unlink()
         for descriptor in (slave, master):
             if descriptor >= 0:
                 os.close(descriptor)
