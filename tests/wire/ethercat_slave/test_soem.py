@@ -18,27 +18,37 @@ from drivers.virtual.wires.netns import Namespace, NamespaceUnavailable
 HERE = Path(__file__).parent
 FACTORY = "tests.wire.ethercat_slave.dictionary_device:make_device"
 MASTER, SLAVE = "ec0m", "ec0s"
+SHARED_MASTER, SHARED_SLAVE = "ec1m", "ec1s"
 
 
 @pytest.fixture(scope="module")
 def namespace() -> Iterator[Namespace]:
     try:
-        made = Namespace.create([(MASTER, SLAVE)])
+        made = Namespace.create([(MASTER, SLAVE), (SHARED_MASTER, SHARED_SLAVE)])
     except NamespaceUnavailable as error:
         pytest.skip(str(error))
     with made:
         yield made
 
 
-def segment(namespace: Namespace, count: int, *options: str) -> VirtualSegment:
+def segment(
+    namespace: Namespace, count: int, *options: str, interface: str = SLAVE
+) -> VirtualSegment:
     drives = ["--drive", "dictionary"] * count
-    return VirtualSegment.start(SLAVE, [*drives, "--factory", FACTORY, *options], namespace)
+    return VirtualSegment.start(interface, [*drives, "--factory", FACTORY, *options], namespace)
 
 
-def start(namespace: Namespace, scenario: str) -> subprocess.Popen[str]:
+@pytest.fixture(scope="module")
+def shared(namespace: Namespace) -> Iterator[VirtualSegment]:
+    """Two slaves that several tests use one after the other, as a real bench."""
+    with segment(namespace, 2, interface=SHARED_SLAVE) as running:
+        yield running
+
+
+def start(namespace: Namespace, scenario: str, interface: str = MASTER) -> subprocess.Popen[str]:
     script = str(HERE / "soem_master.py")
     return namespace.popen(
-        [sys.executable, script, scenario, MASTER],
+        [sys.executable, script, scenario, interface],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
@@ -85,20 +95,20 @@ def test_in_lockstep_a_target_comes_back_as_position_two_frames_later(
     assert got["positions"][2:] == list(range(298))
 
 
-def test_without_process_data_the_watchdog_acts(namespace: Namespace) -> None:
-    with segment(namespace, 2):
-        got = finish(start(namespace, "watchdog"))
+def test_without_process_data_the_watchdog_acts(
+    namespace: Namespace, shared: VirtualSegment
+) -> None:
+    got = finish(start(namespace, "watchdog", SHARED_MASTER))
     assert got["op"] is True
     assert got["states"] == [[0x14, 0x1B]] * 2
 
 
-def test_an_emergency_reaches_the_master(namespace: Namespace) -> None:
-    with segment(namespace, 1) as running:
-        process = start(namespace, "emergency")
-        assert process.stdout is not None
-        assert json.loads(process.stdout.readline()) == {"ready": True}
-        running.command("inject", slave=0, what="emergency", value=0x7305)
-        assert finish(process)["codes"] == [0x7305]
+def test_an_emergency_reaches_the_master(namespace: Namespace, shared: VirtualSegment) -> None:
+    process = start(namespace, "emergency", SHARED_MASTER)
+    assert process.stdout is not None
+    assert json.loads(process.stdout.readline()) == {"ready": True}
+    shared.command("inject", slave=0, what="emergency", value=0x7305)
+    assert finish(process)["codes"] == [0x7305]
 
 
 class Master:
@@ -107,7 +117,7 @@ class Master:
     def __init__(self, namespace: Namespace) -> None:
         script = str(HERE / "soem_master.py")
         self._process = namespace.popen(
-            [sys.executable, script, "interactive", MASTER],
+            [sys.executable, script, "interactive", SHARED_MASTER],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )
@@ -129,41 +139,43 @@ class Master:
         return answer
 
 
-def test_trouble_on_the_wire_as_the_master_sees_it(namespace: Namespace) -> None:
-    with segment(namespace, 2) as running:
-        master = Master(namespace)
-        assert master.cycles(3)[0] == [6, 6, 6]
+def test_trouble_on_the_wire_as_the_master_sees_it(
+    namespace: Namespace, shared: VirtualSegment
+) -> None:
+    master = Master(namespace)
+    assert master.cycles(3)[0] == [6, 6, 6]
 
-        running.command("lose", count=2, cyclic=True)
-        assert master.cycles(4)[0] == [-1, -1, 6, 6]
+    shared.command("lose", count=2, cyclic=True)
+    assert master.cycles(4)[0] == [-1, -1, 6, 6]
 
-        running.command("counter", by=-3, count=1)
-        assert master.cycles(3)[0] == [3, 6, 6]
+    shared.command("counter", by=-3, count=1)
+    assert master.cycles(3)[0] == [3, 6, 6]
 
-        # 100 ms late: the master has given up after 40 ms.
-        running.command("late", by_s=0.1, count=1, cyclic=True)
-        assert master.cycles(20)[0][0] == -1
-        assert running.command("state")["trouble"]["late"] == 1
+    # 100 ms late: the master has given up after 40 ms.
+    shared.command("late", by_s=0.1, count=1, cyclic=True)
+    assert master.cycles(20)[0][0] == -1
+    assert shared.command("state")["trouble"]["late"] == 1
 
-        running.command("cut", cable=1)
-        wkcs, _ = master.cycles(200)  # at least 400 ms
-        assert wkcs[-1] == 3
-        running.command("heal")
-        wkcs, states = master.cycles(3)
-        # Back on the cable, in Safe-Op by its watchdog; there it still exchanges data.
-        assert wkcs[-1] == 6
-        assert states == [[8, 0], [0x14, 0x1B]]
+    shared.command("cut", cable=1)
+    wkcs, _ = master.cycles(200)  # at least 400 ms
+    assert wkcs[-1] == 3
+    shared.command("heal")
+    wkcs, states = master.cycles(3)
+    # Back on the cable, in Safe-Op by its watchdog; there it still exchanges data.
+    assert wkcs[-1] == 6
+    assert states == [[8, 0], [0x14, 0x1B]]
 
-        running.command("cut", cable=0)
-        assert set(master.cycles(2)[0]) == {-1}
-        running.command("heal", cable=0)
-        assert master.cycles(10)[0][-1] == 6
-        master.close()
+    shared.command("cut", cable=0)
+    assert set(master.cycles(2)[0]) == {-1}
+    shared.command("heal", cable=0)
+    assert master.cycles(10)[0][-1] == 6
+    master.close()
 
 
-def test_one_segment_per_interface(namespace: Namespace) -> None:
-    with segment(namespace, 1), pytest.raises(LinkLost, match="already answers on ec0s"):
-        segment(namespace, 1)
+def test_one_segment_per_interface(namespace: Namespace, shared: VirtualSegment) -> None:
+    with pytest.raises(LinkLost, match="already answers on ec1s"):
+        segment(namespace, 1, interface=SHARED_SLAVE)
+    assert len(shared.command("state")["slaves"]) == 2
 
 
 def test_a_wrong_interface_and_a_wrong_drive_are_told_in_words(namespace: Namespace) -> None:
@@ -184,11 +196,11 @@ def test_a_killed_segment_is_noticed_and_can_be_restarted(namespace: Namespace) 
 
 
 def test_the_namespace_is_private(namespace: Namespace) -> None:
-    code = "import socket; print(sorted(name for _, name in socket.if_nameindex()))"
+    code = "import json, socket; print(json.dumps([name for _, name in socket.if_nameindex()]))"
     process = namespace.popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
     out, _ = process.communicate(timeout=20)
     # A kernel may add its own tunnel devices to every namespace; our cable must be there.
-    assert {MASTER, SLAVE} <= set(eval(out))
+    assert {MASTER, SLAVE} <= set(json.loads(out))
 
 
 def test_the_cable_is_silent(namespace: Namespace) -> None:
