@@ -175,6 +175,17 @@ def test_a_late_frame_is_a_repeated_output_and_is_counted() -> None:
     assert wire.upload(0x1C32, 0x0B) == b"\x02\x00"
 
 
+def test_in_safe_op_with_sync0_outputs_do_not_act_either() -> None:
+    wire = dc_wire()
+    assert wire.request(SAFEOP) == (SAFEOP, 0)
+    wire.device.unpacked.clear()
+    for n in range(5):
+        exchange(wire, 77)
+        wire.clock.time_ns += CYCLE
+    wire.state()
+    assert wire.device.unpacked == []
+
+
 def test_outside_op_only_the_last_sync0_is_computed() -> None:
     wire = Wire()
     wire.to_preop()
@@ -278,6 +289,29 @@ def test_a_watchdog_can_be_switched_off(off: str) -> None:
     wire.request(OP)
     wire.clock.time_ns = 10_000 * MS
     assert wire.state() == (OP, 0)
+
+
+@pytest.mark.parametrize("with_sync0", [False, True])
+def test_outputs_from_before_the_watchdog_never_act_again(with_sync0: bool) -> None:
+    wire = dc_wire() if with_sync0 else Wire()
+    if with_sync0:
+        exchange(wire, 1234)
+    else:
+        wire.to_op()
+        wire.one(LWR, 0, 0, wire.outputs(0x0F, 1234))
+    wire.clock.time_ns += 500 * MS
+    assert wire.state() == (SAFEOP | 0x10, 0x001B)
+    wire.device.unpacked.clear()
+    assert wire.request(OP | 0x10) == (SAFEOP, 0)  # waits for new outputs
+    wire.clock.time_ns += 5 * MS
+    assert wire.state() == (SAFEOP, 0)
+    assert wire.device.unpacked == []
+    wire.write(OUT, wire.outputs(0x06, 0))
+    assert wire.state() == (OP, 0)
+    wire.clock.time_ns += 5 * MS
+    wire.write(OUT, wire.outputs(0x06, 0))
+    wire.state()
+    assert {data for _, data in wire.device.unpacked} == {wire.outputs(0x06, 0)}
 
 
 def test_after_the_watchdog_the_master_can_go_back_to_op() -> None:

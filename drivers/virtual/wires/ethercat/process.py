@@ -110,7 +110,12 @@ class ProcessData:
         self._report.mode = _FREE_RUN
 
     def operate(self, on: bool) -> None:
-        """In Op the outputs act; in Safe-Op they are received and ignored."""
+        """In Op the outputs act; in Safe-Op they are received and ignored.
+
+        Outputs from before a fall never act again: Op must be entered with new ones.
+        """
+        if self._operational and not on:
+            self._latest, self._fresh, self.received = b"", False, False
         self._operational = on
         if on:
             self._report.missed = 0
