@@ -75,6 +75,7 @@ def test_parameters_act_after_write_settings(bench) -> None:
     before = b.servo.axis.p[k.P_KP_POSITION_1]
     b.set("2005:01", 400)
     assert b.get("2005:01") == 400
+    b.enable(1)  # a new start of the loops does not bring them in either
     assert b.servo.axis.p[k.P_KP_POSITION_1] == before
     b.apply()
     assert b.servo.axis.p[k.P_KP_POSITION_1] == pytest.approx(TURN * 40)

@@ -271,6 +271,19 @@ def test_ds_c_position_bits(family) -> None:
     assert b.get("6064:00") == pytest.approx(2 * REV, abs=REV / 300)
 
 
+def test_ds_c_has_the_positive_software_limit_first(family) -> None:
+    b = family(DS_C)
+    b.set("607D:01", REV)
+    b.set("607D:02", -REV)
+    b.set("6060:00", 1)
+    for word in (6, 7, 15):
+        b.set("6040:00", word)
+    b.set("607A:00", 5 * REV)
+    b.set("6040:00", 31)
+    b.run(1.5)
+    assert b.get("6064:00") == pytest.approx(REV, abs=REV / 300)
+
+
 def test_ds_c_triggers_stay_and_act_on_change(family) -> None:
     b = family(DS_C)
     b.servo.axis._x[0] = TURN

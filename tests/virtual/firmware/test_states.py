@@ -281,6 +281,17 @@ def test_reset_is_refused_while_the_cause_lasts(bench) -> None:
     assert state(b) == SOD
 
 
+def test_fault_reset_needs_a_rising_edge(bench) -> None:
+    b = bench()
+    b.set("6040:00", 0x80)
+    b.servo.inject("overload")
+    b.set("6040:00", 0x8F)
+    assert state(b) == FAULT
+    b.set("6040:00", 0x0F)
+    b.set("6040:00", 0x8F)
+    assert state(b) == SOD
+
+
 def test_over_temperature_warns_20_degrees_early(bench) -> None:
     b = bench()
     b.set("200B:01", 0x10)
