@@ -179,7 +179,7 @@ def test_in_safe_op_with_sync0_outputs_do_not_act_either() -> None:
     wire = dc_wire()
     assert wire.request(SAFEOP) == (SAFEOP, 0)
     wire.device.unpacked.clear()
-    for n in range(5):
+    for _ in range(5):
         exchange(wire, 77)
         wire.clock.time_ns += CYCLE
     wire.state()
