@@ -30,7 +30,13 @@ def main() -> None:
     for rate in (1000.0, 4000.0):
         for name in only:
             mechanics = NAMED[name]
-            for loop_hz, position in ((0.0, False), (10, False), (40, False), (40, True), (80, False)):
+            for loop_hz, position in (
+                (0.0, False),
+                (10, False),
+                (40, False),
+                (40, True),
+                (80, False),
+            ):
                 m = measure(mechanics, rate, loop_hz, position=position)
                 start = time.perf_counter()
                 found = identify_mechanics(m.records, m.path, m.quantity)
@@ -39,7 +45,9 @@ def main() -> None:
                 bands = [(5.0, high)] + ([(250.0, 400.0)] if rate < 2000 and not loop_hz else [])
                 for low, high in bands:
                     e = errors(found.corrected, mechanics, low, high)
-                    kind = "torque" if not loop_hz else f"{'pos' if position else 'speed'}{loop_hz:g}"
+                    kind = (
+                        "torque" if not loop_hz else f"{'pos' if position else 'speed'}{loop_hz:g}"
+                    )
                     print(
                         f"{name:10s} {rate:4.0f} {kind:8s} {low:4.0f}-{high:4.0f}  {e.magnitude_db:6.3f}"
                         f" {e.phase_deg:6.2f}   {e.covered:4.2f}  {found.fit.delay_s * 1e6:8.1f}"

@@ -114,7 +114,10 @@ def design_moves(
     velocity: FloatArray = np.concatenate(parts)
     width = max(1, round(smoothing_s * sample_rate_hz))
     velocity = np.convolve(velocity, np.ones(width) / width)
-    velocity -= np.sum(velocity) / velocity.size * (velocity != 0)
+    velocity = velocity - np.sum(velocity) / velocity.size * (velocity != 0)
+    # Ramps of whole samples make short moves longer than computed.
+    reached = float(np.ptp(np.cumsum(velocity))) / sample_rate_hz
+    velocity = velocity * min(1.0, 0.97 * limits.travel_rad / reached)
     position = np.cumsum(velocity) / sample_rate_hz
     return Trajectory(position, velocity, np.gradient(velocity) * sample_rate_hz, sample_rate_hz)
 

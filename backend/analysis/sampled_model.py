@@ -294,8 +294,8 @@ class _Problem:
         f0, top = float(self.f[0]), float(self.f[-1])
         count = (x.size - 3) // 4
         gain = float(x[0])
-        low = [gain - 2.0, np.log(1e-3 * TURN * f0), self.coarse_delay - 0.5]
-        high = [gain + 2.0, np.log(0.5 * TURN * np.sqrt(f0 * top)), self.coarse_delay + 0.5]
+        low = [gain - 2.0, np.log(1e-3 * TURN * f0), max(self.coarse_delay - 1.0, -0.2)]
+        high = [gain + 2.0, np.log(0.5 * TURN * np.sqrt(f0 * top)), self.coarse_delay + 1.0]
         low += [np.log(1.2 * f0), np.log(5e-4), gain - 9.0, -0.5] * count
         high += [np.log(1.2 * top), np.log(0.6), gain + 5.0, 0.5] * count
         return np.array(low), np.array(high)

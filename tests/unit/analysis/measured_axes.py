@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from drive_sim import TURN, Drive, Mechanics, simulate
@@ -43,6 +44,7 @@ def tuned_drive(mechanics: Mechanics, bandwidth_hz: float, position: bool = Fals
     )
 
 
+@cache
 def measure(
     mechanics: Mechanics,
     sample_rate_hz: float,
@@ -67,12 +69,16 @@ def measure(
         e = multisine(
             sample_rate_hz=sample_rate_hz, period_samples=period, lines=lines, realisation=i // 2,
             invert=bool(i % 2), amplitude=shape, integrations=0 if loop_hz else 2,
-            base=None if loop_hz else BaseMotion(0.5), ramp_samples=period // 8,
+            iterations=80, base=None if loop_hz else BaseMotion(0.5), ramp_samples=period // 8,
         )  # fmt: skip
         e = scaled(e, share * drive.rated_nm, drive.torque_step * drive.rated_nm)
         moving = base_rad_s * np.sin(TURN * np.arange(e.samples.size) / period)
-        place = base_rad_s * period / sample_rate_hz / TURN * -np.cos(
-            TURN * np.arange(e.samples.size) / period
+        place = (
+            base_rad_s
+            * period
+            / sample_rate_hz
+            / TURN
+            * -np.cos(TURN * np.arange(e.samples.size) / period)
         )
         if not loop_hz:
             run = simulate(mechanics, drive, sample_rate_hz, torque=e.samples)
@@ -111,4 +117,6 @@ def errors(frf: Frf, mechanics: Mechanics, low_hz: float, high_hz: float) -> Err
     db = np.abs(20 * np.log10(np.abs(ratio)))
     deg = np.abs(np.degrees(np.angle(ratio)))
     inside = (db <= 1.96 * frf.std_db[use]) & (deg <= 1.96 * frf.std_deg[use])
-    return Errors(float(np.median(db)), float(np.median(deg)), float(np.mean(inside)), int(use.sum()))
+    return Errors(
+        float(np.median(db)), float(np.median(deg)), float(np.mean(inside)), int(use.sum())
+    )

@@ -42,9 +42,11 @@ def test_crest_factor_of_a_sine_is_sqrt_two():
 
 
 def test_realisations_differ_and_repeat():
-    make = lambda n: multisine(  # noqa: E731
-        sample_rate_hz=1000.0, period_samples=1000, lines=LINES, realisation=n
-    ).one_period
+    make = lambda n: (
+        multisine(
+            sample_rate_hz=1000.0, period_samples=1000, lines=LINES, realisation=n
+        ).one_period
+    )
     a, b = make(1), make(2)
     assert abs(np.corrcoef(a, b)[0, 1]) < 0.3
     assert np.array_equal(a, make(1))
@@ -85,7 +87,10 @@ def test_amplitude_falls_by_20_db_per_decade():
         amplitude=falling_amplitude(LINES * 1.0, 50.0),
     )  # fmt: skip
     got = np.abs(spectrum(e))[LINES]
-    assert np.allclose(got / got[0], falling_amplitude(LINES * 1.0, 50.0) / falling_amplitude(LINES[:1] * 1.0, 50.0))
+    assert np.allclose(
+        got / got[0],
+        falling_amplitude(LINES * 1.0, 50.0) / falling_amplitude(LINES[:1] * 1.0, 50.0),
+    )
 
 
 def test_prbs_has_the_autocorrelation_of_a_maximum_length_sequence():
@@ -107,9 +112,7 @@ def test_every_prbs_order_has_full_length(order):
 
 
 def test_chirp_spends_equal_time_per_octave_and_comes_home():
-    e = chirp(
-        sample_rate_hz=4000.0, f_min_hz=10.0, f_max_hz=640.0, duration_s=6.0, integrations=1
-    )
+    e = chirp(sample_rate_hz=4000.0, f_min_hz=10.0, f_max_hz=640.0, duration_s=6.0, integrations=1)
     crossings = np.flatnonzero(np.diff(np.sign(e.samples)) > 0)
     middle = crossings[np.abs(crossings / 4000.0 - 3.0) < 0.25]
     assert 4000.0 / np.mean(np.diff(middle)) == pytest.approx(80.0, rel=0.03)
