@@ -122,7 +122,10 @@ def test_a_power_cycle_takes_a_drive_and_all_behind_it_away_for_a_while() -> Non
     assert (slave.al.state, slave.controller.station) == (INIT, 0)
     assert wire.devices[1].values[0x2001, 1] == b"\x22\x11"
     assert wire.devices[1].power_cycles == [0.2]
-    # The one behind kept its supply: only its link fell.
+    # Its neighbours kept their supply: only their links fell.
+    assert wire.read(0x0310, 4, 0x1001).data == b"\x00\x01\x00\x00"
+    assert wire.read(0x0310, 4, 0x1003).data == b"\x01\x00\x00\x00"
+    assert slave.controller.memory[0x0310:0x0314] == bytes(4)
     assert wire.slaves[2].controller.station == 0x1003
 
 

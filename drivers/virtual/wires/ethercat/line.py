@@ -127,8 +127,7 @@ class Line:
         self._next_ns = min(waiting, default=_FOREVER)
 
     def _lose(self, position: int, port: int) -> None:
-        if position not in self._off:
-            self._slaves[position].controller.count(reg.LOST_LINK + port)
+        self._slaves[position].controller.count(reg.LOST_LINK + port)
 
 
 def _show_ports(slave: Slave, up: bool, down: bool) -> None:
