@@ -16,6 +16,7 @@ from functools import lru_cache
 from drivers.errors import OutOfRange
 
 READ = 0x03
+READ_INPUT = 0x04
 WRITE_ONE = 0x06
 WRITE_MANY = 0x10
 EXCEPTION_BIT = 0x80
@@ -116,16 +117,16 @@ def _check(station: int, start: int, count: int, longest: int) -> None:
 
 
 @lru_cache(maxsize=4096)
-def read_query(station: int, start: int, count: int) -> Query:
-    """Read ``count`` holding registers (03).
+def read_query(station: int, start: int, count: int, function: int = READ) -> Query:
+    """Read ``count`` holding registers (03), or input registers (04).
 
     Raises:
         OutOfRange: station, register or count do not exist in Modbus.
     """
     _check(station, start, count, MAX_READ_REGISTERS)
-    frame = seal(struct.pack(">BBHH", station, READ, start, count))
-    head = bytes((station, READ, 2 * count))
-    return Query(frame, head, 5 + 2 * count, bytes((station, READ | EXCEPTION_BIT)))
+    frame = seal(struct.pack(">BBHH", station, function, start, count))
+    head = bytes((station, function, 2 * count))
+    return Query(frame, head, 5 + 2 * count, bytes((station, function | EXCEPTION_BIT)))
 
 
 def write_one_query(station: int, register: int, value: int) -> Query:

@@ -3,11 +3,8 @@
 Blocking code; `drivers.modbus.link.RegisterLink` runs it on the bus's thread. Nothing is
 repeated here, because only the caller knows whether a repetition is harmless.
 
-Modbus RTU answers carry no number, so an answer that comes after its time-out looks like the
-answer to the next question of the same shape. Every failed question is therefore remembered
-for ``late_s``; before another question whose answer would look the same, one harmless read with
-an answer of a different shape is asked. Drives answer in order, so once that has come, nothing
-older can follow.
+After a failed question its answer may still come; see `drivers.modbus.late` for how it is kept
+from being taken for another one.
 """
 
 from __future__ import annotations
@@ -30,6 +27,7 @@ from drivers.modbus.framing import (
     write_many_query,
     write_one_query,
 )
+from drivers.modbus.late import LateAnswers
 from drivers.modbus.port import LineSettings, Port, is_pseudo_terminal, open_port
 from drivers.modbus.timing import sleep_precisely
 
@@ -48,6 +46,7 @@ class Counters:
     retries: int = 0
     refusals: int = 0
     late_checks: int = 0
+    late_answers: int = 0
     round_trip_ms: float | None = None
 
 
@@ -77,7 +76,7 @@ class Line:
         self._port: Port | None = None
         self._parity: str = settings.parity
         self._counters: dict[int, Counters] = {}
-        self._late: dict[int, dict[bytes, float]] = {}
+        self._late: dict[int, LateAnswers] = {}
         self._last_failed = b""
         self._restless = False
         self._echo_taken = False
@@ -177,6 +176,7 @@ class Line:
                 "losses": self.losses,
                 "refusals": sum(c.refusals for c in picked),
                 "late_checks": sum(c.late_checks for c in picked),
+                "late_answers": sum(c.late_answers for c in picked),
             },
         )
 
@@ -190,10 +190,14 @@ class Line:
             )
         try:
             self._settle(self._port)
+            late = self._late.setdefault(query.station, LateAnswers())
+            same_read_again = query.frame[1] == READ and query.frame == self._last_failed
+            if late.pending(self._clock()) and not same_read_again:
+                self._outwait(self._port, late, query, timeout_s)
             if self.echo is None and query.frame[1] != READ:
-                self._probe(self._port, query, timeout_s)
-            self._outwait_late(self._port, query, timeout_s)
-            return self._exchange(self._port, query, timeout_s)
+                with suppress(Rejected):
+                    self._exchange(self._port, late, late.check(query), timeout_s)
+            return self._exchange(self._port, late, query, timeout_s)
         except LinkLost as error:
             self._port.close()
             self._port = None
@@ -201,7 +205,9 @@ class Line:
             self._on_change(False, error.message)
             raise
 
-    def _exchange(self, port: Port, query: Query, timeout_s: float | None) -> bytes:
+    def _exchange(
+        self, port: Port, late: LateAnswers, query: Query, timeout_s: float | None
+    ) -> bytes:
         settings = self.settings
         pause = self._quiet_since + settings.pause_s - self._clock()
         if pause > 0:
@@ -211,22 +217,26 @@ class Line:
         port.write(query.frame)
         wire_s = (len(query.frame) + query.length) * settings.char_s
         limit_s = settings.timeout_s if timeout_s is None else timeout_s
-        answer, received = self._await(port, query, sent_at + wire_s + limit_s)
+        answer, received = self._await(port, late, query, sent_at + wire_s + limit_s)
         counters = self._count(query.station)
         counters.transactions += 1
         counters.crc_errors += answer.crc_errors
         self._quiet_since = self._clock()
         if answer.frame is None:
+            late.failed(query, self._clock() + settings.late_s)
             self._fail(query, answer, received, counters, limit_s)
-        self._accept(query, answer, received, counters, sent_at)
+        self._accept(answer, received, counters, sent_at)
         code = answer.exception
         if code is not None:
             counters.refusals += 1
             text = EXCEPTION_TEXTS.get(code, "the drive refused for a reason Modbus does not name")
             raise Rejected(f"station {query.station}: {text} (exception {code})", code=code)
+        late.answered(query)
         return answer.frame
 
-    def _await(self, port: Port, query: Query, deadline: float) -> tuple[Answer, bytes]:
+    def _await(
+        self, port: Port, late: LateAnswers, query: Query, deadline: float
+    ) -> tuple[Answer, bytes]:
         """Collect bytes until the answer is there or cannot come any more."""
         data = port.read(deadline - self._clock())
         if self.echo is False and len(data) == query.length:
@@ -236,6 +246,7 @@ class Line:
         buffer = bytearray(data)
         while True:
             self._cut_echo(buffer, query)
+            self._count(query.station).late_answers += late.cut(buffer, query)
             answer = find_answer(buffer, query)
             if answer.frame is not None:
                 return answer, bytes(buffer)
@@ -264,9 +275,7 @@ class Line:
     def _fail(
         self, query: Query, answer: Answer, received: bytes, counters: Counters, limit_s: float
     ) -> NoReturn:
-        """Remember that an answer may still come, and say what happened."""
-        expiry = self._clock() + self.settings.late_s
-        self._late.setdefault(query.station, {})[query.head] = expiry
+        """Say what happened."""
         self._last_failed = query.frame
         if received:
             self._restless = True
@@ -284,18 +293,13 @@ class Line:
             remedy="check the drive's supply, its address, baud rate and parity, and A/B swapped",
         )
 
-    def _accept(
-        self, query: Query, answer: Answer, received: bytes, counters: Counters, sent_at: float
-    ) -> None:
+    def _accept(self, answer: Answer, received: bytes, counters: Counters, sent_at: float) -> None:
         self._last_failed = b""
         if self.echo is None:
             self.echo = False
         if answer.start or answer.end != len(received):
             counters.framing_errors += 1
             self._restless = self._restless or answer.end != len(received)
-        late = self._late.get(query.station)
-        if late and query.head not in late:
-            del self._late[query.station]
         took_ms = (self._quiet_since - sent_at) * 1000
         old = counters.round_trip_ms
         counters.round_trip_ms = took_ms if old is None else old + (took_ms - old) / 16
@@ -318,30 +322,30 @@ class Line:
         self._restless = False
         self._quiet_since = self._clock()
 
-    def _outwait_late(self, port: Port, query: Query, timeout_s: float | None) -> None:
-        """Make sure that no late answer can be taken for the one to ``query``."""
-        late = self._late.get(query.station)
-        if not late:
-            return
-        now = self._clock()
-        for head in [head for head, expiry in late.items() if expiry <= now]:
-            del late[head]
-        same_read_again = query.frame[1] == READ and query.frame == self._last_failed
-        if query.head in late and not same_read_again:
-            self._probe(port, query, timeout_s)
+    def _outwait(
+        self, port: Port, late: LateAnswers, query: Query, timeout_s: float | None
+    ) -> None:
+        """Make sure that no late answer can be taken for the one to ``query``.
 
-    def _probe(self, port: Port, query: Query, timeout_s: float | None) -> None:
-        """One read whose answer looks different from all that may still come."""
-        station = query.station
-        late = self._late.get(station, {})
-        start = int.from_bytes(query.frame[2:4], "big")
-        shapes = (read_query(station, min(start, 0xFF00), count) for count in range(1, 126))
-        probe = next(q for q in shapes if q.head not in late and q.head != query.head)
-        self._count(station).late_checks += 1
-        with suppress(Rejected):
-            self._exchange(port, probe, timeout_s)
-        self._late.pop(station, None)
-        self._settle(port)
+        Raises:
+            LinkTimeout: no answer to the check, or none that proves anything; nothing was asked.
+        """
+        for choose in (late.check, late.second_check):
+            check = choose(query)
+            self._count(query.station).late_checks += 1
+            try:
+                self._exchange(port, late, check, timeout_s)
+            except Rejected:
+                if not late.refusal_proves(check):
+                    late.failed(check, self._clock() + self.settings.late_s)
+                    continue
+            late.clear()
+            self._settle(port)
+            return
+        raise LinkTimeout(
+            f"station {query.station} answers too late, so its answers cannot be told apart",
+            remedy=f"ask again in {self.settings.late_s:.0f} s; if it goes on, raise timeout_ms",
+        )
 
     def _count(self, station: int) -> Counters:
         return self._counters.setdefault(station, Counters())

@@ -176,7 +176,7 @@ def test_late_echo_of_a_write_does_not_confirm_the_same_write_again() -> None:
     port = ScriptedPort(
         [(0.001, answer(0))],
         [(0.13, write)],  # too late
-        [(0.05, exception_response(1, 3, 2))],  # the check, refused: an answer all the same
+        [(0.05, answer(0))],  # the check: the read that is known to work
         MUTE,
     )
     line = line_on(port)
@@ -184,7 +184,7 @@ def test_late_echo_of_a_write_does_not_confirm_the_same_write_again() -> None:
     for _ in range(2):
         with pytest.raises(LinkTimeout):
             line.write(1, 0x6400, (15,))
-    assert port.sent[1:] == [write, read_query(1, 0x6400, 1).frame, write]
+    assert port.sent == [read_query(1, 0, 1).frame, write, read_query(1, 0, 1).frame, write]
 
 
 def test_repeated_read_may_take_the_late_answer_and_guards_the_next_one() -> None:
@@ -197,6 +197,32 @@ def test_repeated_read_may_take_the_late_answer_and_guards_the_next_one() -> Non
     assert line.read(1, 0, 1) == b"\0\x6f"  # asked again: the same question, so no check
     assert line.read(1, 5, 1) == b"\0\x03"
     assert len(port.sent) == 4
+
+
+def test_refused_check_proves_nothing_if_the_late_answer_may_be_a_refusal() -> None:
+    refused, unknown = exception_response(1, 3, 2), exception_response(1, 4, 1)
+    port = ScriptedPort(
+        [(0.12, refused)],  # nobody knows whether register 0 exists: it is refused too late
+        [(0.06, refused)],  # the first check is refused as well
+        [(0.06, unknown)],  # the second cannot be mistaken
+        [(0.001, answer(5))],
+    )
+    line = line_on(port)
+    with pytest.raises(LinkTimeout):
+        line.read(1, 0, 1)
+    assert line.read(1, 7, 1) == b"\0\x05"
+    assert [frame[1] for frame in port.sent] == [3, 3, 4, 3]
+
+
+def test_drive_that_cannot_be_told_apart_is_left_alone_for_a_while() -> None:
+    refused = exception_response(1, 3, 2)
+    port = ScriptedPort([(0.12, refused)], [(0.06, refused)], MUTE, [(0.001, answer(5))])
+    line = line_on(port)
+    for register in (0x6410, 7):
+        with pytest.raises(LinkTimeout):
+            line.read(1, register, 1)
+    port.now_s += SETTINGS.late_s
+    assert line.read(1, 7, 1) == b"\0\x05"
 
 
 def test_late_answers_are_forgotten_in_time() -> None:
