@@ -82,6 +82,44 @@ class Core:
             low, high = high, low
         return (low, high) if low < high else _INT32
 
+    def modulo(self) -> tuple[float, float] | None:
+        """Lower end and span of the position range 607Bh; None without a proper range.
+
+        The printed defaults are the whole 32-bit range (004:7210-7225).
+        """
+        low, high = self.number("607B:01"), self.number("607B:02")
+        span = high - low
+        return (low, span) if 0 < span < 2**32 - 1 else None
+
+    def shown_position(self, angle_rad: float) -> float:
+        """User position inside the modulo range, if there is one (004:2085-2098)."""
+        position = self.position_of(angle_rad)
+        modulo = self.modulo()
+        if modulo is None:
+            return position
+        low, span = modulo
+        return low + (position - low) % span
+
+    def modulo_target(self, target: float, base: float) -> float:
+        """Where to go for ``target`` from the unwrapped position ``base``: table 24, 004:2104-2157.
+
+        Bits 7 and 6 of 60F2h: 0 as a linear axis, 1 negative only, 2 positive only, 3 shortest.
+        """
+        modulo = self.modulo()
+        if modulo is None:
+            return target
+        low, span = modulo
+        here, wanted = (base - low) % span, (target - low) % span
+        way = int(self.number("60F2:00")) >> 6 & 3
+        if way == 0:
+            return base + wanted - here
+        forwards = (wanted - here) % span
+        if way == 1:
+            return base + (forwards - span if forwards else 0.0)
+        if way == 2 or forwards <= span / 2:
+            return base + forwards
+        return base + forwards - span
+
     def apply_settings(self) -> None:
         """Parameters that act through the loops came into use."""
         od, motor = self.od, self.motor

@@ -34,10 +34,10 @@ def live_values(
     inc_per_rad = _TURN_INCREMENTS / (2 * 3.141592653589793)
 
     def position() -> int:
-        return round((item(k.S_THETA) - core.zero_rad) * core.units.position_per_rad)
+        return round(core.shown_position(item(k.S_THETA)))
 
     def demand() -> int:
-        return round((item(k.S_P_DEMAND) - core.zero_rad) * core.units.position_per_rad)
+        return round(core.shown_position(item(k.S_P_DEMAND)))
 
     def velocity() -> int:
         return round(item(k.S_OMEGA) * core.units.speed_per_rad_s)
@@ -85,7 +85,9 @@ def live_values(
         "60BB:00": lambda: panel.latched("60BB:00"),
         "60BC:00": lambda: panel.latched("60BC:00"),
         "60BD:00": lambda: panel.latched("60BD:00"),
-        "60F4:00": lambda: demand() - position(),
+        "60F4:00": lambda: round(
+            (item(k.S_P_DEMAND) - item(k.S_THETA)) * core.units.position_per_rad
+        ),
         "60FC:00": lambda: round((item(k.S_P_DEMAND) - core.zero_rad) * inc_per_rad),
         "60FD:00": digital_inputs if core.family.traits.assigns_terminals else plain_inputs,
     }

@@ -119,9 +119,10 @@ class Modes:
     def _new_set_point(self, control_word: int) -> None:
         core = self._core
         raw = float(core.number("607A:00"))
-        if control_word & _RELATIVE:
-            base = self._target_user
-            raw += core.position_of(self._axis.angle_rad) if base is None else base
+        base = self._target_user
+        if base is None:
+            base = core.position_of(self._axis.angle_rad)
+        raw = raw + base if control_word & _RELATIVE else core.modulo_target(raw, base)
         low, high = core.software_limits()
         target = min(max(raw, low), high)
         self.limited = target != raw

@@ -249,6 +249,39 @@ def test_unsupported_mode_is_refused(bench) -> None:
     assert b.get("6060:00") == 0
 
 
+@pytest.mark.parametrize(("option", "turned_deg"), [(0, -260), (1, -260), (2, 100), (3, 100)])
+def test_modulo_axis_goes_the_way_of_60f2h(bench, option: int, turned_deg: int) -> None:
+    """A 360° axis at 300° is sent to 40° (table 24, 004:2104-2157)."""
+    b = bench()
+    turn = 36000
+    b.set("6092:01", turn)
+    for key in ("6081:00", "6083:00", "6084:00", "607F:00"):
+        b.set(key, 10 * turn)
+    b.set("607B:01", 0)
+    b.set("607B:02", turn)
+    b.enable(1)
+    move(b, 30000)
+    b.run(1.0)
+    assert b.get("6064:00") == pytest.approx(30000, abs=100)
+    start = b.servo.axis.angle_rad
+    b.set("60F2:00", option << 6)
+    move(b, 4000)
+    b.run(1.5)
+    assert b.get("6064:00") == pytest.approx(4000, abs=100)
+    assert math.degrees(b.servo.axis.angle_rad - start) == pytest.approx(turned_deg, abs=2)
+
+
+def test_modulo_position_never_leaves_its_range(bench) -> None:
+    b = bench()
+    b.set("607B:01", 0)
+    b.set("607B:02", REV)
+    b.enable(3)
+    b.set("60FF:00", -3 * REV)
+    for _ in range(100):
+        b.run(0.013)
+        assert 0 <= b.get("6064:00") <= REV
+
+
 # --- loops ------------------------------------------------------------------------------------
 def speed_response(b: Bench, f_hz: float) -> complex:
     """Closed speed loop at one frequency, by torque-free injection into the speed set-point."""
