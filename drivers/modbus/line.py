@@ -190,7 +190,9 @@ class Line:
             )
         try:
             self._settle(self._port)
-            late = self._late.setdefault(query.station, LateAnswers())
+            late = self._late.get(query.station)
+            if late is None:
+                late = self._late[query.station] = LateAnswers()
             same_read_again = query.frame[1] == READ and query.frame == self._last_failed
             if late.pending(self._clock()) and not same_read_again:
                 self._outwait(self._port, late, query, timeout_s)
