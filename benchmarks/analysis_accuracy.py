@@ -18,9 +18,12 @@ sys.path[:0] = [
     str(Path(__file__).parents[1] / "tests" / "unit" / "analysis"),
 ]
 
-from measured_axes import NAMED, errors, measure
+from measured_axes import NAMED, errors, measure  # noqa: E402
 
-from backend.analysis.identify import identify_mechanics
+from backend.analysis.identify import identify_mechanics  # noqa: E402
+
+
+LOOPS = ((0.0, False), (10.0, False), (40.0, False), (40.0, True), (80.0, False))
 
 
 def main() -> None:
@@ -49,9 +52,11 @@ def main() -> None:
                         "torque" if not loop_hz else f"{'pos' if position else 'speed'}{loop_hz:g}"
                     )
                     print(
-                        f"{name:10s} {rate:4.0f} {kind:8s} {low:4.0f}-{high:4.0f}  {e.magnitude_db:6.3f}"
+                        f"{name:10s} {rate:4.0f} {kind:8s} {low:4.0f}-{high:4.0f}  "
+                        f"{e.magnitude_db:6.3f}"
                         f" {e.phase_deg:6.2f}   {e.covered:4.2f}  {found.fit.delay_s * 1e6:8.1f}"
-                        f"  {m.duration_s:8.1f}  {spent:10.3f} {'' if found.trusted else 'untrusted'}"
+                        f"  {m.duration_s:8.1f}  {spent:10.3f} "
+                        f"{'' if found.trusted else 'untrusted'}"
                     )
                 modes = " ".join(
                     f"{x.frequency_hz:.1f}/{x.damping:.3f}"

@@ -14,11 +14,11 @@ sys.path[:0] = [
     str(Path(__file__).parents[1] / "tests" / "unit" / "analysis"),
 ]
 
-import numpy as np
-from measured_axes import NAMED, measure
-from scipy.signal import csd, welch
+import numpy as np  # noqa: E402
+from measured_axes import NAMED, measure  # noqa: E402
+from scipy.signal import csd, welch  # noqa: E402
 
-from backend.analysis.identify import identify_mechanics
+from backend.analysis.identify import identify_mechanics  # noqa: E402
 
 
 def main() -> None:

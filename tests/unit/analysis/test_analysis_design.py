@@ -87,7 +87,7 @@ def test_goals_hold_for_shifted_modes():
 
 def test_notches_raise_the_bandwidth():
     table = designed(SHARP)
-    fast = [c for c in table if "fast" in c.marks][0]
+    fast = next(c for c in table if "fast" in c.marks)
     bare = max((c for c in table if not c.notches), key=lambda c: c.gains.speed_bandwidth_hz)
     assert fast.notches
     assert fast.gains.speed_bandwidth_hz > 2.0 * bare.gains.speed_bandwidth_hz

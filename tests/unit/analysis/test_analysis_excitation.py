@@ -42,11 +42,11 @@ def test_crest_factor_of_a_sine_is_sqrt_two():
 
 
 def test_realisations_differ_and_repeat():
-    make = lambda n: (
-        multisine(
+    def make(n):
+        return multisine(
             sample_rate_hz=1000.0, period_samples=1000, lines=LINES, realisation=n
         ).one_period
-    )
+
     a, b = make(1), make(2)
     assert abs(np.corrcoef(a, b)[0, 1]) < 0.3
     assert np.array_equal(a, make(1))

@@ -49,10 +49,12 @@ def test_torque_mode_at_1_khz_direct_and_model(mechanics):
     assert m.duration_s <= 10.0
     found = identify_mechanics(m.records, m.path, m.quantity)
     assert found.trusted
-    direct = errors(found.direct, mechanics, 5.0, 250.0)
-    assert direct.magnitude_db < 0.3
-    assert direct.phase_deg < 2.0
-    assert direct.covered >= 0.9
+    for frf in (found.direct, found.corrected):
+        low = errors(frf, mechanics, 5.0, 250.0)
+        # With a heavy load on a light motor the images alone reach 0.3 dB in the direct estimate.
+        assert low.magnitude_db < (0.4 if frf is found.direct and mechanics is HEAVY else 0.3)
+        assert low.phase_deg < 2.0
+        assert low.covered >= 0.9
     corrected = errors(found.corrected, mechanics, 250.0, 400.0)
     assert corrected.magnitude_db < 0.6
     assert corrected.phase_deg < 4.0
@@ -263,8 +265,8 @@ def test_useless_input_is_refused():
         estimate_periodic((replace(first, torque=None),), m.path, "torque_injection")
     with pytest.raises(ValueError, match="samples"):
         Record(first.excitation, first.response[:-1])
+    e = chirp(sample_rate_hz=1000.0, f_min_hz=5.0, f_max_hz=100.0, duration_s=1.0)
     with pytest.raises(ValueError, match="periodic"):
-        e = chirp(sample_rate_hz=1000.0, f_min_hz=5.0, f_max_hz=100.0, duration_s=1.0)
         estimate_periodic((Record(e, e.samples),), m.path, m.quantity)
     with pytest.raises(ValueError, match="reference"):
         identify_mechanics(m.records, m.path, "closed_loop")

@@ -19,8 +19,11 @@ def response(system, f=F):
 
 LOOPS = {
     "third order": control.tf([4e6], [1, 300, 2e4, 0]) * 0.2,
-    "pi on inertia with lag": control.tf([1, 60.0], [1, 0]) * control.tf([300.0], [1, 0]) * control.tf([6283.0], [1, 6283.0]),
-    "resonant": control.tf([200.0], [1, 0]) * control.tf([1, 20, 4e5], [1, 30, 6e5]) * control.tf([3000.0], [1, 3000.0]),
+    "pi on inertia with lag": control.tf([300.0, 18000.0], [1, 0, 0])
+    * control.tf([6283.0], [1, 6283.0]),
+    "resonant": control.tf([200.0], [1, 0])
+    * control.tf([1, 20, 4e5], [1, 30, 6e5])
+    * control.tf([3000.0], [1, 3000.0]),
 }  # fmt: skip
 
 
