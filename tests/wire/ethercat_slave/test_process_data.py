@@ -75,6 +75,13 @@ def test_in_safe_op_outputs_are_received_and_do_not_act() -> None:
     assert wire.device.values[0x607A, 0] == bytes(4)
 
 
+def test_reading_past_the_end_of_the_inputs_keeps_the_length() -> None:
+    wire = Wire()
+    wire.to_safeop()
+    answer = wire.read(IN, 12)
+    assert (answer.wkc, answer.data) == (1, inputs(0, 0x0250, 0) + bytes(4))
+
+
 def test_a_bitwise_fmmu_moves_single_bits() -> None:
     wire = Wire()
     wire.to_safeop()

@@ -35,8 +35,8 @@ class ControllerEvents(Protocol):
     def state_requested(self, control: int, now_ns: int) -> None:
         """The master has written AL control."""
 
-    def sync_managers_changed(self) -> None:
-        """The master has written sync manager registers."""
+    def configuration_changed(self) -> None:
+        """The master has written sync manager registers or switched SYNC0."""
 
     def mailbox_repeat_requested(self) -> None:
         """The activation byte of sync manager 1 was written."""
@@ -228,6 +228,7 @@ class Controller:
             self._dc.compare(data[reg.DC_SYSTEM_TIME - address :], now_ns)
         if address <= reg.DC_ACTIVATION < end:
             self._dc.activate(now_ns)
+            self._events.configuration_changed()
 
     def _configure_sync_managers(self, address: int, data: bytes) -> None:
         for sm in self.sms:
@@ -243,7 +244,7 @@ class Controller:
                 self._events.mailbox_repeat_requested()
             self._show(sm)
         self._active = [sm for sm in self.sms if sm.enabled]
-        self._events.sync_managers_changed()
+        self._events.configuration_changed()
 
     def _configure_fmmus(self, address: int, data: bytes) -> None:
         for at, value in enumerate(data, address):
@@ -277,14 +278,11 @@ class Controller:
             part = bytes(data[low - address : high - address])
             return self.write(fmmu.physical + low - fmmu.start, part, now_ns)
         done = False
-        for offset, bit in enumerate(fmmu.bits()):
-            at = bit // 8 - address
-            if 0 <= at < len(data):
-                place = fmmu.physical * 8 + fmmu.physical_bit + offset
-                mask = 1 << place % 8
-                old = self._stored(place // 8)
-                new = old | mask if data[at] >> bit % 8 & 1 else old & ~mask
-                done |= self.write(place // 8, bytes([new]), now_ns)
+        for bit, place in fmmu.bits(address, len(data)):
+            mask = 1 << place % 8
+            old = self._stored(place // 8)
+            new = old | mask if data[bit // 8] >> bit % 8 & 1 else old & ~mask
+            done |= self.write(place // 8, bytes([new]), now_ns)
         return done
 
     def _stored(self, address: int) -> int:
@@ -302,11 +300,9 @@ class Controller:
                 data[low - address : high - address] = part
             return part is not None
         done = False
-        for offset, bit in enumerate(fmmu.bits()):
-            at = bit // 8 - address
-            place = fmmu.physical * 8 + fmmu.physical_bit + offset
-            if 0 <= at < len(data) and (byte := self.read(place // 8, 1, now_ns)) is not None:
-                mask = 1 << bit % 8
+        for bit, place in fmmu.bits(address, len(data)):
+            if (byte := self.read(place // 8, 1, now_ns)) is not None:
+                at, mask = bit // 8, 1 << bit % 8
                 data[at] = data[at] | mask if byte[0] >> place % 8 & 1 else data[at] & ~mask
                 done = True
         return done

@@ -8,11 +8,12 @@ import os
 import selectors
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import IO, Any
 
 from drivers.errors import LinkLost, LinkTimeout
 from drivers.virtual.wires.netns import Namespace, child_environment
@@ -25,8 +26,9 @@ ANSWER_TIMEOUT_S = 5.0
 class VirtualSegment:
     """A running segment. ``command`` is the control channel of `control.Control`."""
 
-    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+    def __init__(self, process: subprocess.Popen[bytes], words: IO[bytes]) -> None:
         self._process = process
+        self._words = words
         self._buffer = b""
         self._next_id = 0
         self.description: dict[str, Any] = {}
@@ -45,12 +47,14 @@ class VirtualSegment:
         """
         module = "drivers.virtual.wires.ethercat"
         argv = [sys.executable, "-m", module, "--iface", interface, *arguments]
+        # A file and not a pipe for what it says: a pipe that nobody reads stops it once full.
+        words = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
         process = subprocess.Popen(
             namespace.command(argv) if namespace else argv,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=words,
             env=child_environment(),
         )  # fmt: skip
-        segment = cls(process)
+        segment = cls(process, words)
         try:
             segment.description = segment._receive(START_TIMEOUT_S)
         except (LinkLost, LinkTimeout):
@@ -110,9 +114,9 @@ class VirtualSegment:
             process.wait(timeout=5)
         except subprocess.TimeoutExpired:
             self.kill()
-        for stream in (process.stdout, process.stderr):
-            if stream is not None:
-                stream.close()
+        if process.stdout is not None:
+            process.stdout.close()
+        self._words.close()
 
     def __enter__(self) -> VirtualSegment:
         return self
@@ -145,9 +149,7 @@ class VirtualSegment:
     def _ended(self) -> LinkLost:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=2)
-        words = b""
-        if self._process.stderr is not None and self._process.poll() is not None:
-            words = self._process.stderr.read()
-        text = words.decode(errors="replace").strip().splitlines()
+        self._words.seek(0)
+        text = self._words.read().decode(errors="replace").strip().splitlines()
         reason = text[-1] if text else f"exit status {self._process.poll()}"
         return LinkLost(f"the virtual segment has ended: {reason}")

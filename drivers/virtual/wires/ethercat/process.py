@@ -12,6 +12,9 @@ from drivers.virtual.wires.ethercat.dictionary import CoeDictionary, SyncReport
 from drivers.virtual.wires.ethercat.registers import AlCode
 from drivers.virtual.wires.ethercat.syncmanager import SyncManager
 
+_SHORTEST_CYCLE_NS = 31_250
+"""No drive of ours goes below; where the manual prints a limit, that one counts as well."""
+
 _FREE_RUN, _SYNC_MANAGER, _SYNC0 = 0, 1, 2
 
 
@@ -77,6 +80,8 @@ class ProcessData:
         if self._clock.sync0_cycle_ns == 0:
             return AlCode.INVALID_DC_CONFIG
         pdo = self._device.profile.pdo
+        if self._clock.sync0_cycle_ns < _SHORTEST_CYCLE_NS:
+            return AlCode.INVALID_SYNC_CYCLE
         cycle_us = self._clock.sync0_cycle_ns / 1000
         low = pdo.cycle_min_us if pdo else None
         high = pdo.cycle_max_us if pdo else None

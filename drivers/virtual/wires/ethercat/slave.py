@@ -176,7 +176,7 @@ class Slave:
         """The master may have missed the last answer."""
         self.mailbox.repeat_toggled()
 
-    def sync_managers_changed(self) -> None:
+    def configuration_changed(self) -> None:
         """A master that switches off what the present state needs forces an error state."""
         heading = min(self.al.state, self.al.target)
         if heading >= AlState.PREOP and not self._mailbox_set():

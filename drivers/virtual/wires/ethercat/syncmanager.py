@@ -7,7 +7,7 @@ changing on the last byte; in buffered mode the newest complete data win.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 MAILBOX_FULL = 0x08
@@ -16,6 +16,7 @@ _DIRECTION_WRITE = 0x04
 _WATCHDOG_TRIGGER = 0x40
 _ENABLE = 0x01
 _REPEAT = 0x02
+_MEMORY_BITS = 0x10000 * 8
 
 
 def _ignore() -> None:
@@ -97,10 +98,9 @@ class SyncManager:
             return None
         offset = address - self.start
         if not self.mailbox:
-            data = self.data[offset : offset + length] if offset >= 0 else None
-            if data is not None and offset + length >= self.length:
-                self.on_read()
-            return None if data is None else bytes(data)
+            if offset < 0:
+                return None
+            return bytes(self.data[offset : offset + length]).ljust(length, b"\0")
         if not self.full or offset < 0 or (offset and not self._opened):
             return None
         self._opened = True
@@ -163,10 +163,14 @@ class Fmmu:
         """Whole bytes only, the usual case."""
         return self.start_bit == 0 and self.stop_bit == 7 and self.physical_bit == 0
 
-    def bits(self) -> range:
-        """Logical bit addresses covered."""
-        last = (self.end - 1) * 8 + self.stop_bit
-        return range(self.start * 8 + self.start_bit, last + 1)
+    def bits(self, address: int, length: int) -> Iterator[tuple[int, int]]:
+        """Pairs of bits that lie in a datagram: place in its data, and in physical memory."""
+        begin = self.start * 8 + self.start_bit
+        end = (self.end - 1) * 8 + self.stop_bit + 1
+        origin = self.physical * 8 + self.physical_bit - begin
+        for bit in range(max(begin, address * 8), min(end, (address + length) * 8)):
+            if origin + bit < _MEMORY_BITS:
+                yield bit - address * 8, origin + bit
 
 
 def parse_fmmu(raw: bytes) -> Fmmu | None:
