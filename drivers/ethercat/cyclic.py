@@ -179,6 +179,7 @@ class CyclicLoop:
         self.counters.late_max_us = max(self.counters.late_max_us, late_us)
 
     def _exchange(self) -> int:
+        self._segment.discard_late_frames()
         self._master.send_processdata()
         if self._fd is not None:
             ready, _, _ = select.select((self._fd,), (), (), self._wait_s)

@@ -129,6 +129,7 @@ class EthercatLink:
         here = stations.get(station) if station is not None else None
         details: dict[str, float | int | str] = {
             "host_restarts": self._host.restarts,
+            "late_frames": int(self._status.get("late_frames", 0)),
             "mailbox_repeats": sum(int(item["repeats"]) for item in stations.values()),
         }
         for key, value in cyclic.items():

@@ -517,6 +517,7 @@ class Operations:
             "attached": self._attached,
             "open": self._open,
             "frames": self.lanes.frames,
+            "late_frames": self.segment.late_frames,
             "stations": {
                 s.number: {
                     "lost": s.lost,

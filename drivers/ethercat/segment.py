@@ -5,6 +5,10 @@ longer than 15 characters overflow a buffer; ``close()`` on a master that never 
 descriptor 0 and a second one closes a stranger's; a failed open leaks its socket; outputs longer
 than the slave's overwrite memory; the IO map of 4096 bytes is not checked; errors of earlier
 calls stay in a global queue and are raised by later ones.
+
+And SOEM tells answers apart by an index of four bits alone: when 16 late frames lie in the
+socket, each request is at once answered by one that is 16 frames old, for ever. So late frames
+are thrown away before anything is sent.
 """
 
 from __future__ import annotations
@@ -36,6 +40,10 @@ class Segment:
         self.socket_fd: int | None = None
         self.slaves: Sequence[pysoem.CdefSlave] = ()
         self.mapped = False
+        self.late_frames = 0
+        """Frames that came back after they had been given up."""
+        self._ear: socket.socket | None = None
+        self._scrap = bytearray(2048)
 
     def open(self) -> None:
         """Open the interface for us alone.
@@ -66,12 +74,17 @@ class Segment:
         new = _sockets() - before
         self.socket_fd = min(new) if new else None
         self._index = socket.if_nametoindex(self.interface)
+        if self.socket_fd is not None:
+            self._ear = socket.socket(fileno=os.dup(self.socket_fd))
         self._master = master
 
     def close(self) -> None:
         """Close the interface once; calling again does nothing."""
         master, self._master = self._master, None
         self.slaves, self.socket_fd, self.mapped = (), None, False
+        if self._ear is not None:
+            self._ear.close()
+            self._ear = None
         if master is not None:
             master.close()
         self._unlock()
@@ -103,6 +116,7 @@ class Segment:
             ProtocolError: more slaves than can be handled.
         """
         self.mapped = False
+        self.discard_late_frames()
         self.master.manual_state_change = 0
         count = self.master.config_init(release_gil=True)
         self.forget_errors()
@@ -111,8 +125,22 @@ class Segment:
         self.slaves = tuple(self.master.slaves) if count > 0 else ()
         return len(self.slaves)
 
+    def discard_late_frames(self) -> None:
+        """Throw away what nobody waits for any more; to be called with no frame under way."""
+        if self._ear is None:
+            return
+        try:
+            while self._ear.recv_into(self._scrap, 0, socket.MSG_DONTWAIT):
+                self.late_frames += 1
+        except BlockingIOError:
+            return
+        except OSError:
+            # The interface went down: whoever sends next is told.
+            return
+
     def read(self, station: int, register: int, size: int) -> bytes | None:
         """Read a register of a slave, or None when it does not answer."""
+        self.discard_late_frames()
         try:
             data: bytes = self.slaves[station - 1]._fprd(register, size, _FRAME_TIMEOUT_US)  # noqa: SLF001 - the only register access pysoem offers
         except pysoem.WkcError:
@@ -121,6 +149,7 @@ class Segment:
 
     def write(self, station: int, register: int, data: bytes) -> bool:
         """Write a register of a slave; False when it does not answer."""
+        self.discard_late_frames()
         try:
             self.slaves[station - 1]._fpwr(register, data, _FRAME_TIMEOUT_US)  # noqa: SLF001 - as above
         except pysoem.WkcError:
@@ -171,7 +200,16 @@ class Segment:
 
     def recover(self, station: int) -> bool:
         """Give a slave that was switched off its address back; False when it is another one."""
-        back = bool(self.slaves[station - 1].recover(2000) > 0)
+        # SOEM sends some of these frames without waiting, and needs the socket to block then.
+        waits = self.socket_fd is None or os.get_blocking(self.socket_fd)
+        if self.socket_fd is not None:
+            os.set_blocking(self.socket_fd, True)
+        self.discard_late_frames()
+        try:
+            back = bool(self.slaves[station - 1].recover(2000) > 0)
+        finally:
+            if self.socket_fd is not None:
+                os.set_blocking(self.socket_fd, waits)
         self.forget_errors()
         return back
 

@@ -49,6 +49,7 @@ class Rig:
             self.do("mute", slave=slave, on=False)
             self.do("die_in_transfer", slave=slave, after_segments=None)
             self.do("power_on", slave=slave)
+            self.do("inject", slave=slave, what="calm")
             for state in ("PREOP", "SAFEOP", "OP"):
                 self.do("refuse", slave=slave, state=state, code=None)
 

@@ -95,8 +95,8 @@ class ServoDevice(DictionaryDevice):
     def _switch(self) -> None:
         word = int.from_bytes(self.values[0x6040, 0], "little")
         if self.status == _FAULT:
-            if word & 0x80 and not self.bus_lost:
-                self.status = _DISABLED
+            if word & 0x80:
+                self.status, self.bus_lost = _DISABLED, False
                 self.values[0x603F, 0] = b"\0\0"
         elif not word & 0x02:
             self.status = _DISABLED
@@ -135,9 +135,8 @@ class ServoDevice(DictionaryDevice):
 
     def communication_lost(self, reason: str) -> None:
         super().communication_lost(reason)
-        self.bus_lost = True
         if self.status == _ENABLED:
-            self.status = _FAULT
+            self.status, self.bus_lost = _FAULT, True
             self.values[0x603F, 0] = (0x8700).to_bytes(2, "little")
             self.emergencies.append((0x8700, 0x10, bytes(5)))
 
@@ -151,8 +150,10 @@ class ServoDevice(DictionaryDevice):
         elif what == "fault":
             self.status = _FAULT
             self._put(0x603F, value)
-        elif what == "bus_back":
-            self.bus_lost = False
+        elif what == "calm":
+            self.status, self.bus_lost, self.speed = _DISABLED, False, 0.0
+            self._put(0x6077, 0)
+            self._put(0x60F4, 0)
         else:
             super().inject(what, value)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import signal
 import subprocess
@@ -12,7 +13,7 @@ import time
 
 import pytest
 
-from drivers.errors import Busy, LinkLost, LinkTimeout, NotAllowed, Rejected
+from drivers.errors import Busy, DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
 from drivers.ethercat.al_status import AlState
 from drivers.ethercat.coe import EntryDescription
 from drivers.ethercat.link import EthercatLink
@@ -195,6 +196,22 @@ async def test_lost_late_and_damaged_frames_cost_time_but_no_value(rig: Rig) -> 
                 await bus.link.write(1, RECORD[1], value)
                 assert await bus.link.read(1, RECORD[1]) == value
             rig.do("peace")
+
+
+async def test_a_heap_of_late_frames_is_never_taken_for_answers(rig: Rig) -> None:
+    """SOEM's index has four bits: 16 frames too late would answer for ever."""
+    async with rig.link() as bus:
+        rig.do("late", by_s=0.05, count=40)
+        for _ in range(3):
+            with contextlib.suppress(DriveError):
+                await bus.link.read(1, STATUS)
+        rig.do("peace")
+        await until(lambda: not bus.link.quality(1).state.startswith("no answer"), 3.0)
+        for number in range(1, 20):
+            value = number.to_bytes(2, "little")
+            await bus.link.write(1, RECORD[1], value)
+            assert await bus.link.read(1, RECORD[1]) == value
+        assert int(bus.link.quality().details["late_frames"]) > 0
 
 
 async def test_a_busy_eeprom_ends_in_words(rig: Rig) -> None:

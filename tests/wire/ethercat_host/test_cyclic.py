@@ -1,0 +1,400 @@
+"""Cyclic exchange on a real wire: motion, samples, and trouble in the middle of it."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from drivers.cia402 import Mode, State
+from drivers.errors import Busy, LinkLost, NotAllowed, OutOfRange
+from drivers.link import Address, CyclicSignal, Envelope, ScopeBlock, Trajectory
+from drivers.virtual.wires.netns import child_environment
+from profiles.schema import DataType
+from tests.wire.ethercat_host.conftest import Bus, Rig, until
+from tests.wire.ethercat_host.servo_device import servo_profile
+
+POSITION = Address(0x607A, 0, "INT32")
+VELOCITY = Address(0x60FF, 0, "INT32")
+TORQUE = Address(0x6071, 0, "INT16")
+_INPUTS: tuple[tuple[int, DataType, str], ...] = (
+    (0x6041, "UINT16", "status"), (0x6064, "INT32", "position"), (0x606C, "INT32", "speed"),
+    (0x6077, "INT16", "torque"), (0x6061, "INT8", "mode"), (0x60F4, "INT32", "following"),
+)  # fmt: skip
+START = 1000
+
+
+def inputs(station: int) -> list[CyclicSignal]:
+    return [
+        CyclicSignal(station, Address(index, 0, kind), f"{station}.{name}")
+        for index, kind, name in _INPUTS
+    ]
+
+
+def outputs(station: int) -> list[CyclicSignal]:
+    return [
+        CyclicSignal(station, POSITION, f"{station}.target"),
+        CyclicSignal(station, VELOCITY, f"{station}.target speed"),
+        CyclicSignal(station, TORQUE, f"{station}.target torque"),
+        CyclicSignal(station, Address(0x6060, 0, "INT8"), f"{station}.mode wanted"),
+        CyclicSignal(station, Address(0x6072, 0, "UINT16"), f"{station}.max torque"),
+    ]
+
+
+@asynccontextmanager
+async def running(
+    rig: Rig, stations: tuple[int, ...] = (1, 2), cycle_s: float = 0.002
+) -> AsyncIterator[Bus]:
+    """2 ms: the tests must hold on a computer that does other things as well."""
+    async with rig.link() as bus:
+        for station in stations:
+            bus.link.know(station, servo_profile())
+        cyclic = bus.link.process_data
+        await cyclic.configure(
+            [s for n in stations for s in inputs(n)],
+            [s for n in stations for s in outputs(n)],
+            cycle_s,
+        )
+        await cyclic.start()
+        try:
+            yield bus
+        finally:
+            if bus.link.quality().connected and cyclic.running:
+                await cyclic.stop()
+
+
+async def enable(bus: Bus, station: int, mode: Mode = Mode.CSP) -> None:
+    await bus.link.process_data.drive_to(station, State.OPERATION_ENABLED, mode)
+    await until(lambda: in_state(bus, station) == "Operation enabled", 3.0)
+
+
+def in_state(bus: Bus, station: int) -> str:
+    return bus.link.process_data.axis_state(station)[0]
+
+
+def move(
+    station: int,
+    values: npt.ArrayLike,
+    target: Address = POSITION,
+    envelope: Envelope | None = None,
+    renew_s: float = 0.2,
+) -> Trajectory:
+    return Trajectory(
+        station, target, np.asarray(values, np.int64), envelope or Envelope(), renew_s=renew_s
+    )
+
+
+def ramp(rig: Rig, slave: int, step: int = 5, count: int = 5000) -> npt.NDArray[np.int64]:
+    return rig.truth(slave, 0x6064) + step * np.arange(count, dtype=np.int64)
+
+
+class Track:
+    """Everything that the loop delivered, by channel."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.blocks: list[ScopeBlock] = []
+        bus.link.process_data.blocks(self.blocks.append)
+
+    def __getitem__(self, channel: str) -> npt.NDArray[np.float64]:
+        column = self.blocks[0].channels.index(channel)
+        return np.concatenate([block.samples[:, column] for block in self.blocks])
+
+
+async def test_a_trajectory_is_played_exactly_one_value_per_cycle(rig: Rig) -> None:
+    async with running(rig) as bus:
+        track = Track(bus)
+        assert bus.link.process_data.dc
+        await enable(bus, 1)
+        await enable(bus, 2)
+        wave = (2000 * (1 - np.cos(np.linspace(0, 2 * np.pi, 300)))).astype(np.int64)
+        first, second = wave + rig.truth(0, 0x6064), rig.truth(1, 0x6064) - wave
+        await bus.link.process_data.run([move(1, first), move(2, second)])
+        await asyncio.sleep(0.1)
+        for channel, values in (("1.target", first), ("2.target", second)):
+            told = track[channel]
+            begin = int(np.argmax(told != told[0])) - int(np.argmax(values != values[0]))
+            assert np.array_equal(told[begin : begin + 300], values)
+        follows = track["1.position"]
+        assert follows.max() == first.max()
+        counters = bus.link.quality().details
+        delivered = sum(len(b.samples) + b.dropped for b in track.blocks)
+        assert delivered <= int(counters["cyclic_cycles"]) + int(counters["cyclic_overruns"]) + 200
+        ends = [b.t0_s + len(b.samples) * b.dt_s for b in track.blocks]
+        for block, end in zip(track.blocks[1:], ends, strict=False):
+            if not block.dropped:
+                assert block.t0_s == pytest.approx(end, abs=1e-3), "no gap that is not counted"
+
+
+async def test_mapped_objects_keep_the_value_that_they_had(rig: Rig) -> None:
+    async with running(rig):
+        assert rig.truth(0, 0x6072) == 3000, "a mapped torque limit must not become zero"
+
+
+async def test_parameters_are_read_while_axes_move(rig: Rig) -> None:
+    async with running(rig) as bus:
+        await enable(bus, 1)
+        moving = asyncio.create_task(bus.link.process_data.run([move(1, ramp(rig, 0, count=200))]))
+        reads = 0
+        while not moving.done():
+            assert await bus.link.read(1, Address(0x1008, 0, "STRING")) == b"DICT-1 drive"
+            reads += 1
+        await moving
+        assert reads > 20
+        with pytest.raises(NotAllowed, match="6040:00 belongs to the cyclic exchange"):
+            await bus.link.write(1, Address(0x6040, 0, "UINT16"), b"\x0f\0")
+        await bus.link.write(1, Address(0x6072, 0, "UINT16"), (1500).to_bytes(2, "little"))
+        await until(lambda: rig.truth(0, 0x6072) == 1500, 1.0)
+        with pytest.raises(Busy, match="runs on this segment"):
+            await bus.link.scan(lambda _s, _t: None)
+
+
+async def test_velocity_and_torque_modes(rig: Rig) -> None:
+    async with running(rig) as bus:
+        await enable(bus, 1, Mode.CSV)
+        await bus.link.process_data.run([move(1, [3000] * 60 + [0], VELOCITY)])
+        await until(lambda: rig.truth(0, 0x606C) == 0, 1.0)
+        assert rig.truth(0, 0x6064) > START
+        await until(lambda: in_state(bus, 1) == "Ready to switch on", 2.0)
+        await enable(bus, 1, Mode.CST)
+        await bus.link.process_data.run([move(1, [2] * 30, TORQUE)])
+        await until(lambda: rig.truth(0, 0x606C) == 0, 2.0, "the quick stop ends the motion")
+
+
+async def test_setpoints_that_are_not_renewed_end_the_motion(rig: Rig) -> None:
+    async with running(rig) as bus:
+        await enable(bus, 1)
+        await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=0.2)])
+        started = time.monotonic()
+        await bus.told("not renewed in time")
+        assert 0.15 < time.monotonic() - started < 0.4
+        await until(lambda: in_state(bus, 1) == "Ready to switch on", 1.0)
+        assert rig.truth(0, 0x606C) == 0
+
+
+@pytest.mark.parametrize(
+    ("what", "value", "envelope", "words"),
+    [
+        ("torque", 900, Envelope(torque_max=500), "torque 900 is beyond the limit of 500"),
+        ("following", -40, Envelope(following_error_max=30), "following error -40 is beyond"),
+    ],
+)
+async def test_the_envelope_stops_one_axis_and_not_the_other(
+    rig: Rig, what: str, value: int, envelope: Envelope, words: str
+) -> None:
+    async with running(rig) as bus:
+        await enable(bus, 1)
+        await enable(bus, 2)
+        play = bus.link.process_data.run(
+            [move(1, ramp(rig, 0), envelope=envelope, renew_s=1.0), move(2, ramp(rig, 1))]
+        )
+        moving = asyncio.create_task(play)
+        await asyncio.sleep(0.1)
+        rig.do("inject", slave=0, what=what, value=value)
+        await bus.told(words)
+        await until(lambda: in_state(bus, 1) != "Operation enabled", 1.0)
+        with pytest.raises(NotAllowed, match=words):
+            await moving
+        rig.do("inject", slave=0, what=what, value=0)
+        assert not [t for t in bus.texts if "beyond" in t and words not in t]
+
+
+async def test_what_the_envelope_forbids_is_refused_before_anything_moves(rig: Rig) -> None:
+    async with running(rig) as bus:
+        here = rig.truth(0, 0x6064)
+        with pytest.raises(NotAllowed, match="a motion needs 'Operation enabled'"):
+            await bus.link.process_data.play([move(1, [here])])
+        await enable(bus, 1)
+        with pytest.raises(OutOfRange, match="the envelope allows"):
+            await bus.link.process_data.play(
+                [move(1, [here, here + 50], envelope=Envelope(position_max=here + 10))]
+            )
+        with pytest.raises(OutOfRange, match="holds"):
+            await bus.link.process_data.play([move(1, [1 << 40])])
+        assert rig.truth(0, 0x6064) == here
+
+
+async def test_halt_stops_every_axis(rig: Rig) -> None:
+    async with running(rig) as bus:
+        for station in (1, 2):
+            await enable(bus, station)
+        await bus.link.process_data.play(
+            [move(1, ramp(rig, 0), renew_s=5), move(2, ramp(rig, 1), renew_s=5)]
+        )
+        await asyncio.sleep(0.1)
+        await bus.link.process_data.halt()
+        took = await until(lambda: all(rig.truth(n, 0x606C) == 0 for n in (0, 1)), 1.0)
+        assert took < 0.3
+        for station in (1, 2):
+            await until(lambda n=station: in_state(bus, n) == "Ready to switch on", 1.0)  # type: ignore[misc]
+
+
+async def test_single_wrong_counters_and_lost_frames_are_tolerated_and_counted(rig: Rig) -> None:
+    async with running(rig) as bus:
+        await enable(bus, 1)
+        moving = asyncio.create_task(bus.link.process_data.run([move(1, ramp(rig, 0, count=250))]))
+        await asyncio.sleep(0.1)
+        before = bus.link.quality()
+        rig.do("counter", by=-1, count=1)
+        await asyncio.sleep(0.1)
+        rig.do("lose", count=2, cyclic=True)
+        await moving
+        await asyncio.sleep(0.25)
+        after = bus.link.quality()
+        assert after.wkc_errors - before.wkc_errors == 1
+        assert after.lost_frames - before.lost_frames >= 2
+
+
+async def test_data_that_stay_invalid_stop_the_axis(rig: Rig) -> None:
+    async with running(rig) as bus:
+        await enable(bus, 1)
+        await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=5)])
+        rig.do("counter", by=-1)
+        await bus.told("no valid process data for", "the axis is braked")
+        await until(lambda: rig.truth(0, 0x606C) == 0, 1.0)
+        rig.do("peace")
+        await until(lambda: in_state(bus, 1) == "Ready to switch on", 2.0)
+
+
+async def test_a_cable_cut_in_motion_stops_the_axis_and_heals(rig: Rig) -> None:
+    async with running(rig) as bus:
+        await enable(bus, 2)
+        await bus.link.process_data.play([move(2, ramp(rig, 1), renew_s=5)])
+        rig.do("cut", cable=1)
+        took = await until(lambda: rig.truth(1, 0x606C) == 0, 1.0, "the watchdog stops it")
+        assert took < 0.2
+        await bus.told("station 2", "no longer answers")
+        with pytest.raises((NotAllowed, LinkLost), match="does not answer"):
+            await bus.link.process_data.play([move(2, [0])])
+        await enable(bus, 1)
+        await bus.link.process_data.run([move(1, ramp(rig, 0, count=30))])
+        rig.do("heal")
+        await bus.told("station 2 is in OP again")
+        await bus.link.process_data.reset_fault(2)
+        await until(lambda: in_state(bus, 2) == "Switch on disabled", 2.0)
+        await enable(bus, 2)
+        await bus.link.process_data.run([move(2, ramp(rig, 1, count=30))])
+
+
+async def test_a_power_cycle_in_motion_ends_it_and_the_drive_comes_back_disabled(
+    rig: Rig,
+) -> None:
+    async with running(rig) as bus:
+        await enable(bus, 1)
+        await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=5)])
+        rig.do("power_cycle", slave=0, off_s=0.3)
+        await bus.told("station 1", "was switched on again")
+        await bus.told("station 1 is in OP again", within_s=8)
+        await until(lambda: in_state(bus, 1) == "Switch on disabled", 2.0)
+        assert rig.do("state")["slaves"][0]["state"] == "OP"  # type: ignore[index]
+        await enable(bus, 1)
+        await bus.link.process_data.run([move(1, ramp(rig, 0, count=30))])
+
+
+async def test_killing_the_host_in_motion_stops_the_axis_and_restarts_it(rig: Rig) -> None:
+    async with running(rig) as bus:
+        await enable(bus, 1)
+        await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=5)])
+        await asyncio.sleep(0.1)
+        assert rig.truth(0, 0x606C) > 0
+        host = bus.link._host.pid
+        assert host is not None
+        os.kill(host, signal.SIGKILL)
+        took = await until(lambda: rig.truth(0, 0x606C) == 0, 1.0)
+        assert took < 0.2
+        await bus.told("died", "started again")
+        await bus.told("runs again")
+        found = await bus.link.scan(lambda _s, _t: None)
+        assert len(found) == 2
+        with pytest.raises(NotAllowed, match="does not run"):
+            await bus.link.process_data.renew(1)
+
+
+async def test_killing_the_server_in_motion_stops_the_axis(rig: Rig) -> None:
+    """The host notices the end of the pipe, brakes, disables and leaves OP."""
+    script = textwrap.dedent(
+        f"""
+        import asyncio, sys
+        from tests.wire.ethercat_host.test_cyclic import *
+        from drivers.ethercat.link import EthercatLink
+
+        async def main():
+            link = EthercatLink("ec0m", launcher={rig.namespace.command([])!r})
+            bus = Bus(link)
+            await link.open()
+            link.know(1, servo_profile())
+            cyclic = link.process_data
+            await cyclic.configure(inputs(1), outputs(1), 0.002)
+            await cyclic.start()
+            await enable(bus, 1)
+            here = int({rig.truth(0, 0x6064)})
+            await cyclic.play([move(1, here + 5 * np.arange(9000), renew_s=60)])
+            print("moving", link._host.pid, flush=True)
+            await asyncio.sleep(60)
+
+        asyncio.run(main())
+        """
+    )
+    server = subprocess.Popen(  # noqa: ASYNC220 - it is killed below
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, env=child_environment()
+    )
+    assert server.stdout is not None
+    line = await asyncio.to_thread(server.stdout.readline)
+    host = int(line.split()[1])
+    await until(lambda: rig.truth(0, 0x606C) > 0, 2.0)
+    server.kill()
+    took = await until(lambda: rig.truth(0, 0x606C) == 0, 1.0)
+    assert took < 0.2
+    server.wait()
+    server.stdout.close()
+    await until(lambda: not os.path.exists(f"/proc/{host}"), 6.0, "the host outlived its server")  # noqa: PTH110
+    async with rig.link() as bus:
+        assert len(await bus.link.scan(lambda _s, _t: None)) == 2
+
+
+async def test_killing_the_segment_in_motion_ends_it_and_a_new_one_is_taken_up(rig: Rig) -> None:
+    async with running(rig) as bus:
+        await enable(bus, 1)
+        await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=5)])
+        rig.segment.kill()
+        await bus.told("no valid process data for")
+        await bus.told("station 1", "no longer answers")
+        rig.segment.close()
+        rig.start()
+        await bus.told("station 1 is in OP again", within_s=10)
+        await bus.told("station 2 is in OP again", within_s=10)
+        assert in_state(bus, 1) != "Operation enabled"
+        await enable(bus, 1)
+
+
+async def test_watchdogs_are_in_the_slaves(rig: Rig) -> None:
+    async with running(rig):
+        for slave in (0, 1):
+            divider = int(str(rig.do("register", slave=slave, address=0x400)))
+            ticks = int(str(rig.do("register", slave=slave, address=0x420)))
+            assert ticks * (divider + 2) * 40e-9 == pytest.approx(0.05, rel=0.01)
+            assert int(str(rig.do("register", slave=slave, address=0x814, length=1))) & 0x40
+
+
+async def test_a_refused_mapping_names_drive_and_reason(rig: Rig) -> None:
+    async with rig.link() as bus:
+        wish = [CyclicSignal(1, Address(0x2001, 1, "UINT16"), "odd")]
+        with pytest.raises(NotAllowed, match=r"station 1 does not take these process data"):
+            await bus.link.process_data.configure(wish, [], 0.001)
+        rig.do("refuse", slave=0, state="SAFEOP", code=0x0025)
+        with pytest.raises(NotAllowed, match=r"refuses SAFEOP.*invalid output mapping"):
+            await bus.link.process_data.configure(inputs(1), outputs(1), 0.001)
+        bus.link.know(1, servo_profile())
+        with pytest.raises(NotAllowed, match="takes cycles of 250 to 10000"):
+            await bus.link.process_data.configure(inputs(1), outputs(1), 0.02)
+        with pytest.raises(NotAllowed, match="configure the cyclic data first"):
+            await bus.link.process_data.start()
