@@ -36,7 +36,7 @@ class DeviceControl:
         self._after_stop: Callable[[], None] | None = None
         self._halt_done: Callable[[], None] | None = None
         self._retry_step: float | None = None
-        self._axis.p[k.P_LIMIT_STOPS] = float(core.family.traits.limit_switch_faults)
+        self.modes.homing.guard_limits()
         self._axis.listen(k.EV_ARRIVED)
 
     # --- commands --------------------------------------------------------------------------
@@ -179,6 +179,8 @@ class DeviceControl:
     # --- events ----------------------------------------------------------------------------
     def on_events(self, events: int) -> None:
         """React to what ended a run of the 50 µs loop."""
+        if events & k.EV_ALARM_CLOCK:
+            self._axis.set_alarm(None)
         if events & k.EV_FAULT:
             self._on_fault()
         if events & k.EV_STOPPED:
@@ -196,8 +198,6 @@ class DeviceControl:
                 self._end_identification()
         elif self.modes.running:
             self.modes.on_events(events, self.control_word)
-        elif events & k.EV_ALARM_CLOCK:
-            self._axis.set_alarm(None)
 
     # --- identification --------------------------------------------------------------------
     def _begin_identification(self) -> None:

@@ -75,6 +75,8 @@ class Homing:
     def on_events(self, events: int) -> None:
         """Resume when what the script waits for has come, or give up at the deadline."""
         if self._script is None:
+            if events & k.EV_STOPPED:
+                self.guard_limits()
             return
         if events & k.EV_ALARM_CLOCK and self.deadline_step is not None:
             self._script.close()
@@ -97,9 +99,15 @@ class Homing:
             self._axis.listen(self._waiting.event)
             self._axis.watch_signals(self._waiting.signals)
 
+    def guard_limits(self) -> None:
+        """Outside a search a limit switch is a fault again."""
+        self._axis.p[k.P_LIMIT_STOPS] = float(self._core.family.traits.limit_switch_faults)
+
     def _fail(self) -> None:
         self.failed = True
         self._finish()
+        # The axis may stand on a limit switch: that is a homing error and no fault.
+        self._axis.p[k.P_LIMIT_STOPS] = 0.0
         self._axis.stop_ramp(self._acceleration())
 
     def _finish(self) -> None:
@@ -109,7 +117,7 @@ class Homing:
         self._axis.listen(k.EV_ARRIVED)
         self._axis.watch_signals(0)
         self._axis.watch_stall(0.0, math.inf, 0.0)
-        self._axis.p[k.P_LIMIT_STOPS] = float(self._core.family.traits.limit_switch_faults)
+        self.guard_limits()
         self._core.torque_cap_nm = math.inf
         self._core.apply_motion()
 

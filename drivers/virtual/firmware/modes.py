@@ -51,6 +51,7 @@ class Modes:
         """Begin a mode with the power stage on, without a bump."""
         if self.homing.active:
             self.homing.abort()
+        self.homing.guard_limits()
         self.mode, self.running = mode, True
         self._move = self._waiting = None
         self._target_user = None
@@ -144,7 +145,7 @@ class Modes:
 
     def on_events(self, events: int, control_word: int) -> None:
         """Trajectory ends and homing progress."""
-        if self.homing.active:
+        if self.mode == HM:
             self.homing.on_events(events)
         elif events & k.EV_ARRIVED and self.mode == PP and self._waiting is not None:
             self._begin(self._waiting)

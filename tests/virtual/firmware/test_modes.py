@@ -500,6 +500,7 @@ def test_homing_fails_on_the_limit_switch_and_at_the_time_out(bench) -> None:
     b.run(3.0)
     assert b.status & 1 << 13
     assert not b.status & 1 << 12
+    assert b.status & 0x6F == 0x27  # an error of homing, not a fault
     assert abs(b.get("606C:00")) < REV // 50
     b = bench()
     b.set("2070:03", 1)
