@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
+from drivers.virtual.device import Device
 from drivers.virtual.wires.ethercat.segment import Segment
 from drivers.virtual.wires.ethercat.slave import Slave
 
@@ -77,13 +78,14 @@ def parse(raw: bytes) -> list[Answer]:
 class Wire:
     """A segment of dictionary drives with a time that stands still, and a master's moves."""
 
-    def __init__(self, count: int = 1, **profile: object) -> None:
+    def __init__(self, count: int = 1, *, real: Device | None = None, **profile: object) -> None:
         self.clock = ManualClock()
         self.devices = [
             DictionaryDevice(make_profile(**profile))  # type: ignore[arg-type]
             for _ in range(count)
         ]
-        self.slaves = [Slave(device, self.clock) for device in self.devices]
+        drives: list[Device] = list(self.devices) if real is None else [real]
+        self.slaves = [Slave(device, self.clock) for device in drives]
         self.segment = Segment(self.slaves, self.clock)
         self._counter = 0
 
