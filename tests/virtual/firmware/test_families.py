@@ -12,9 +12,10 @@ import pytest
 from drivers.virtual.device import SdoAbort
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware import make_device
+from drivers.virtual.firmware.factory import FAMILIES
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import MechanicsSpec, TravelSpec
-from profiles.loader import load_profile
+from profiles.loader import drive_names, load_profile
 from profiles.schema import (
     Fault,
     GainSpec,
@@ -324,3 +325,26 @@ def test_generic_drive_obeys_6007h(family, option: int, bits: int) -> None:
     b.set("605E:00", 0)
     b.servo.communication_lost("heartbeat")
     assert b.status & 0x6F == bits
+
+
+@pytest.mark.parametrize("drive", sorted(set(FAMILIES) & set(drive_names())))
+def test_every_family_turns_with_its_real_profile(family, drive: str) -> None:
+    """One revolution per second in PV or CSV, seen in the profile's own units."""
+    profile = load_profile(drive)
+    b = family(profile)
+    for index in b.servo.indices():
+        for subindex in b.servo.subindices(index):
+            entry = b.servo.od.find(index, subindex)
+            if entry.parameter.access != "wo":
+                b.servo.read(index, subindex)
+    mode = 3 if 3 in profile.supported_modes else 9
+    b.set("6060:00", mode)
+    for word in (6, 7, 15):
+        b.set("6040:00", word)
+        b.run(0.02)
+    one = round(abs(b.servo.core.units.speed_per_rad_s) * TURN)
+    b.set("60FF:00", one)
+    b.run(2.0)
+    assert b.servo.axis.speed_rad_s == pytest.approx(TURN, rel=0.03)
+    assert b.get("606C:00") == pytest.approx(one, rel=0.03, abs=2)
+    assert b.get("603F:00") == 0
