@@ -149,6 +149,7 @@ def _remember(axis: Axis, name: str) -> None:
     match name:
         case "save":
             drive.mark_saved()
+            drive.mark_applied("write_settings")
         case "write_settings":
             drive.mark_applied("write_settings")
             axis.forget()
