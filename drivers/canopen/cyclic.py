@@ -1,53 +1,44 @@
 """SYNC-driven process data: `drivers.link.Cyclic` on a CAN bus.
 
 Per cycle: SYNC, then the outputs for the next SYNC; the inputs that SYNC called for arrive
-meanwhile and form one sample. The set-up of the drives is undone by `stop`.
+meanwhile and form one sample. The set-up of the drives is undone by `stop`. The loop owns the
+control word of every axis that it has outputs for (`drivers.link.OwnsPowerState`).
 """
 
 from __future__ import annotations
 
+import array
 import asyncio
+import math
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
+
 from drivers.canopen import frames
-from drivers.canopen.busload import BusLoad, require_room
+from drivers.canopen.busload import BusLoad
+from drivers.canopen.drive_setup import DriveSetup, ReadObject, WriteObject
 from drivers.canopen.frames import Frame
-from drivers.canopen.pdo import INVALID, PdoPlan, SdoWrite, plan, set_up
+from drivers.canopen.images import CONTROL_WORD, Images
+from drivers.canopen.pdo import PdoPlan, plan_within_load
 from drivers.canopen.port import CanPort
-from drivers.canopen.setpoints import Player
-from drivers.canopen.synchronous import SyncLoop, Tables
+from drivers.canopen.synchronous import SyncLoop
 from drivers.canopen.url import CanUrl
-from drivers.codec import decode
-from drivers.errors import DriveError, LinkLost, NotAllowed, Rejected
-from drivers.link import (
-    CyclicSignal,
-    Envelope,
-    LinkEvent,
-    ScopeBlock,
-    Trajectory,
-    Unsubscribe,
-)
+from drivers.cia402 import State
+from drivers.errors import DriveError, NotAllowed, OutOfRange
+from drivers.ethercat.playback import AxisLoop, Limits, Motion
+from drivers.link import CyclicSignal, LinkEvent, ScopeBlock, Trajectory, Unsubscribe
+from profiles.schema import INTEGER_RANGE
 
 SHORTEST_CYCLE_S = 0.001
-_WATCHDOG_MS = 200
-_PDO_FLAGS = 0x60000000
-
-#: Which input each limit of an envelope is judged by.
-_ENVELOPE_INPUT = {"position": 0x6064, "speed": 0x606C, "torque": 0x6077, "following": 0x60F4}
-
-
-ReadObject = Callable[[int, int, int], bytes]
-"""Read (station, index, subindex), blocking."""
-
-WriteObject = Callable[[int, int, int, bytes], None]
-"""Write (station, index, subindex, data), blocking."""
+_MODE = 0x6060
+_OWNED = (CONTROL_WORD, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2)
 
 InWorker = Callable[[Callable[[], None]], Awaitable[None]]
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Configured:
     pdos: tuple[PdoPlan, ...]
     cycle_s: float
@@ -65,15 +56,18 @@ class CanopenCyclic:
         in_worker: InWorker,
     ) -> None:
         self.load: BusLoad | None = None
+        self.left_over: tuple[tuple[CyclicSignal, str], ...] = ()
+        """Signals of the last `configure` that are not exchanged, and why."""
         self.unguarded: frozenset[int] = frozenset()
         """Stations with outputs whose drive offers no watchdog (1016h) against our silence."""
         self._port = port
         self._settings = settings
         self._read = read
         self._write = write
+        self._setup = DriveSetup(read, write, settings.own_id)
         self._in_worker = in_worker
         self._configured: _Configured | None = None
-        self._undo: list[tuple[int, SdoWrite]] = []
+        self._without_cyclic_modes: set[int] = set()
         self._loop: SyncLoop | None = None
         self._consumers: list[Callable[[ScopeBlock], None]] = []
         self._tell: Callable[[LinkEvent], None] = lambda _event: None
@@ -82,13 +76,21 @@ class CanopenCyclic:
         """Where events of the loop go (any thread)."""
         self._tell = tell
 
+    def set_modes(self, station: int, modes: Sequence[int]) -> None:
+        """Which modes the drive has: without CSP, CSV or CST its commands stay with SDO."""
+        if {8, 9, 10} & set(modes):
+            self._without_cyclic_modes.discard(station)
+        else:
+            self._without_cyclic_modes.add(station)
+
     async def configure(
         self, inputs: Sequence[CyclicSignal], outputs: Sequence[CyclicSignal], cycle_s: float
     ) -> tuple[CyclicSignal, ...]:
         """Plan the PDOs and return the signals that fit; nothing is written before `start`.
 
         Raises:
-            NotAllowed: cycle below 1 ms, bus load above 80 %, or still running.
+            NotAllowed: cycle below 1 ms, bus load above 80 % even with the most important
+                signals only, or still running.
         """
         if self._loop is not None:
             raise NotAllowed(
@@ -101,11 +103,16 @@ class CanopenCyclic:
                 limit="1 ms",
                 remedy="use 1 ms or longer",
             )
-        pdos, left = plan(inputs, outputs)
-        if not pdos:
+        by_sdo = [s for s in outputs if s.station in self._without_cyclic_modes]
+        cyclic = [s for s in outputs if s.station not in self._without_cyclic_modes]
+        planned = plan_within_load(inputs, cyclic, cycle_s, self._settings.bitrate)
+        why = "the drive has no cyclic mode: it is commanded by SDO"
+        self.left_over = (*planned.left_over, *((s, why) for s in by_sdo))
+        if not planned.pdos:
             raise NotAllowed("none of these signals can travel in a PDO", remedy="poll them")
-        self.load = require_room([p.size for p in pdos], cycle_s, self._settings.bitrate)
-        self._configured = _Configured(pdos, cycle_s)
+        self.load = planned.load
+        self._configured = _Configured(planned.pdos, cycle_s)
+        left = [signal for signal, _ in self.left_over]
         return tuple(s for s in (*inputs, *outputs) if s not in left)
 
     async def start(self) -> None:
@@ -121,45 +128,42 @@ class CanopenCyclic:
         if self._loop is not None:
             return
         event_loop = asyncio.get_running_loop()
+        images = Images(configured.pdos, configured.cycle_s, self._report)
         try:
-            await self._in_worker(partial(self._set_up_drives, configured))
+            await self._in_worker(partial(self._prepare, configured, images))
         except BaseException:
-            await asyncio.shield(self._in_worker(self._undo_drives))
+            await asyncio.shield(self._in_worker(self._setup.undo))
             raise
-        tables = Tables.of(configured.pdos)
-        await self._in_worker(partial(self._read_outputs, configured, tables))
 
         def deliver(block: ScopeBlock) -> None:
             event_loop.call_soon_threadsafe(self._deliver, block)
 
-        loop = SyncLoop(
+        self._loop = SyncLoop(
             self._port.send,
-            tables,
+            images,
             configured.cycle_s,
             deliver=deliver,
             tell=self._tell,
             own_id=self._settings.own_id,
         )
-        self._loop = loop
-        loop.start()
-        stations = sorted({p.station for p in configured.pdos})
-        await self._in_worker(partial(self._nmt, frames.NMT_START, stations))
+        self._loop.start()
+        await self._in_worker(partial(self._nmt, frames.NMT_START, images.stations))
 
     async def stop(self) -> None:
         """Ramp down whatever moves, leave Operational and put the drives' PDOs back."""
-        loop, configured = self._loop, self._configured
-        if loop is None or configured is None:
+        loop = self._loop
+        if loop is None:
             return
-        stations = sorted({p.station for p in configured.pdos})
         try:
             await self._in_worker(loop.halt_and_wait)
             # Before the silence: else the drives' own watchdog would report a fault.
-            await self._in_worker(partial(self._undo_watchdogs))
+            await self._in_worker(self._setup.unguard)
+            stations = loop.images.stations
             await self._in_worker(partial(self._nmt, frames.NMT_PREOPERATIONAL, stations))
         finally:
             await self._in_worker(loop.stop)
             self._loop = None
-            await self._in_worker(self._undo_drives)
+            await self._in_worker(self._setup.undo)
 
     async def shut_down(self) -> None:
         """`stop`, whatever state the bus is in."""
@@ -172,40 +176,26 @@ class CanopenCyclic:
         """Play trajectories in step; returns the cycle counter of the first value.
 
         Raises:
-            NotAllowed: not running, a target that is not a mapped output, or an envelope limit
-                whose signal is not among the inputs and so cannot be enforced.
+            NotAllowed: not running or not enabled, a target that is not a mapped output, a jump at
+                the beginning, or an envelope limit whose signal is not among the inputs.
+            OutOfRange: a value does not fit its target.
         """
         loop = self._require_running()
+        motions = [(t.station, _motion(t, loop.cycle_s)) for t in trajectories]
         for trajectory in trajectories:
-            for target in (trajectory.target, trajectory.offset_target):
-                if target is not None and not loop.tables.has_output(
-                    trajectory.station, target.index or 0, target.subindex
-                ):
-                    raise NotAllowed(
-                        f"{target} of node {trajectory.station} is not a cyclic output",
-                        parameter=str(target),
-                        remedy="configure it as an output first",
-                    )
-            for name, index in _ENVELOPE_INPUT.items():
-                if _limits(trajectory.envelope, name) and not loop.tables.has_input(
-                    trajectory.station, index
-                ):
-                    raise NotAllowed(
-                        f"the {name} limit of node {trajectory.station} cannot be enforced: "
-                        f"{index:04X}:00 is not among the cyclic inputs",
-                        parameter=f"{index:04X}:00",
-                        remedy="configure it as an input first",
-                    )
-        return loop.play([Player(t, loop.cycle_s) for t in trajectories])
+            self._require_axis(trajectory.station)
+            if trajectory.target.subindex:
+                raise NotAllowed(f"{trajectory.target} is no setpoint of CiA 402")
+        return loop.play(motions)
 
     async def renew(self, station: int) -> None:
         """Extend the life of the setpoints of ``station``."""
-        self._require_running().renew(station)
+        self._require_running().axis(station, AxisLoop.renew)
 
     async def halt(self, station: int | None = None) -> None:
-        """Controlled stop now; the axis stays enabled and its setpoints end."""
+        """Brake now and leave Operation enabled; setpoints end."""
         if self._loop is not None:
-            self._loop.halt(station)
+            self._loop.halt(station, "it was halted")
 
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
         """Deliver samples on the event loop's thread."""
@@ -217,6 +207,44 @@ class CanopenCyclic:
 
         return leave
 
+    # Power states (drivers.link.OwnsPowerState)
+
+    @property
+    def running(self) -> bool:
+        """Whether process data are exchanged."""
+        return self._loop is not None and self._loop.running
+
+    def owns(self, station: int) -> bool:
+        """Whether the loop writes the control word of ``station``."""
+        return self._loop is not None and station in self._loop.images.axes
+
+    async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
+        """Head for a power state; the axis brakes before it leaves Operation enabled.
+
+        Raises:
+            NotAllowed: the drive has a fault, moves, or its control word is not mapped.
+        """
+        loop = self._require_running()
+        self._require_axis(station)
+        if mode is not None and (station, _MODE, 0) not in loop.images.outputs:
+            data = mode.to_bytes(1, "little", signed=True)
+            await self._in_worker(partial(self._write, station, _MODE, 0, data))
+        loop.axis(station, lambda axis: axis.drive_to(goal, mode))
+
+    async def reset_fault(self, station: int) -> None:
+        """Reset a fault once; the axis stays disabled."""
+        self._require_axis(station)
+        self._require_running().axis(station, AxisLoop.reset_fault)
+
+    def axis_state(self, station: int) -> tuple[str, str, str]:
+        """Power state, phase of the setpoints, and why the last motion was ended by force."""
+        axis = None if self._loop is None else self._loop.images.axes.get(station)
+        if axis is None:
+            return "Unknown", "idle", ""
+        return axis.state.value, axis.phase.value, axis.halted
+
+    # For the link
+
     def statistics(self) -> dict[str, float | int | str]:
         """Cycles, lost samples and SYNC lateness in µs, for link quality."""
         figures: dict[str, float | int | str] = {}
@@ -226,33 +254,56 @@ class CanopenCyclic:
             figures |= self._loop.statistics()
         return figures
 
-    def take(self, frame: Frame, now_s: float) -> bool:
+    def take(self, frame: Frame) -> bool:
         """Take a received frame if it is one of our input PDOs (receiving thread)."""
         loop = self._loop
-        return loop is not None and loop.take(frame, now_s)
+        return loop is not None and loop.take(frame)
 
     def event(self, event: LinkEvent) -> None:
         """A loss or restart ends setpoints: they must not go on by themselves afterwards."""
         if self._loop is None:
             return
-        if event.kind in ("lost", "boot") or event.station is None:
-            self._loop.abandon(event.station)
+        if event.kind in ("lost", "boot") or (event.kind == "fault" and event.station is None):
+            self._loop.abandon(event.station, event.text)
         elif event.kind == "fault":
-            self._loop.halt(event.station, disable=True)
+            self._loop.halt(event.station, event.text)
 
     def drives(self, station: int, index: int, subindex: int) -> bool:
         """Whether this object is written by our PDOs each cycle."""
         loop = self._loop
-        return loop is not None and loop.tables.has_output(station, index, subindex)
+        return loop is not None and (station, index, subindex) in loop.images.outputs
 
     def put(self, station: int, index: int, subindex: int, data: bytes) -> None:
-        """Send ``data`` with the PDOs from now on; returns when it is on the bus. Blocks."""
-        self._require_running().put(station, index, subindex, data)
+        """Send ``data`` with the PDOs from now on; returns when it is on the bus. Blocks.
+
+        Raises:
+            NotAllowed: the loop itself writes this object.
+        """
+        loop = self._require_running()
+        if station in loop.images.axes and subindex == 0 and index in _OWNED:
+            raise NotAllowed(
+                f"node {station}: the cyclic exchange writes {index:04X}h",
+                parameter=f"{index:04X}:00",
+                remedy="end the cyclic exchange, or use a cyclic mode",
+            )
+        loop.put((station, index, subindex), data)
+
+    # Beneath
 
     def _require_running(self) -> SyncLoop:
         if self._loop is None:
             raise NotAllowed("the cyclic exchange is not running", remedy="start it first")
         return self._loop
+
+    def _require_axis(self, station: int) -> None:
+        if not self.owns(station):
+            raise NotAllowed(
+                f"node {station}: the control word is not in the cyclic data",
+                remedy="configure 6040:00 as an output, or command the drive by SDO",
+            )
+
+    def _report(self, station: int, text: str) -> None:
+        self._tell(LinkEvent("fault", station, f"node {station}: {text}"))
 
     def _deliver(self, block: ScopeBlock) -> None:
         for consumer in list(self._consumers):
@@ -262,23 +313,13 @@ class CanopenCyclic:
         for station in stations:
             self._port.send(Frame(frames.NMT, bytes([command, station])))
 
-    # Setting the drives up, with the way back.
-
-    def _set_up_drives(self, configured: _Configured) -> None:
-        stations = sorted({p.station for p in configured.pdos})
-        self._nmt(frames.NMT_PREOPERATIONAL, stations)
-        for station in stations:
-            used = {
-                p.number for p in configured.pdos if (p.station, p.direction) == (station, "tx")
-            }
-            for number in range(4):
-                if number not in used:
-                    self._silence(station, 0x1800 + number)
-        for pdo in configured.pdos:
-            self._map(pdo)
+    def _prepare(self, configured: _Configured, images: Images) -> None:
+        """Map, guard, and begin with the drives' present values, so nothing changes at first."""
+        self._nmt(frames.NMT_PREOPERATIONAL, images.stations)
+        self._setup.map_pdos(configured.pdos)
         unguarded = set()
-        for station in sorted({p.station for p in configured.pdos if p.direction == "rx"}):
-            if not self._guard(station):
+        for station in sorted({station for station, _, _ in images.outputs}):
+            if not self._setup.guard(station):
                 unguarded.add(station)
                 self._tell(
                     LinkEvent(
@@ -289,98 +330,45 @@ class CanopenCyclic:
                     )
                 )
         self.unguarded = frozenset(unguarded)
+        for key, slot in images.outputs.items():
+            data = self._read(*key)
+            if len(data) != slot.size:
+                raise NotAllowed(
+                    f"node {key[0]}: {key[1]:04X}:{key[2]:02X} has {len(data)} bytes, "
+                    f"{slot.size} were expected",
+                    remedy="compare the profile with the drive's own dictionary",
+                )
+            images.set_output(key, data)
 
-    def _change(self, station: int, write: SdoWrite) -> None:
-        """Write, remembering how to undo it."""
-        before = self._read(station, write.index, write.subindex)
-        self._undo.append((station, SdoWrite(write.index, write.subindex, before)))
-        self._write(station, write.index, write.subindex, write.data)
 
-    def _silence(self, station: int, communication: int) -> None:
-        try:
-            cob = int.from_bytes(self._read(station, communication, 1), "little")
-            if not cob & INVALID:
-                data = (cob | INVALID).to_bytes(4, "little")
-                self._change(station, SdoWrite(communication, 1, data))
-        except Rejected:
-            return  # a drive without this PDO has nothing to silence
-
-    def _map(self, pdo: PdoPlan) -> None:
-        station = pdo.station
-        try:
-            cob = self._read(station, pdo.communication, 1)
-            kind = self._read(station, pdo.communication, 2)
-            count = self._read(station, pdo.mapping, 0)
-            entries = [self._read(station, pdo.mapping, n) for n in range(1, min(count[0], 8) + 1)]
-            before = [SdoWrite(pdo.communication, 1, cob)]
-            before += [SdoWrite(pdo.mapping, 0, count)]
-            before += [SdoWrite(pdo.mapping, n, e) for n, e in enumerate(entries, 1)][::-1]
-            before += [SdoWrite(pdo.mapping, 0, b"\0"), SdoWrite(pdo.communication, 2, kind)]
-            invalid = int.from_bytes(cob, "little") | INVALID
-            before += [SdoWrite(pdo.communication, 1, invalid.to_bytes(4, "little"))]
-            # The list is undone from its end: invalid first, then the mapping, then valid again.
-            self._undo += [(station, write) for write in before]
-            for write in set_up(pdo, int.from_bytes(cob, "little") & _PDO_FLAGS):
-                self._write(station, write.index, write.subindex, write.data)
-        except Rejected as refusal:
-            names = ", ".join(str(s.address) for s in pdo.signals)
-            raise NotAllowed(
-                f"node {station} does not let {names} be mapped to PDO {pdo.number + 1}: "
-                f"{refusal.message}",
-                drive=f"node {station}",
-                parameter=refusal.parameter,
-                remedy="leave these signals out, they can be polled",
-            ) from refusal
-
-    def _guard(self, station: int) -> bool:
-        value = (self._settings.own_id << 16 | _WATCHDOG_MS).to_bytes(4, "little")
-        try:
-            self._change(station, SdoWrite(0x1016, 1, value))
-        except Rejected:
-            return False
-        return self._read(station, 0x1016, 1) == value
-
-    def _undo_watchdogs(self) -> None:
-        mine = [(s, w) for s, w in self._undo if w.index == 0x1016]
-        self._undo = [(s, w) for s, w in self._undo if w.index != 0x1016]
-        self._put_back(mine)
-
-    def _undo_drives(self) -> None:
-        undo, self._undo = self._undo, []
-        self._put_back(undo)
-
-    def _put_back(self, undo: Sequence[tuple[int, SdoWrite]]) -> None:
-        failures: list[str] = []
-        for station, write in reversed(undo):
-            try:
-                self._write(station, write.index, write.subindex, write.data)
-            except LinkLost:
-                raise
-            except DriveError as error:
-                failures.append(f"node {station} {write.index:04X}:{write.subindex:02X} ({error})")
-        if failures:
-            raise NotAllowed(
-                "these settings of the drives could not be put back: " + "; ".join(failures),
-                remedy="restart the drives before using them with another master",
+def _motion(trajectory: Trajectory, cycle_s: float) -> Motion:
+    envelope = trajectory.envelope
+    for address, values in (
+        (trajectory.target, trajectory.values),
+        (trajectory.offset_target, trajectory.offset_values),
+    ):
+        if address is None or values is None or not len(values):
+            continue
+        low, high = INTEGER_RANGE[address.type]
+        if int(values.min()) < low or int(values.max()) > high:
+            raise OutOfRange(
+                f"the trajectory goes beyond what {address} can hold",
+                parameter=str(address),
+                limit=f"{low}…{high}",
             )
-
-    def _read_outputs(self, configured: _Configured, tables: Tables) -> None:
-        """Start from the drive's present values, so that the first PDO changes nothing."""
-        for pdo in configured.pdos:
-            if pdo.direction == "rx":
-                for signal in pdo.signals:
-                    address = signal.address
-                    index = address.index or 0
-                    data = self._read(pdo.station, index, address.subindex)
-                    decode(address.type, data)
-                    tables.set_output(pdo.station, index, address.subindex, data)
-
-
-def _limits(envelope: Envelope, name: str) -> bool:
-    values = {
-        "position": (envelope.position_min, envelope.position_max),
-        "speed": (envelope.speed_max,),
-        "torque": (envelope.torque_max,),
-        "following": (envelope.following_error_max,),
-    }[name]
-    return any(value is not None for value in values)
+    offsets = trajectory.offset_values
+    return Motion(
+        target=trajectory.target.index or 0,
+        values=array.array("q", trajectory.values.tolist()),
+        limits=Limits(
+            envelope.position_min,
+            envelope.position_max,
+            envelope.speed_max,
+            envelope.torque_max,
+            envelope.following_error_max,
+        ),
+        renew_cycles=max(1, math.ceil(trajectory.renew_s / cycle_s)),
+        longest_step=int(np.max(np.abs(np.diff(trajectory.values)), initial=0)),
+        offset=None if trajectory.offset_target is None else trajectory.offset_target.index,
+        offset_values=None if offsets is None else array.array("q", offsets.tolist()),
+    )

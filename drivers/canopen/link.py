@@ -35,7 +35,7 @@ from drivers.link import (
     Progress,
     Unsubscribe,
 )
-from profiles.schema import LinkKind
+from profiles.schema import LinkKind, Profile
 
 T = TypeVar("T")
 
@@ -103,6 +103,10 @@ class CanopenLink:
             self._workers = None
             await asyncio.get_running_loop().run_in_executor(None, self._port.close)
             workers.shutdown(wait=True)
+
+    def configure_station(self, station: int, profile: Profile) -> None:
+        """Learn which family answers at ``station`` (`drivers.link.NeedsProfile`)."""
+        self._cyclic.set_modes(station, profile.supported_modes)
 
     async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
         """Ask every node number for its device type, then who answers for its identity.
@@ -290,7 +294,7 @@ class CanopenLink:
     # Beneath: what runs on the receiving thread.
 
     def _frame(self, frame: Frame, now_s: float) -> None:
-        if self._cyclic.take(frame, now_s):
+        if self._cyclic.take(frame):
             return
         function, node = frame.cob_id & 0x780, frame.cob_id & 0x7F
         if function == SDO_ANSWER and node:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from drivers.canopen.busload import LIMIT, BusLoad, bus_load, require_room
 from drivers.canopen.frames import RPDO, TPDO
 from drivers.codec import size_of
 from drivers.link import CyclicSignal
@@ -80,6 +81,59 @@ def plan(
             left += rest
             pdos += [PdoPlan(station, direction, n, tuple(g)) for n, g in enumerate(groups)]
     return tuple(pdos), tuple(left)
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedPlan:
+    """PDOs within the bus load, the signals left out with the reason, and the load."""
+
+    pdos: tuple[PdoPlan, ...]
+    left_over: tuple[tuple[CyclicSignal, str], ...]
+    load: BusLoad | None
+
+
+_INPUTS_KEPT = 3
+_OUTPUTS_KEPT = 5
+
+
+def plan_within_load(
+    inputs: Sequence[CyclicSignal],
+    outputs: Sequence[CyclicSignal],
+    cycle_s: float,
+    bitrate: int,
+) -> LoadedPlan:
+    """As `plan`, leaving out the less important signals while the bus would be too full.
+
+    Signals of a station count as the more important the earlier they come; its first 3 inputs and
+    first 5 outputs are never left out.
+
+    Raises:
+        NotAllowed: even those need more than 80 % of the bus.
+    """
+    kept_in, kept_out = list(inputs), list(outputs)
+    dropped: list[tuple[CyclicSignal, str]] = []
+    while True:
+        pdos, left = plan(kept_in, kept_out)
+        sizes = [p.size for p in pdos]
+        if not pdos:
+            load = None
+        elif bus_load(sizes, cycle_s, bitrate).fraction <= LIMIT:
+            load = bus_load(sizes, cycle_s, bitrate)
+        else:
+            ranked = [(_rank(s, kept_in) - _INPUTS_KEPT, kept_in, s) for s in kept_in]
+            ranked += [(_rank(s, kept_out) - _OUTPUTS_KEPT, kept_out, s) for s in kept_out]
+            rank, owner, least = max(ranked, key=lambda item: item[0])
+            if rank < 0:
+                require_room(sizes, cycle_s, bitrate)
+            owner.remove(least)
+            dropped.append((least, f"the bus would be more than {LIMIT:.0%} full"))
+            continue
+        unfit = tuple((s, "it does not fit into the drive's PDOs") for s in left)
+        return LoadedPlan(pdos, (*unfit, *dropped), load)
+
+
+def _rank(signal: CyclicSignal, among: Sequence[CyclicSignal]) -> int:
+    return [s for s in among if s.station == signal.station].index(signal)
 
 
 def _pack(

@@ -1,4 +1,7 @@
-"""The SYNC loop: one thread, absolute deadlines, samples in and setpoints out."""
+"""The SYNC loop: one thread, absolute deadlines, samples in and setpoints out.
+
+What an axis does with its setpoints is the same on every bus: `drivers.ethercat.playback`.
+"""
 
 from __future__ import annotations
 
@@ -11,94 +14,18 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.canopen.frames import HEARTBEAT, SYNC, Frame
-from drivers.canopen.pdo import PdoPlan
-from drivers.canopen.setpoints import Player
-from drivers.codec import decode, encode, size_of
+from drivers.canopen.images import Images, Key
+from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout
-from drivers.link import CyclicSignal, Envelope, LinkEvent, ScopeBlock
-from profiles.schema import DataType
+from drivers.ethercat.playback import AxisLoop, Motion, Phase
+from drivers.link import LinkEvent, ScopeBlock
 
-_CONTROL_WORD = (0x6040, 0)
-_DISABLE_OPERATION = b"\x07\x00"
-_SHUTDOWN = b"\x06\x00"
-_RATES = (0x60FF, 0x6071, 0x60B1, 0x60B2)
-"""Targets and offsets of speed and torque."""
 _BLOCK_S = 0.025
 _HEARTBEAT_S = 0.05
 _OPERATIONAL = b"\x05"
-_SILENT_S = 0.05
+_BRAKE_WHEN_SILENT_S = 0.05
+_GIVE_UP_WHEN_SILENT_S = 0.3
 _LATENESS_KEPT = 4096
-
-_Key = tuple[int, int, int]
-
-
-@dataclass(slots=True)
-class _Slot:
-    """Where one signal sits in one PDO."""
-
-    cob_id: int
-    start: int
-    type: DataType
-    column: int
-
-
-@dataclass(slots=True)
-class Tables:
-    """Where each signal sits, and the bytes that go out next. Guarded by the loop's lock."""
-
-    channels: tuple[str, ...]
-    inputs: dict[_Key, _Slot]
-    outputs: dict[_Key, _Slot]
-    images: dict[int, bytearray]
-    lengths: dict[int, int]
-    """Length in bytes of each input PDO by its identifier."""
-
-    @classmethod
-    def of(cls, pdos: Sequence[PdoPlan]) -> Tables:
-        """Tables for a plan; channels in the order of the plan's inputs."""
-        tables = cls((), {}, {}, {}, {})
-        names: list[str] = []
-        for pdo in pdos:
-            start = 0
-            for signal in pdo.signals:
-                slot = _Slot(pdo.cob_id, start, signal.address.type, len(names))
-                if pdo.direction == "tx":
-                    tables.inputs[_key(signal)] = slot
-                    names.append(signal.channel)
-                else:
-                    tables.outputs[_key(signal)] = slot
-                start += size_of(signal.address.type) or 0
-            if pdo.direction == "tx":
-                tables.lengths[pdo.cob_id] = start
-            else:
-                tables.images[pdo.cob_id] = bytearray(start)
-        tables.channels = tuple(names)
-        return tables
-
-    def has_output(self, station: int, index: int, subindex: int) -> bool:
-        """Whether this object goes out each cycle."""
-        return (station, index, subindex) in self.outputs
-
-    def has_input(self, station: int, index: int) -> bool:
-        """Whether this object comes in each cycle."""
-        return (station, index, 0) in self.inputs
-
-    def set_output(self, station: int, index: int, subindex: int, data: bytes) -> None:
-        """Change the bytes that go out."""
-        slot = self.outputs[station, index, subindex]
-        self.images[slot.cob_id][slot.start : slot.start + len(data)] = data
-
-    def neutralise(self, station: int, index: int, subindex: int) -> None:
-        """Make this output harmless; positions stay, as holding is what a position does."""
-        slot = self.outputs[station, index, subindex]
-        if index == _CONTROL_WORD[0]:
-            self.set_output(station, index, subindex, _SHUTDOWN)
-        elif index in _RATES:
-            self.set_output(station, index, subindex, bytes(size_of(slot.type) or 0))
-
-    def station_of(self, cob_id: int) -> int:
-        """The node behind an identifier of the pre-defined connection set."""
-        return cob_id & 0x7F
 
 
 @dataclass(slots=True)
@@ -124,14 +51,14 @@ class SyncLoop:
     def __init__(
         self,
         send: Callable[[Frame], None],
-        tables: Tables,
+        images: Images,
         cycle_s: float,
         *,
         deliver: Callable[[ScopeBlock], None],
         tell: Callable[[LinkEvent], None],
         own_id: int,
     ) -> None:
-        self.tables = tables
+        self.images = images
         self.cycle_s = cycle_s
         self._send = send
         self._deliver = deliver
@@ -139,13 +66,11 @@ class SyncLoop:
         self._heartbeat = Frame(HEARTBEAT + own_id, _OPERATIONAL)
         self._lock = threading.Condition()
         self._stopping = False
-        self._players: list[Player] = []
         self._cycle = 0
         self._sent_cycle = -1
         self._arrived: dict[int, bytes] = {}
-        self._last_seen_s: dict[int, float] = {}
-        self._latest: dict[_Key, float] = {}
-        self._rows: list[list[float]] = []
+        self._silent_s = dict.fromkeys(images.stations, 0.0)
+        self._rows: list[list[int | float]] = []
         self._row_valid: list[bool] = []
         self._block_start_s = 0.0
         self._sequence = 0
@@ -158,24 +83,28 @@ class SyncLoop:
         """Start the thread."""
         self._thread.start()
 
+    @property
+    def running(self) -> bool:
+        """Whether SYNC is being sent."""
+        return self._thread.is_alive()
+
     def stop(self) -> None:
         """End the thread at once; `halt_and_wait` first to stop motion."""
         with self._lock:
             self._stopping = True
         self._thread.join()
 
-    def take(self, frame: Frame, now_s: float) -> bool:
+    def take(self, frame: Frame) -> bool:
         """Take a frame if it is one of the input PDOs."""
-        length = self.tables.lengths.get(frame.cob_id)
+        length = self.images.lengths.get(frame.cob_id)
         if length is None or frame.remote:
             return False
         if len(frame.data) >= length:
             with self._lock:
                 self._arrived[frame.cob_id] = frame.data
-                self._last_seen_s[self.tables.station_of(frame.cob_id)] = now_s
         return True
 
-    def put(self, station: int, index: int, subindex: int, data: bytes) -> None:
+    def put(self, key: Key, data: bytes) -> None:
         """Change an output; returns when the frame and the SYNC that makes it valid are sent.
 
         Raises:
@@ -183,59 +112,64 @@ class SyncLoop:
             LinkTimeout: the loop does not run.
         """
         with self._lock:
+            if not self._bus_lost:
+                self.images.set_output(key, data)
+                wanted = self._cycle + 2
+                sent = self._lock.wait_for(
+                    lambda: self._sent_cycle >= wanted or self._bus_lost, 0.5 + 3 * self.cycle_s
+                )
+                if not sent:
+                    raise LinkTimeout("the cyclic exchange did not run", remedy="start it anew")
             if self._bus_lost:
                 raise LinkLost("the CAN bus is lost", remedy="wait until the adapter is back")
-            self.tables.set_output(station, index, subindex, data)
-            wanted = self._cycle + 2
-            if not self._lock.wait_for(
-                lambda: self._sent_cycle >= wanted or self._bus_lost, 0.5 + 3 * self.cycle_s
-            ):
-                raise LinkTimeout("the cyclic exchange did not run", remedy="stop and start it")
-            if self._bus_lost:
-                raise LinkLost("the CAN bus is lost", remedy="wait until the adapter is back")
 
-    def play(self, players: Sequence[Player]) -> int:
-        """Begin in the next cycle; players of the same target are replaced."""
+    def axis(self, station: int, use: Callable[[AxisLoop], None]) -> None:
+        """Do something with the axis of ``station`` between two cycles; nothing without one."""
         with self._lock:
-            new = {(p.trajectory.station, p.trajectory.target) for p in players}
-            self._players = [
-                p for p in self._players if (p.trajectory.station, p.trajectory.target) not in new
-            ]
-            self._players += players
-            return self._cycle
+            axis = self.images.axes.get(station)
+            if axis is not None:
+                use(axis)
 
-    def renew(self, station: int) -> None:
-        """Extend the life of this station's setpoints."""
-        with self._lock:
-            for player in self._players:
-                if player.trajectory.station == station:
-                    player.renew()
+    def play(self, motions: Sequence[tuple[int, Motion]]) -> int:
+        """Begin together in the next cycle; returns its number.
 
-    def halt(self, station: int | None, *, disable: bool = False) -> None:
-        """Begin to stop one station, or all with None."""
-        with self._lock:
-            for player in self._players:
-                if station is None or player.trajectory.station == station:
-                    player.brake(disable_at_end=disable)
-
-    def abandon(self, station: int | None) -> None:
-        """A node or the bus is lost: setpoints end without a ramp, as nobody receives it.
-
-        What goes out once it is back cannot move anything: disabled, no speed, no torque.
+        Raises:
+            NotAllowed: one of them cannot begin; then none does.
         """
         with self._lock:
-            self._players = [
-                p for p in self._players if station is not None and p.trajectory.station != station
-            ]
-            for node, index, subindex in self.tables.outputs:
-                if station is None or node == station:
-                    self.tables.neutralise(node, index, subindex)
+            for station, motion in motions:
+                self.images.axes[station].check(motion)
+            for station, motion in motions:
+                self.images.axes[station].play(motion)
+            return self._cycle
+
+    def halt(self, station: int | None, why: str) -> None:
+        """Brake one station, or all with None, and leave Operation enabled."""
+        with self._lock:
+            for axis in self.images.axes.values():
+                if station in (None, axis.station):
+                    axis.stop(why, State.READY)
+
+    def abandon(self, station: int | None, why: str) -> None:
+        """A node or the bus is lost: setpoints end without a ramp, as nobody receives it."""
+        with self._lock:
+            for node in self.images.stations:
+                if station in (None, node):
+                    self.images.neutralise(node, why)
 
     def halt_and_wait(self) -> None:
-        """Stop everything and wait until it stands, at most 2 s. Blocks."""
-        self.halt(None)
+        """Stop everything and wait until nothing is enabled, at most 1.5 s. Blocks."""
+        self.halt(None, "the cyclic exchange ends")
+
+        def still() -> bool:
+            return self._bus_lost or all(
+                axis.phase is Phase.IDLE
+                and (axis.goal is None or axis.state is not State.OPERATION_ENABLED)
+                for axis in self.images.axes.values()
+            )
+
         with self._lock:
-            self._lock.wait_for(lambda: not self._players or self._bus_lost, 2.0)
+            self._lock.wait_for(still, 1.5)
 
     def statistics(self) -> dict[str, float | int | str]:
         """Figures for link quality."""
@@ -263,7 +197,7 @@ class SyncLoop:
                     return
                 if self._cycle > 0:
                     self._close_sample()
-                outgoing = self._next_outputs(now_s)
+                outgoing = [Frame(c, bytes(image)) for c, image in self.images.frames.items()]
             if now_s >= heartbeat_due_s:
                 heartbeat_due_s = now_s + _HEARTBEAT_S
                 outgoing.append(self._heartbeat)
@@ -286,7 +220,7 @@ class SyncLoop:
             for frame in outgoing:
                 self._send(frame)
         except DriveError as error:
-            self.abandon(None)
+            self.abandon(None, "the CAN bus was lost")
             with self._lock:
                 lost, self._bus_lost = not self._bus_lost, True
                 self._lock.notify_all()
@@ -306,22 +240,31 @@ class SyncLoop:
 
     def _close_sample(self) -> None:
         arrived, self._arrived = self._arrived, {}
-        row = [float("nan")] * len(self.tables.channels)
-        for key, slot in self.tables.inputs.items():
-            data = arrived.get(slot.cob_id)
-            if data is not None:
-                size = size_of(slot.type) or 0
-                value = float(decode(slot.type, data[slot.start : slot.start + size]))
-                self._latest[key] = value
-                row[slot.column] = value
-            elif key in self._latest:
-                row[slot.column] = self._latest[key]
-        complete = len(arrived) == len(self.tables.lengths)
-        self._statistics.incomplete += not complete
-        self._rows.append(row)
-        self._row_valid.append(complete)
+        complete = self.images.take(arrived)
+        valid = len(arrived) == len(self.images.lengths)
+        self._statistics.incomplete += not valid
+        self._rows.append(list(self.images.values))
+        self._row_valid.append(valid)
+        for station, axis in self.images.axes.items():
+            if station in complete:
+                self._silent_s[station] = 0.0
+                axis.step(self.images.values)  # type: ignore[arg-type]
+            else:
+                self._silent(station, axis)
+        for station in self.images.axes:
+            self.images.pack_axis(station)
         if len(self._rows) * self.cycle_s >= _BLOCK_S:
             self._flush()
+
+    def _silent(self, station: int, axis: AxisLoop) -> None:
+        """A cycle without this station's inputs: one is forgiven, many are not."""
+        axis.blind()
+        before = self._silent_s[station]
+        self._silent_s[station] = now = before + self.cycle_s
+        if before < _BRAKE_WHEN_SILENT_S <= now:
+            axis.stop("its cyclic data stopped coming: the axis is braked and disabled")
+        if before < _GIVE_UP_WHEN_SILENT_S <= now:
+            self.images.neutralise(station, "its cyclic data stopped coming")
 
     def _flush(self) -> None:
         if not self._rows:
@@ -331,8 +274,8 @@ class SyncLoop:
             sequence=self._sequence,
             t0_s=self._block_start_s,
             dt_s=self.cycle_s,
-            channels=self.tables.channels,
-            samples=samples.reshape(len(self._rows), len(self.tables.channels)),
+            channels=self.images.channels,
+            samples=samples.reshape(len(self._rows), len(self.images.channels)),
             dropped=self._dropped,
             valid=np.array(self._row_valid, dtype=np.bool_),
         )
@@ -341,53 +284,3 @@ class SyncLoop:
         self._block_start_s += len(self._rows) * self.cycle_s
         self._rows, self._row_valid = [], []
         self._deliver(block)
-
-    def _next_outputs(self, now_s: float) -> list[Frame]:
-        for player in list(self._players):
-            trajectory = player.trajectory
-            station = trajectory.station
-            why = self._breach(station, trajectory.envelope, now_s)
-            if why and not player.braking:
-                player.brake(disable_at_end=True)
-                self._tell(LinkEvent("fault", station, f"node {station} is being stopped: {why}"))
-            value, offset = player.step()
-            target = trajectory.target
-            self._put_value(station, target.index or 0, target.subindex, value, target.type)
-            if offset is not None and trajectory.offset_target is not None:
-                extra = trajectory.offset_target
-                self._put_value(station, extra.index or 0, extra.subindex, offset, extra.type)
-            if player.finished:
-                self._players.remove(player)
-                if player.disable_at_end and self.tables.has_output(station, *_CONTROL_WORD):
-                    self.tables.set_output(station, *_CONTROL_WORD, _DISABLE_OPERATION)
-        return [Frame(cob_id, bytes(image)) for cob_id, image in self.tables.images.items()]
-
-    def _put_value(
-        self, station: int, index: int, subindex: int, value: int, data_type: DataType
-    ) -> None:
-        self.tables.set_output(station, index, subindex, encode(data_type, value))
-
-    def _breach(self, station: int, envelope: Envelope, now_s: float) -> str:
-        """Why ``station`` must stop, or empty."""
-        seen = self._last_seen_s.get(station)
-        if seen is not None and now_s - seen > _SILENT_S + 3 * self.cycle_s:
-            return "its cyclic data stopped coming"
-        position = self._latest.get((station, 0x6064, 0))
-        if position is not None:
-            if envelope.position_max is not None and position > envelope.position_max:
-                return f"position {position:.0f} above the limit {envelope.position_max:.0f}"
-            if envelope.position_min is not None and position < envelope.position_min:
-                return f"position {position:.0f} below the limit {envelope.position_min:.0f}"
-        for index, limit, name in (
-            (0x606C, envelope.speed_max, "speed"),
-            (0x6077, envelope.torque_max, "torque"),
-            (0x60F4, envelope.following_error_max, "following error"),
-        ):
-            value = self._latest.get((station, index, 0))
-            if limit is not None and value is not None and abs(value) > limit:
-                return f"{name} {value:.0f} outside the limit {limit:.0f}"
-        return ""
-
-
-def _key(signal: CyclicSignal) -> _Key:
-    return signal.station, signal.address.index or 0, signal.address.subindex

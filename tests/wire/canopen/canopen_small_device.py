@@ -34,6 +34,8 @@ _ROWS: list[tuple[str, str, DataType, str, str, int | str]] = [
     ("2001:00", "Limited number", "INT16", "rw", "none", 0),
     ("6040:00", "Control word", "UINT16", "rw", "rx", 0),
     ("6041:00", "Status word", "UINT16", "ro", "tx", 0x0250),
+    ("6060:00", "Mode", "INT8", "rw", "rx", 0),
+    ("6061:00", "Mode display", "INT8", "ro", "tx", 0),
     ("6064:00", "Position", "INT32", "ro", "tx", 0),
     ("606C:00", "Speed", "INT32", "ro", "tx", 0),
     ("6071:00", "Target torque", "INT16", "rw", "rx", 0),
@@ -143,9 +145,16 @@ class SmallDevice:
         if isinstance(value, int) and not (low or 0) <= value <= (high or 0):
             raise SdoAbort(ABORT_VALUE_RANGE)
         self._values[index, subindex] = data
-        follower = {0x607A: 0x6064, 0x60FF: 0x606C}.get(index)
+        follower = {0x607A: 0x6064, 0x60FF: 0x606C, 0x6060: 0x6061}.get(index)
         if follower:
             self._values[follower, 0] = data
+        if index == 0x6040:
+            # CiA 402-2 clause 8.4: the states that these control words lead to.
+            status = {0x06: 0x0231, 0x07: 0x0233, 0x0F: 0x0237}.get(data[0] & 0x8F, 0x0250)
+            self._values[0x6041, 0] = status.to_bytes(2, "little")
+
+    def turn_by_hand(self, position: int) -> None:
+        self._values[0x6064, 0] = position.to_bytes(4, "little", signed=True)
 
     def value(self, index: int, subindex: int = 0) -> int | float | str:
         parameter = self.profile.by_key[f"{index:04X}:{subindex:02X}"]

@@ -5,21 +5,20 @@ from __future__ import annotations
 import errno
 
 import can
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.canopen.adapter import open_bus, translate
 from drivers.canopen.frames import Frame, exact_bits, worst_case_bits
+from drivers.canopen.images import Images
 from drivers.canopen.link import _fit
 from drivers.canopen.nodes import NodeWatch, emergency_text
-from drivers.canopen.pdo import plan, set_up
+from drivers.canopen.pdo import plan, plan_within_load, set_up
 from drivers.canopen.scanning import readable
-from drivers.canopen.setpoints import Player
 from drivers.canopen.url import INTERFACES, parse_canopen_url
 from drivers.errors import LinkLost, OutOfRange
-from drivers.link import Address, CyclicSignal, Envelope, Trajectory
+from drivers.link import Address, CyclicSignal
 
 
 def test_urls_of_the_documentation() -> None:
@@ -171,36 +170,31 @@ def test_a_pdo_is_invalid_while_it_is_mapped() -> None:
     ]
 
 
-def _player(index: int, values: list[int], renew_s: float = 0.01) -> Player:
-    target = Address(index, 0, "INT32")
-    return Player(Trajectory(1, target, np.array(values), Envelope(), renew_s=renew_s), 0.001)
+def test_the_less_important_signals_make_room() -> None:
+    inputs = [_signal(0x6041, "UINT16"), *(_signal(0x6064 + n) for n in range(7))]
+    outputs = [_signal(0x6040, "UINT16"), _signal(0x607A), _signal(0x60FF)]
+    # 750 bit times. With 6066h: PDOs of 6 and 8 bytes in, 6 and 4 out, and SYNC are
+    # 115 + 135 + 115 + 95 + 55 = 515 bits (69 %); with 6067h too 610 bits (81 %).
+    planned = plan_within_load(inputs, outputs, 0.0015, 500_000)
+    assert planned.load is not None
+    assert planned.load.bits_per_cycle == 515
+    kept = {s.address.index for p in planned.pdos for s in p.signals}
+    assert {0x6041, 0x6064, 0x6065, 0x6040, 0x607A, 0x60FF} <= kept
+    assert [s.address.index for s, _ in planned.left_over] == [0x606A, 0x6069, 0x6068, 0x6067]
+    assert all("80% full" in why for _, why in planned.left_over)
 
 
-def test_a_position_stops_without_a_jump() -> None:
-    player = _player(0x607A, [0, 1, 3, 6, 10, 15, 20, 25, 30, 35])
-    played = [player.step()[0] for _ in range(10)]
-    assert played == [0, 1, 3, 6, 10, 15, 20, 25, 30, 35]
-    player.brake(disable_at_end=True)
-    rest = []
-    while not player.finished:
-        rest.append(player.step()[0])
-    # Five per cycle, one less in each: 4 + 3 + 2 + 1.
-    assert rest == [39, 42, 44, 45, 45]
-
-
-def test_a_speed_is_held_for_its_life_and_then_ramps_to_zero() -> None:
-    player = _player(0x60FF, [0, 100, 200], renew_s=0.004)
-    assert [player.step()[0] for _ in range(7)] == [0, 100, 200, 200, 200, 200, 200]
-    assert [player.step()[0] for _ in range(2)] == [100, 0]
-    assert player.finished
-    assert player.disable_at_end
-
-
-def test_renewal_extends_the_life() -> None:
-    player = _player(0x60FF, [100], renew_s=0.003)
-    for _ in range(20):
-        player.renew()
-        assert player.step()[0] == 100
+def test_a_lost_station_is_made_harmless() -> None:
+    outputs = [_signal(0x6040, "UINT16"), _signal(0x607A), _signal(0x60FF)]
+    pdos, _ = plan([_signal(0x6064)], outputs)
+    images = Images(pdos, 0.001, lambda *_: None)
+    images.set_output((3, 0x6040, 0), b"\x0f\0")
+    images.set_output((3, 0x607A, 0), b"\x39\x30\0\0")
+    images.set_output((3, 0x60FF, 0), b"\x39\x30\0\0")
+    images.neutralise(3, "lost")
+    images.pack_axis(3)
+    assert [bytes(f).hex() for f in images.frames.values()] == ["060039300000", "00000000"]
+    assert images.axes[3].halted == "lost"
 
 
 def test_padding_is_cut_and_other_bytes_are_kept() -> None:

@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 from conftest import until
 
+from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.link import CanopenLink
+from drivers.cia402 import State
 from drivers.link import Address, CyclicSignal, Envelope, LinkEvent, ScopeBlock, Trajectory
 from drivers.virtual.device import Device
 from drivers.virtual.firmware.factory import make_device
@@ -102,18 +104,17 @@ async def test_a_fault_comes_as_an_emergency_and_is_reset(servo: Servo) -> None:
 
 async def test_cyclic_position_follows_and_losing_us_stops_it(servo: Servo) -> None:
     cyclic = servo.link.cyclic
-    assert cyclic is not None
+    assert isinstance(cyclic, CanopenCyclic)
     blocks: list[ScopeBlock] = []
     cyclic.blocks(blocks.append)
-    await servo.link.write(3, MODE, b"\x08")
     inputs = [CyclicSignal(3, STATUS, "status"), CyclicSignal(3, POSITION, "position")]
     outputs = [CyclicSignal(3, CONTROL, "control"), CyclicSignal(3, TARGET, "target")]
     await cyclic.configure(inputs, outputs, 0.005)
-    start = await servo.number(POSITION)
-    await servo.link.write(3, TARGET, start.to_bytes(4, "little", signed=True))
     await cyclic.start()
-    await servo.command(0x06, 0x07, 0x0F)
+    await cyclic.drive_to(3, State.OPERATION_ENABLED, 8)
     await servo.state(0x6F, 0x27)
+    await until(lambda: cyclic.axis_state(3)[0] == State.OPERATION_ENABLED.value)
+    start = int.from_bytes(servo.device.read(0x607A, 0), "little", signed=True)
     # A smooth move of 2000 increments in half a second.
     ramp = (1 - np.cos(np.linspace(0, math.pi, 100))) / 2
     values = start + np.round(2000 * ramp).astype(np.int64)

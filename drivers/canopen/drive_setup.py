@@ -1,0 +1,134 @@
+"""Preparing drives for process data, and the way back. Blocking; runs on a worker thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from drivers.canopen.pdo import INVALID, PdoPlan, SdoWrite, set_up
+from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
+
+WATCHDOG_MS = 200
+_PDO_FLAGS = 0x60000000
+
+ReadObject = Callable[[int, int, int], bytes]
+"""Read (station, index, subindex), blocking."""
+
+WriteObject = Callable[[int, int, int, bytes], None]
+"""Write (station, index, subindex, data), blocking."""
+
+
+class DriveSetup:
+    """Changes drives and remembers how to undo it."""
+
+    def __init__(self, read: ReadObject, write: WriteObject, own_id: int) -> None:
+        self._read = read
+        self._write = write
+        self._own_id = own_id
+        self._undo: list[tuple[int, SdoWrite]] = []
+
+    def map_pdos(self, pdos: Sequence[PdoPlan]) -> None:
+        """Map these PDOs, and silence the other three or four input PDOs of their stations.
+
+        Raises:
+            NotAllowed: a drive does not let a signal be mapped; the message names it.
+        """
+        for station in sorted({p.station for p in pdos}):
+            used = {p.number for p in pdos if (p.station, p.direction) == (station, "tx")}
+            for number in range(4):
+                if number not in used:
+                    self._silence(station, 0x1800 + number)
+        for pdo in pdos:
+            self._map(pdo)
+
+    def guard(self, station: int) -> bool:
+        """Let the drive watch our heartbeat; False where it has no consumer (1016h)."""
+        value = (self._own_id << 16 | WATCHDOG_MS).to_bytes(4, "little")
+        try:
+            self._change(station, SdoWrite(0x1016, 1, value))
+        except Rejected:
+            return False
+        return self._read(station, 0x1016, 1) == value
+
+    def unguard(self) -> None:
+        """Undo `guard`: before the heartbeat ends, or the drives would report a fault."""
+        mine = [(s, w) for s, w in self._undo if w.index == 0x1016]
+        self._undo = [(s, w) for s, w in self._undo if w.index != 0x1016]
+        self._put_back(mine)
+
+    def undo(self) -> None:
+        """Put everything back.
+
+        Raises:
+            NotAllowed: something could not be put back; the message lists it.
+        """
+        undo, self._undo = self._undo, []
+        self._put_back(undo)
+
+    def _change(self, station: int, write: SdoWrite) -> None:
+        before = self._read(station, write.index, write.subindex)
+        self._undo.append((station, SdoWrite(write.index, write.subindex, before)))
+        self._write(station, write.index, write.subindex, write.data)
+
+    def _silence(self, station: int, communication: int) -> None:
+        try:
+            cob = int.from_bytes(self._read(station, communication, 1), "little")
+            if not cob & INVALID:
+                data = (cob | INVALID).to_bytes(4, "little")
+                self._change(station, SdoWrite(communication, 1, data))
+        except Rejected:
+            return  # a drive without this PDO has nothing to silence
+
+    def _map(self, pdo: PdoPlan) -> None:
+        station = pdo.station
+        try:
+            cob = self._read(station, pdo.communication, 1)
+            self._remember(pdo, cob)
+            for write in set_up(pdo, int.from_bytes(cob, "little") & _PDO_FLAGS):
+                self._write(station, write.index, write.subindex, write.data)
+        except Rejected as refusal:
+            names = ", ".join(str(s.address) for s in pdo.signals)
+            raise NotAllowed(
+                f"node {station} does not let {names} be mapped to PDO {pdo.number + 1}: "
+                f"{refusal.message}",
+                drive=f"node {station}",
+                parameter=refusal.parameter,
+                remedy="leave these signals out, they can be polled",
+            ) from refusal
+
+    def _remember(self, pdo: PdoPlan, cob: bytes) -> None:
+        """The list is undone from its end: invalid first, then the mapping, then valid again."""
+        station = pdo.station
+        kind = self._read(station, pdo.communication, 2)
+        count = self._read(station, pdo.mapping, 0)
+        entries = [self._read(station, pdo.mapping, n) for n in range(1, min(count[0], 8) + 1)]
+        invalid = int.from_bytes(cob, "little") | INVALID
+        before = [
+            SdoWrite(pdo.communication, 1, cob),
+            SdoWrite(pdo.mapping, 0, count),
+            *[SdoWrite(pdo.mapping, n, e) for n, e in enumerate(entries, 1)][::-1],
+            SdoWrite(pdo.mapping, 0, b"\0"),
+            SdoWrite(pdo.communication, 2, kind),
+            SdoWrite(pdo.communication, 1, invalid.to_bytes(4, "little")),
+        ]
+        self._undo += [(station, write) for write in before]
+
+    def _put_back(self, undo: Sequence[tuple[int, SdoWrite]]) -> None:
+        failures: list[str] = []
+        silent: set[int] = set()
+        for station, write in reversed(undo):
+            if station in silent:
+                continue  # asking a dead drive again and again only takes time
+            try:
+                self._write(station, write.index, write.subindex, write.data)
+            except LinkLost:
+                raise
+            except LinkTimeout as error:
+                silent.add(station)
+                failures.append(f"all of node {station}, which does not answer ({error})")
+            except DriveError as error:
+                failures.append(f"node {station} {write.index:04X}:{write.subindex:02X} ({error})")
+        if failures:
+            raise NotAllowed(
+                "these settings of the drives could not be put back: " + "; ".join(failures),
+                remedy="restart the drives before using them with another master",
+            )

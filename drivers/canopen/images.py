@@ -1,0 +1,148 @@
+"""Where each signal sits in the PDOs, and each station's axis in the cyclic loop. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from drivers import cia402
+from drivers.canopen.pdo import PdoPlan
+from drivers.codec import decode, encode, size_of
+from drivers.ethercat.playback import AxisLoop
+from profiles.schema import INTEGER_RANGE, DataType
+
+Key = tuple[int, int, int]
+"""Station, index, subindex."""
+
+CONTROL_WORD = 0x6040
+_RATES = (0x60FF, 0x6071, 0x60B1, 0x60B2)
+"""Targets and offsets of speed and torque."""
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """One signal: its PDO, where it starts there, and its column among the inputs."""
+
+    cob_id: int
+    start: int
+    type: DataType
+    column: int
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return size_of(self.type) or 0
+
+
+class Images:
+    """Inputs of the last cycle and outputs of the next. One thread at a time."""
+
+    def __init__(
+        self, pdos: Sequence[PdoPlan], cycle_s: float, report: Callable[[int, str], None]
+    ) -> None:
+        self.channels: tuple[str, ...] = ()
+        self.inputs: dict[Key, Slot] = {}
+        self.outputs: dict[Key, Slot] = {}
+        self.frames: dict[int, bytearray] = {}
+        """Bytes of each output PDO by its identifier."""
+        self.lengths: dict[int, int] = {}
+        """Length of each input PDO by its identifier."""
+        self.stations = sorted({p.station for p in pdos})
+        self.axes: dict[int, AxisLoop] = {}
+        self.values: list[int | float] = []
+        self._cycle_s = cycle_s
+        self._report = report
+        self._place(pdos)
+        for station in self.stations:
+            if (station, CONTROL_WORD, 0) in self.outputs:
+                self.axes[station] = self._axis(station)
+
+    def _place(self, pdos: Sequence[PdoPlan]) -> None:
+        names: list[str] = []
+        for pdo in pdos:
+            start = 0
+            for signal in pdo.signals:
+                slot = Slot(pdo.cob_id, start, signal.address.type, len(names))
+                key = (signal.station, signal.address.index or 0, signal.address.subindex)
+                if pdo.direction == "tx":
+                    self.inputs[key] = slot
+                    names.append(signal.channel)
+                else:
+                    self.outputs[key] = slot
+                start += slot.size
+            if pdo.direction == "tx":
+                self.lengths[pdo.cob_id] = start
+            else:
+                self.frames[pdo.cob_id] = bytearray(start)
+        self.channels = tuple(names)
+        self.values = [0] * len(names)
+
+    def _axis(self, station: int) -> AxisLoop:
+        objects = self._objects(station)
+        inputs = {
+            index: slot.column
+            for (node, index, subindex), slot in self.inputs.items()
+            if node == station and subindex == 0
+        }
+        return AxisLoop(
+            station,
+            inputs=inputs,
+            outputs={index: n for n, index in enumerate(objects)},
+            output_count=len(objects),
+            cycle_s=self._cycle_s,
+            report=self._report,
+        )
+
+    def _objects(self, station: int) -> list[int]:
+        """Outputs that the axis may write: numbers without a subindex."""
+        return [
+            index
+            for (node, index, subindex), slot in self.outputs.items()
+            if node == station and subindex == 0 and slot.type in INTEGER_RANGE
+        ]
+
+    def set_output(self, key: Key, data: bytes) -> None:
+        """Change the bytes that go out."""
+        slot = self.outputs[key]
+        self.frames[slot.cob_id][slot.start : slot.start + slot.size] = data
+        axis = self.axes.get(key[0])
+        if axis is not None and key[2] == 0 and slot.type in INTEGER_RANGE:
+            value = decode(slot.type, data)
+            axis.outputs[self._objects(key[0]).index(key[1])] = int(value)
+
+    def take(self, arrived: dict[int, bytes]) -> set[int]:
+        """Take over the input PDOs of one cycle; returns the stations that are complete."""
+        missing: set[int] = set()
+        for (station, _index, _subindex), slot in self.inputs.items():
+            data = arrived.get(slot.cob_id)
+            if data is None:
+                missing.add(station)
+            else:
+                value = decode(slot.type, data[slot.start : slot.start + slot.size])
+                self.values[slot.column] = value if not isinstance(value, str) else 0
+        return {s for s in self.stations if s not in missing}
+
+    def pack_axis(self, station: int) -> None:
+        """The axis' outputs into the PDOs."""
+        axis = self.axes[station]
+        for value, index in zip(axis.outputs, self._objects(station), strict=True):
+            slot = self.outputs[station, index, 0]
+            self.frames[slot.cob_id][slot.start : slot.start + slot.size] = encode(slot.type, value)
+
+    def neutralise(self, station: int, why: str) -> None:
+        """End everything of this station and make its outputs harmless.
+
+        Disabled, no speed, no torque; the position stays, as holding is what a position does. A
+        new loop replaces the old one, so nothing of its motion is left.
+        """
+        for key, slot in self.outputs.items():
+            if key[0] == station and key[1] == CONTROL_WORD:
+                self.set_output(key, encode(slot.type, cia402.SHUTDOWN))
+            elif key[0] == station and key[1] in _RATES:
+                self.set_output(key, bytes(slot.size))
+        old = self.axes.get(station)
+        if old is not None:
+            fresh = self._axis(station)
+            fresh.outputs[:] = old.outputs
+            fresh.halted = why
+            self.axes[station] = fresh
