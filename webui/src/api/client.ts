@@ -67,7 +67,7 @@ function asProblem(body: unknown, status: number): Problem {
       status,
       ...found,
       detail: typeof detail === 'string' ? detail : JSON.stringify(detail),
-    } as Problem
+    }
   }
   return { type: 'about:blank', title: '', status, detail: typeof body === 'string' ? body : '' }
 }

@@ -33,7 +33,7 @@ function exact(traces: Trace[], rings: Ring[], from: number, to: number): Column
   times.sort((a, b) => a - b)
   const unique = times.filter((time, i) => i === 0 || time !== times[i - 1])
   const series = traces.map(({ ring, channel }) => {
-    const values: (number | null)[] = new Array(unique.length).fill(null)
+    const values = new Array<number | null>(unique.length).fill(null)
     let row = ring.firstAt(from)
     for (let i = 0; i < unique.length && row < ring.length; i++) {
       if (ring.time(row) !== unique[i]) continue
@@ -47,13 +47,13 @@ function exact(traces: Trace[], rings: Ring[], from: number, to: number): Column
 
 function binned(traces: Trace[], from: number, to: number, bins: number): Columns {
   const width = (to - from) / bins
-  const times: number[] = new Array(2 * bins)
+  const times = new Array<number>(2 * bins)
   for (let bin = 0; bin < bins; bin++) {
     times[2 * bin] = from + (bin + 0.25) * width
     times[2 * bin + 1] = from + (bin + 0.75) * width
   }
   const series = traces.map(({ ring, channel }) => {
-    const values: (number | null)[] = new Array(2 * bins).fill(null)
+    const values = new Array<number | null>(2 * bins).fill(null)
     const end = lastInside(ring, to)
     let row = ring.firstAt(from)
     while (row < end) {

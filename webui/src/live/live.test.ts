@@ -307,7 +307,9 @@ describe('live socket', () => {
     expect(live.send(start)).toBe(false)
     vi.advanceTimersByTime(300)
     sockets[1]?.open()
-    expect(sockets[1]?.sent.map((text) => JSON.parse(text).type)).toEqual(['watch_state'])
+    expect(sockets[1]?.sent.map((text) => (JSON.parse(text) as { type: string }).type)).toEqual([
+      'watch_state',
+    ])
     vi.useRealTimers()
   })
   it('gives up a connection that has gone silent', () => {

@@ -102,7 +102,7 @@ export class ScopeStore {
   /** Raw samples as CSV: one row per time, empty where a trace has no sample then. */
   csv(refs: TraceRef[], names: string[], from: number, to: number): string {
     const traces = refs.flatMap((ref) => this.find(ref) ?? [])
-    const [times = [], ...series] = columns(traces, from, to, Number.MAX_SAFE_INTEGER)
+    const [times, ...series] = columns(traces, from, to, Number.MAX_SAFE_INTEGER)
     const origin = times[0] ?? 0
     const quoted = ['time_s', ...names].map((name) => `"${name.replaceAll('"', '""')}"`)
     const lines = [quoted.join(',')]

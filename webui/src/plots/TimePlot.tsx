@@ -28,6 +28,9 @@ export interface PlotHandle {
 
 /** Scale of the traces that have no unit. */
 const NO_UNIT = '–'
+/** uPlot.Axis.Side, which as an ambient const enum cannot be imported. */
+const LEFT = 3
+const RIGHT = 1
 const GRAB_PX = 14
 const WHEEL_ZOOM = 1.25
 
@@ -169,7 +172,8 @@ function options(
           scale: name,
           ...(name === NO_UNIT ? {} : { label: name, labelSize: 18 }),
           size: 60,
-          side: i % 2 === 0 ? 3 : 1,
+          // eslint-disable-next-line @typescript-eslint/no-unsafe-enum-assignment -- see LEFT
+          side: i % 2 === 0 ? LEFT : RIGHT,
           grid: { show: i === 0, stroke: grid, width: 1 },
         }),
       ),

@@ -96,7 +96,6 @@ export function ProcedureDialog({
         <summary>{t('procedures.steps', { count: procedure.steps.length })}</summary>
         <ol>
           {procedure.steps.map((step, i) => (
-            // biome-ignore lint/suspicious/noArrayIndexKey: steps have no name and never move
             <li key={i}>{step}</li>
           ))}
         </ol>

@@ -42,7 +42,7 @@ function row(part: Partial<ParameterRow>): ParameterRow {
     unreachable_why: '',
     ...part,
     reading: part.reading ?? reading,
-  } as ParameterRow
+  }
 }
 
 describe('typed values', () => {

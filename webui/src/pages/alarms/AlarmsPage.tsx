@@ -98,7 +98,6 @@ function Log({ drive }: { drive: string }) {
       {entries.length === 0 && <p className="dim">{t('log.empty')}</p>}
       <ul className="log">
         {entries.map((entry, i) => (
-          // biome-ignore lint/suspicious/noArrayIndexKey: entries have no name of their own
           <li key={`${entry.time} ${i}`} className={entry.level}>
             <time className="num dim">{dateTime(entry.time)}</time>
             <strong>{t(`log.${entry.level}`)}</strong>

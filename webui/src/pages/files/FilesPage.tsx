@@ -27,7 +27,7 @@ export function FilesPage() {
       const text = await ask(
         api.GET('/api/v1/sets/{file}', { params: { path: { file } }, parseAs: 'text' }),
       )
-      offerDownload(file, [text as string], 'application/toml')
+      offerDownload(file, [text], 'application/toml')
     })
   return (
     <div className="page">

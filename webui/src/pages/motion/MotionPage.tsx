@@ -40,7 +40,7 @@ export function MotionPage({ drive }: { drive: string }) {
           <SegmentedControl
             fullWidth
             value={tab}
-            onChange={(next) => setTab(next as typeof tab)}
+            onChange={(next) => setTab(next)}
             data={TABS.map((name) => ({ value: name, label: t(`motion.tab.${name}`) }))}
           />
           {tab === 'jog' && <JogPanel drive={drive} state={state} />}

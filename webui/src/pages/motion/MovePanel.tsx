@@ -88,7 +88,7 @@ export function MovePanel({
       <SegmentedControl
         fullWidth
         value={mode}
-        onChange={(next) => setMode(next as Mode)}
+        onChange={(next) => setMode(next)}
         data={possible.map((each) => ({ value: each, label: t(`move.mode.${each}`) }))}
       />
       <p className="dim">{t(`move.help.${mode}`)}</p>

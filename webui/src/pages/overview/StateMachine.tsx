@@ -91,7 +91,6 @@ export function StateMachine({
           )
         }
         return (
-          // biome-ignore lint/a11y/useSemanticElements: a <button> cannot live inside an SVG
           <g
             key={box.state}
             className={look}

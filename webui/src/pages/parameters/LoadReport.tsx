@@ -6,13 +6,14 @@ import { useT } from '../../i18n'
 import { setJob, useJob } from '../../live/store'
 import { JobNote, useJobEnd } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import type { Raw } from '../../widgets/types'
 import { useAction } from '../../widgets/useAction'
 
 interface Row {
   key: string
-  before: unknown
-  wanted: unknown
-  after: unknown
+  before: Raw | null
+  wanted: Raw
+  after: Raw | null
   ok: boolean
   problem: string
 }

@@ -58,7 +58,7 @@ export function ParametersPage({ drive }: { drive: string }) {
         </h1>
         <SegmentedControl
           value={view}
-          onChange={(next) => setView(next as 'table' | 'compare')}
+          onChange={(next) => setView(next)}
           data={[
             { value: 'table', label: t('parameters.table') },
             { value: 'compare', label: t('parameters.compare') },

@@ -46,7 +46,6 @@ export function Measurements({
               const atA = frame?.cursorValues[0]?.[i] ?? null
               const atB = frame?.cursorValues[1]?.[i] ?? null
               return (
-                // biome-ignore lint/suspicious/noArrayIndexKey: traces are told apart by place
                 <tr key={i}>
                   <td>
                     <span className="swatch" style={{ background: each.color }} /> {each.label}

@@ -20,12 +20,15 @@ export function storedChannels(): Channel[] | null {
   try {
     const found: unknown = JSON.parse(localStorage.getItem(STORED) ?? 'null')
     if (!Array.isArray(found)) return null
-    return found.filter(
-      (each): each is Channel => typeof each?.drive === 'string' && typeof each?.key === 'string',
-    )
+    return found.filter(isChannel)
   } catch {
     return null
   }
+}
+
+function isChannel(each: unknown): each is Channel {
+  const { drive, key } = (each ?? {}) as Partial<Channel>
+  return typeof drive === 'string' && typeof key === 'string'
 }
 
 export const storeChannels = (channels: Channel[]) =>
