@@ -127,6 +127,7 @@ class _Spectra:
     response: tuple[ComplexArray, ...]
     torque: tuple[ComplexArray, ...]
     direction: tuple[ComplexArray, ...]
+    realisation: tuple[int, ...]
     samples: int
     used: int
     dropped: int
@@ -169,6 +170,7 @@ def _collect(records: tuple[Record, ...], path: SignalPath, quantity: Quantity) 
     if first.period_samples == 0:
         raise ValueError("period-synchronous estimation needs a periodic excitation")
     sent, response, torque, direction = [], [], [], []
+    realisation: list[int] = []
     used = dropped = 0
     for record in records:
         e = record.excitation
@@ -178,6 +180,7 @@ def _collect(records: tuple[Record, ...], path: SignalPath, quantity: Quantity) 
         used, dropped = used + len(good), dropped + lost
         if not good:
             continue
+        realisation.append(e.realisation)
         sent.append(_period_spectra(e.samples, e, good))
         response.append(_period_spectra(record.response, e, good))
         direction.append(
@@ -190,7 +193,7 @@ def _collect(records: tuple[Record, ...], path: SignalPath, quantity: Quantity) 
         raise ValueError("every period has a gap; nothing is left to evaluate")
     return _Spectra(
         first.line_hz, first.lines, tuple(sent), tuple(response), tuple(torque),
-        tuple(direction), first.period_samples, used, dropped,
+        tuple(direction), tuple(realisation), first.period_samples, used, dropped,
     )  # fmt: skip
 
 
@@ -356,8 +359,18 @@ def _variances(
         noise = _neighbour_mean(np.asarray(inner) / noise_freedom, reach)
     width = min(2 * reach + 1, g.size)
     if count > 1:
-        total = _neighbour_mean(np.sum(np.abs(means) ** 2, axis=0) / (count - 1), reach)
-        return noise, total, 2 * (count - 1) * width
+        # A pair of opposite sign shares its phases and so its odd distortion: it is one draw.
+        aligned = np.array(
+            [m * r.mean(axis=0).conj() for m, r in zip(means, s.sent, strict=True)]
+        ) / np.maximum([np.abs(r.mean(axis=0)) for r in s.sent], 1e-300)
+        names = np.array(s.realisation)
+        draws = np.unique(names) if np.unique(names).size > 1 else np.arange(count)
+        rows = names if np.unique(names).size > 1 else draws
+        groups = np.array([aligned[rows == d].mean(axis=0) for d in draws])
+        scatter = np.sum(np.abs(groups) ** 2, axis=0) / (len(draws) - 1) * (count / len(draws))
+        # Few draws can look quieter than the noise between periods says they are.
+        total = np.fmax(_neighbour_mean(scatter, reach), noise * count / s.used)
+        return noise, total, 2 * (len(draws) - 1) * width
     return noise, noise * count / s.used, 2 * noise_freedom * width
 
 
@@ -407,7 +420,7 @@ def estimate_aperiodic(
     lines = np.flatnonzero(keep).astype(np.int64)
     r, y = np.array(sent), np.array(response)
     spectra = _Spectra(
-        f, lines, (r,), (y,), (np.array(torque),), (), segment_samples, len(sent), dropped
+        f, lines, (r,), (y,), (np.array(torque),), (), (0,), segment_samples, len(sent), dropped
     )
     u = _continuous_input(spectra, path, quantity)[0]
     s_yr = np.sum(y * r.conj(), axis=0)
@@ -454,7 +467,7 @@ def estimate_stepped(record: Record, path: SignalPath, quantity: Quantity) -> Fr
                 c = np.linalg.lstsq(basis, signal[n], rcond=None)[0]
                 amplitudes[k, j, i] = c[0] + 1j * c[1]
     r, y, t = amplitudes
-    spectra = _Spectra(f, np.arange(f.size), (r,), (y,), (t,), (), 2, 2, 0)
+    spectra = _Spectra(f, np.arange(f.size), (r,), (y,), (t,), (), (0,), 2, 2, 0)
     u = _continuous_input(spectra, path, quantity)[0]
     g = np.asarray(y.sum(axis=0) / u.sum(axis=0))
     relative = np.abs(y[0] / u[0] - y[1] / u[1]) / (2 * np.abs(g))
