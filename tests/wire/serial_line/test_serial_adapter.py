@@ -150,7 +150,7 @@ async def test_mute_station_holds_up_a_write_to_another_for_one_time_out_at_most
         await link.write(2, CONTROL, b"\x06\0")
         took = time.monotonic() - asked
         reader.cancel()
-    assert took < 0.15
+    assert took < 0.3  # five repetitions would be half a second
 
 
 async def test_two_tasks_and_two_threads_get_their_own_answers(
