@@ -135,8 +135,11 @@ class SyncLoop:
 
         Raises:
             NotAllowed: one of them cannot begin; then none does.
+            LinkLost: the bus is gone.
         """
         with self._lock:
+            if self._bus_lost:
+                raise LinkLost("the CAN bus is lost", remedy="wait until the adapter is back")
             for station, motion in motions:
                 self.images.axes[station].check(motion)
             for station, motion in motions:
@@ -220,11 +223,11 @@ class SyncLoop:
             for frame in outgoing:
                 self._send(frame)
         except DriveError as error:
-            self.abandon(None, "the CAN bus was lost")
             with self._lock:
                 lost, self._bus_lost = not self._bus_lost, True
                 self._lock.notify_all()
             if lost:
+                self.abandon(None, error.message)
                 self._tell(LinkEvent("state", None, f"cyclic exchange interrupted: {error}"))
             return
         self._bus_lost = False

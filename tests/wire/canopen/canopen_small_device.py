@@ -108,6 +108,7 @@ class SmallDevice:
         self.big = bytes(range(256)) * 8
         self.serial = serial
         self.now_ns = 0
+        self.coupled = True
         self._values: dict[tuple[int, int], bytes] = {}
         self.power_cycle()
 
@@ -146,7 +147,7 @@ class SmallDevice:
             raise SdoAbort(ABORT_VALUE_RANGE)
         self._values[index, subindex] = data
         follower = {0x607A: 0x6064, 0x60FF: 0x606C, 0x6060: 0x6061}.get(index)
-        if follower:
+        if follower and self.coupled:
             self._values[follower, 0] = data
         if index == 0x6040:
             # CiA 402-2 clause 8.4: the states that these control words lead to.
@@ -154,6 +155,7 @@ class SmallDevice:
             self._values[0x6041, 0] = status.to_bytes(2, "little")
 
     def turn_by_hand(self, position: int) -> None:
+        self.coupled = False
         self._values[0x6064, 0] = position.to_bytes(4, "little", signed=True)
 
     def value(self, index: int, subindex: int = 0) -> int | float | str:
