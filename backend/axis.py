@@ -117,7 +117,12 @@ class Axis:
     def cyclic_power(self) -> OwnsPowerState | None:
         """The cyclic loop, while it runs and owns this axis' control word."""
         session = self.session
-        return session.power() if session is not None and session.running else None
+        if session is None or not session.running:
+            return None
+        power = session.power()
+        # A CANopen drive without cyclic modes keeps taking its commands by SDO.
+        owns = getattr(power, "owns", None)
+        return power if owns is None or owns(session.station(self.drive)) else None
 
     async def go_to_cyclic(
         self, session: CyclicSession, goal: State, mode: Mode | None, timeout_s: float
