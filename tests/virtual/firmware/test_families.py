@@ -348,3 +348,15 @@ def test_every_family_turns_with_its_real_profile(family, drive: str) -> None:
     assert b.servo.axis.speed_rad_s == pytest.approx(TURN, rel=0.03)
     assert b.get("606C:00") == pytest.approx(one, rel=0.03, abs=2)
     assert b.get("603F:00") == 0
+
+
+def test_stiffness_row_of_the_real_profile(family) -> None:
+    """Level 20 of table 38: 32.9, 115 and 22.7 Hz (004:3023)."""
+    b = family(load_profile("mms7"))
+    b.set("2005:0E", 1)
+    b.set("2005:0F", 20)
+    b.apply()
+    p, inertia = b.servo.axis.p, b.get("2001:06") * 1e-7
+    assert p[k.P_KP_POSITION_1] == pytest.approx(TURN * 32.9)
+    assert p[k.P_KP_SPEED_1] == pytest.approx(TURN * 115 * inertia)
+    assert p[k.P_KI_SPEED_1] == pytest.approx(TURN * 115 * inertia * TURN * 22.7)

@@ -24,7 +24,7 @@ from drivers.virtual.firmware.settings import (
     ProtectionSettings,
 )
 from drivers.virtual.mechanics import MechanicsSpec
-from profiles.schema import Profile, Raw
+from profiles.schema import Profile, Raw, StiffnessTable
 
 TWO_PI = 2 * math.pi
 _SIGNAL_OF_FUNCTION = {1: k.SIG_NEGATIVE, 2: k.SIG_POSITIVE, 3: k.SIG_HOME}  # 004:6476-6509
@@ -157,7 +157,8 @@ class Mms7:
         if od.number(mode) == 1 and profile.stiffness:
             table = profile.stiffness[min(table_index, len(profile.stiffness) - 1)]
             row = table.rows.get(int(od.number(level)))
-            values = list(row) if row is not None else values
+            if row is not None:
+                values = _raw_row(profile, table, row)
         return _bandwidth_gains(values[0], values[1], values[2], inertia)
 
     @staticmethod
@@ -235,6 +236,16 @@ class Mms7:
                 forced &= ~signal
                 inverted |= signal if polarity >> terminal & 1 else 0
         return Wiring(forced=forced, forced_on=forced_on & forced, inverted=inverted)
+
+
+def _raw_row(profile: Profile, table: StiffnessTable, row: tuple[float, ...]) -> list[float]:
+    """A row in raw values; with ``column_units`` it is printed in engineering values."""
+    if not table.column_units:
+        return list(row)
+    return [
+        float(profile.by_key[key].to_raw(value))
+        for key, value in zip(table.columns, row, strict=True)
+    ]
 
 
 def _bandwidth_gains(
