@@ -149,7 +149,7 @@ def interactive(interface: str) -> dict[str, Any]:
             for slave in master.slaves:
                 slave.output = (0x0F).to_bytes(2, "little") + n.to_bytes(4, "little")
             master.send_processdata()
-            wkcs.append(int(master.receive_processdata(40_000)))
+            wkcs.append(int(master.receive_processdata(80_000)))
             time.sleep(0.002)
         master.read_state()
         states = [[s.state, s.al_status] for s in master.slaves]

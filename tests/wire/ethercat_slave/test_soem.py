@@ -151,10 +151,15 @@ def test_trouble_on_the_wire_as_the_master_sees_it(
     shared.command("counter", by=-3, count=1)
     assert master.cycles(3)[0] == [3, 6, 6]
 
-    # 100 ms late: the master has given up after 40 ms.
-    shared.command("late", by_s=0.1, count=1, cyclic=True)
+    # 200 ms late: the master has given up after 80 ms.
+    shared.command("late", by_s=0.2, count=1, cyclic=True)
     assert master.cycles(20)[0][0] == -1
     assert shared.command("state")["trouble"]["late"] == 1
+
+    shared.command("late", by_s=0.02, count=3, cyclic=True, direction="out")
+    wkcs, _ = master.cycles(3)
+    assert wkcs == [6, 6, 6]  # late, and still in the master's time
+    assert shared.command("state")["trouble"]["late"] == 4
 
     shared.command("cut", cable=1)
     wkcs, _ = master.cycles(200)  # at least 400 ms

@@ -197,6 +197,20 @@ def test_late_frames_say_how_late() -> None:
     assert wire.segment.reply_delay_ns == 0
 
 
+def test_a_frame_that_reaches_the_slaves_late_acts_late() -> None:
+    wire = Wire(1)
+    wire.number()
+    Channel(wire)("late", by_s=0.002, count=1, direction="out")
+    sent = frame((5, 0x1001, 0x0020, b"\x07"))
+    assert wire.segment.process_frame(sent) is None
+    assert wire.segment.hold_ns == 2 * MS
+    assert wire.slaves[0].controller.memory[0x20] == 0
+    got = wire.segment.process_frame(sent, held=True)
+    assert got is not None
+    assert parse(got)[0].wkc == 1
+    assert wire.slaves[0].controller.memory[0x20] == 7
+
+
 def test_damaged_frames_are_counted_where_they_arrive() -> None:
     wire = Wire(3)
     wire.number()

@@ -134,15 +134,23 @@ class Control:
         direction: str = "in",
         cyclic: bool = False,
     ) -> None:
-        if direction not in ("in", "out"):
-            raise ValueError("direction is 'out' (to the slaves) or 'in' (back to the master)")
+        _check_direction(direction)
         fate = Fate(lost_outbound=direction == "out", lost_inbound=direction == "in")
         self._segment.trouble.add(fate, count, chance, cyclic)
 
     def _late(
-        self, by_s: float, count: int | None = None, chance: float = 1.0, cyclic: bool = False
+        self,
+        by_s: float,
+        *,
+        count: int | None = None,
+        chance: float = 1.0,
+        direction: str = "in",
+        cyclic: bool = False,
     ) -> None:
-        self._segment.trouble.add(Fate(delay_ns=int(by_s * _NS)), count, chance, cyclic)
+        _check_direction(direction)
+        late_ns = int(by_s * _NS)
+        fate = Fate(hold_ns=late_ns) if direction == "out" else Fate(delay_ns=late_ns)
+        self._segment.trouble.add(fate, count, chance, cyclic)
 
     def _corrupt(
         self, slave: int, port: int = 0, count: int | None = 1, chance: float = 1.0
@@ -254,3 +262,8 @@ class Control:
 
     def _stop(self) -> None:
         self.stopped = True
+
+
+def _check_direction(direction: str) -> None:
+    if direction not in ("in", "out"):
+        raise ValueError("direction is 'out' (to the slaves) or 'in' (back to the master)")

@@ -15,7 +15,7 @@ from drivers.virtual.wires.ethercat.clock import WireClock
 from drivers.virtual.wires.ethercat.line import Line
 from drivers.virtual.wires.ethercat.registers import Command
 from drivers.virtual.wires.ethercat.slave import Slave
-from drivers.virtual.wires.ethercat.trouble import Trouble
+from drivers.virtual.wires.ethercat.trouble import NO_TROUBLE, Trouble
 
 ETHERTYPE = b"\x88\xa4"
 _ETHERNET, _HEADER, _DATAGRAM = 14, 2, 10
@@ -65,20 +65,27 @@ class Segment:
         self.frames = 0
         self.reply_delay_ns = 0
         """How long the reply of the last frame is to be held back."""
+        self.hold_ns = 0
+        """When above 0, the last frame has not been processed: it is to come again, as held."""
 
-    def process_frame(self, frame: bytes, age_ns: int = 0) -> bytes | None:
+    def process_frame(self, frame: bytes, age_ns: int = 0, held: bool = False) -> bytes | None:
         """One frame from the master; None when nothing comes back.
 
-        ``age_ns`` is how long ago it arrived, where the network stack tells.
+        ``age_ns`` is how long ago it arrived, where the network stack tells. A frame that the
+        caller has held back for `hold_ns` comes again as ``held``.
         """
+        self.reply_delay_ns = self.hold_ns = 0
         if len(frame) < _ETHERNET + _HEADER or frame[12:14] != ETHERTYPE:
             return None
         parts = datagrams(frame)
         cyclic = any(part.command in _LOGICAL for part in parts)
+        fate = NO_TROUBLE if held else self.trouble.frame_fate(cyclic)
+        if fate.hold_ns:
+            self.hold_ns = fate.hold_ns
+            return None
         now = self.clock.arrival(cyclic, self._cycle_ns() if cyclic else 0, age_ns)
         self.frames += 1
         reach = self.line.update(now)
-        fate = self.trouble.frame_fate(cyclic)
         self.reply_delay_ns = fate.delay_ns
         if fate.lost_outbound or not reach:
             return None

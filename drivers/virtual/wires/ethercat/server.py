@@ -94,7 +94,7 @@ class SegmentServer:
         except LinkLost:
             self._lock.release()
             raise
-        self._late: list[tuple[int, int, bytes]] = []
+        self._late: list[tuple[int, int, bool, bytes]] = []
         self._sequence = 0
 
     def run(self) -> None:
@@ -110,7 +110,7 @@ class SegmentServer:
                         self._drain()
                     elif not self._command():
                         return
-                self._send_late()
+                self._finish_late()
                 if not events:
                     self._segment.settle()
 
@@ -150,18 +150,25 @@ class SegmentServer:
             except OSError:
                 return  # the interface was switched off; it may come back
             reply = self._segment.process_frame(frame, _age_ns(ancillary))
-            if reply is None:
-                continue
-            delay = self._segment.reply_delay_ns
-            if delay:
-                self._sequence += 1
-                heapq.heappush(self._late, (time.monotonic_ns() + delay, self._sequence, reply))
-            else:
+            if self._segment.hold_ns:
+                self._postpone(self._segment.hold_ns, frame, is_reply=False)
+            elif reply is not None and self._segment.reply_delay_ns:
+                self._postpone(self._segment.reply_delay_ns, reply, is_reply=True)
+            elif reply is not None:
                 self._send(reply)
 
-    def _send_late(self) -> None:
+    def _postpone(self, delay_ns: int, frame: bytes, is_reply: bool) -> None:
+        self._sequence += 1
+        due_ns = time.monotonic_ns() + delay_ns
+        heapq.heappush(self._late, (due_ns, self._sequence, is_reply, frame))
+
+    def _finish_late(self) -> None:
+        """Send late replies and process late frames that are due."""
         while self._late and self._late[0][0] <= time.monotonic_ns():
-            self._send(heapq.heappop(self._late)[2])
+            _, _, is_reply, frame = heapq.heappop(self._late)
+            reply = frame if is_reply else self._segment.process_frame(frame, held=True)
+            if reply is not None:
+                self._send(reply)
 
     def _send(self, frame: bytes) -> None:
         # A full queue or a dead interface loses the frame, as a cable would.

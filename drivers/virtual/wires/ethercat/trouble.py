@@ -18,10 +18,13 @@ class Fate:
     corrupt_at: tuple[int, int] | None = None
     """Slave and port where it arrives damaged."""
     delay_ns: int = 0
+    """The reply comes back late."""
+    hold_ns: int = 0
+    """The frame reaches the slaves late, and so its reply is late as well."""
     counter_offset: int = 0
 
 
-_FINE = Fate()
+NO_TROUBLE = Fate()
 
 
 @dataclass(slots=True)
@@ -59,10 +62,10 @@ class Trouble:
     def frame_fate(self, cyclic: bool) -> Fate:
         """Fate of the frame that has just come; counts rules down."""
         if not self._rules:
-            return _FINE
+            return NO_TROUBLE
         outbound = inbound = False
         corrupt: tuple[int, int] | None = None
-        delay = offset = 0
+        delay = hold = offset = 0
         for rule in list(self._rules):
             if (rule.cyclic_only and not cyclic) or self._random.random() >= rule.chance:
                 continue
@@ -74,9 +77,10 @@ class Trouble:
             inbound |= rule.fate.lost_inbound
             corrupt = rule.fate.corrupt_at or corrupt
             delay = max(delay, rule.fate.delay_ns)
+            hold = max(hold, rule.fate.hold_ns)
             offset += rule.fate.counter_offset
         self.counted["lost"] += outbound or inbound
         self.counted["corrupt"] += corrupt is not None
-        self.counted["late"] += delay > 0
+        self.counted["late"] += delay > 0 or hold > 0
         self.counted["counter"] += offset != 0
-        return Fate(outbound, inbound, corrupt, delay, offset)
+        return Fate(outbound, inbound, corrupt, delay, hold, offset)
