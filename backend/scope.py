@@ -26,6 +26,8 @@ from drivers.link import ScopeBlock
 FLUSH_S = 0.04
 #: Blocks that wait for a slow subscriber before dropping begins.
 QUEUE_BLOCKS = 50
+#: Polling is no faster than this, or a link without wire time would take a whole core.
+SHORTEST_PERIOD_S = 0.0005
 #: Pause between tries while the drive does not answer.
 RETRY_S = 0.25
 
@@ -174,7 +176,8 @@ class _Sampler:
                 await asyncio.sleep(min(waits, default=FLUSH_S))
                 continue
             for subscription in due:
-                subscription.due = max(subscription.due + subscription.period_s, now)
+                period = max(subscription.period_s, SHORTEST_PERIOD_S)
+                subscription.due = max(subscription.due + period, now)
             keys = list(dict.fromkeys(key for s in due for key in s.keys))
             before = time.monotonic()
             try:
