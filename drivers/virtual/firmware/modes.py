@@ -86,7 +86,7 @@ class Modes:
 
     # --- set-points ------------------------------------------------------------------------
     def refresh(self) -> None:
-        """A set-point or profile parameter of PV or PT changed."""
+        """A set-point or parameter of the running mode changed."""
         if not self.running:
             return
         core = self._core
@@ -100,6 +100,8 @@ class Modes:
         elif self.mode == PT:
             slope = max(core.torque_of(core.number("6087:00", 3000)), 1e-6)
             self._axis.run_torque(core.torque_of(core.number("6071:00")), slope)
+        elif self.mode in _CYCLIC_LOOP:
+            self._interpolation()
 
     def on_control_word(self, now: int, before: int) -> None:
         """Bits 4 to 6 in PP, bit 4 in HM; only called in operation enabled."""

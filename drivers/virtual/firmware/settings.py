@@ -94,7 +94,9 @@ class ProtectionSettings:
 
 @dataclass(frozen=True, slots=True)
 class ImpedanceSettings:
-    """Gains of the impedance controller; unset limits are infinite."""
+    """Gains of the impedance controller. Their units are not printed (004:4570-4577): Nm/rad,
+    Nm/(rad·s) and Nm/(rad/s) are assumed.
+    """
 
     kp: float
     ki: float

@@ -50,8 +50,11 @@ class TravelSpec(_Part):
 
     @model_validator(mode="after")
     def _in_order(self) -> TravelSpec:
-        if not self.min_rev < self.max_rev:
-            raise ValueError(f"travel: min_rev {self.min_rev} is not below max_rev {self.max_rev}")
+        if not (self.min_rev < self.max_rev and self.min_rev <= 0 <= self.max_rev):
+            raise ValueError(
+                f"travel: the start position 0 must lie between min_rev {self.min_rev} and "
+                f"max_rev {self.max_rev}, and there must be room between them"
+            )
         return self
 
 

@@ -243,3 +243,15 @@ def test_mechanics_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
     path.write_text(path.read_text() + "weight=3\n")
     with pytest.raises(ValueError, match="weight"):
         load_mechanics(path)
+
+
+@pytest.mark.parametrize(("low", "high"), [(1, 2), (-2, -1), (0, 0), (2, -2)])
+def test_travel_must_hold_the_start_position(low: float, high: float) -> None:
+    with pytest.raises(ValueError, match="start position"):
+        TravelSpec(min_rev=low, max_rev=high)
+
+
+def test_at_most_three_couplings_with_backlash() -> None:
+    loose = LoadSpec(inertia_kgm2=1e-5, stiffness_nm_per_rad=100, backlash_rad=0.01)
+    with pytest.raises(ValueError, match="three couplings"):
+        spec(load=(loose,) * 4)

@@ -95,6 +95,8 @@ ROWS: list[tuple[Any, ...]] = [
     ("2070:01", "UINT16", "rw", "none", NOW, 500),
     ("2070:02", "UINT16", "rw", "none", NOW, 500),
     ("2070:03", "UINT16", "rw", "none", NOW, 100),
+    *((f"2080:{sub:02X}", "REAL32", "rw", "rx", NOW, 0) for sub in (1, 2, 3, 5, 6)),
+    ("2080:04", "REAL32", "rw", "none", NOW, 1000),
     ("2108:01", "UINT8", "rw", "none", SETTINGS, 0, 0, 1),
     ("603F:00", "UINT16", "ro", "tx", NOW, 0),
     ("6040:00", "UINT16", "rw", "rx", NOW, 0),

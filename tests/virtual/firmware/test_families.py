@@ -360,3 +360,19 @@ def test_stiffness_row_of_the_real_profile(family) -> None:
     assert p[k.P_KP_POSITION_1] == pytest.approx(TURN * 32.9)
     assert p[k.P_KP_SPEED_1] == pytest.approx(TURN * 115 * inertia)
     assert p[k.P_KI_SPEED_1] == pytest.approx(TURN * 115 * inertia * TURN * 22.7)
+
+
+def test_gains_without_a_unit_act_in_proportion(family) -> None:
+    profile = family_profile(
+        "ds_c",
+        parameter("2510:00", "UINT16"),
+        parameter("2511:00", "UINT16", 50),
+        gains=GainSpec(convention="unit", position="2510:00", speed="2511:00", source="003:711"),
+    )
+    b = family(profile)
+    p = b.servo.axis.p
+    position, speed = p[k.P_KP_POSITION_1], p[k.P_KP_SPEED_1]
+    b.set("2510:00", 200)
+    b.set("2511:00", 25)
+    assert p[k.P_KP_POSITION_1] == pytest.approx(2 * position)
+    assert p[k.P_KP_SPEED_1] == pytest.approx(0.5 * speed)

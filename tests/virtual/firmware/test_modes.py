@@ -214,6 +214,22 @@ def test_csv_and_cst(bench) -> None:
     assert gained == pytest.approx(0.12 * 1.27 / 5e-5 * 5e-3, rel=0.05)
 
 
+def test_impedance_mode_is_a_spring_and_damper(bench) -> None:
+    """Held against 0.05 Nm with Kp = 0.5 Nm/rad the axis yields 0.1 rad (figure 53)."""
+    b = bench(rigid(friction=FrictionSpec(gravity_nm=0.05)))
+    b.set("2080:01", 0.5)
+    b.set("2080:03", 0.01)
+    b.enable(-4)
+    b.run(1.0)
+    assert b.servo.axis.angle_rad == pytest.approx(-0.1, rel=1e-3)
+    b.set("2080:01", 1.0)  # acts at once (004:4539)
+    b.run(1.0)
+    assert b.servo.axis.angle_rad == pytest.approx(-0.05, rel=1e-3)
+    b.set("60B2:00", round(0.05 / 1.27 * 1000))  # the torque offset carries the weight
+    b.run(1.0)
+    assert b.servo.axis.angle_rad == pytest.approx(0.0, abs=2e-3)
+
+
 def test_following_error_bit_without_a_fault(bench) -> None:
     b = bench()
     b.set("6065:00", 1000)

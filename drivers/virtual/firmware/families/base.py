@@ -31,7 +31,7 @@ class Units:
     ramp_reference_rad_s: float = 0.0
 
     def ramp(self, raw: float) -> float:
-        """Magnitude of an acceleration [rad/s²]; a ramp of zero means the steepest possible."""
+        """Magnitude of an acceleration [rad/s²]; zero counts as the smallest step above it."""
         if self.ramps_are_times_ms:
             return self.ramp_reference_rad_s / max(raw, 1.0) * 1000.0
         return max(raw, 1.0) / abs(self.acceleration_per_rad_s2)

@@ -28,6 +28,8 @@ from profiles.schema import NotchSlot, Profile, Raw
 
 TWO_PI = 2 * math.pi
 _MS = 1e-3
+_UNIT_GAIN = 100
+"""Start value of a gain for which the manual prints neither unit nor default."""
 
 #: Names of faults as manuals print them, per protection, and the standard's code (CiA 402-2).
 _FAULT_WORDS: tuple[tuple[int, str, int], ...] = (
@@ -97,6 +99,10 @@ class Cia402:
             "60C2:01": 1, "60C2:02": -3, "605A:00": 2, "605D:00": 1, "605E:00": 2, "6007:00": 1,
             "6502:00": sum(1 << (mode - 1) for mode in self._profile.supported_modes if mode > 0),
         }  # fmt: skip
+        gains = self._profile.gains
+        if gains is not None and gains.convention == "unit":
+            keys = (gains.position, gains.speed, gains.integral)
+            fallback |= {key: _UNIT_GAIN for key in keys if key is not None}
         if self.traits.positive_limit_first:
             fallback |= {"607D:01": 2**31 - 1, "607D:02": -(2**31)}
         return fallback
@@ -162,18 +168,22 @@ class Cia402:
                 return default
             return float(parameter.to_value(od.number(key))) or default
 
-        if gains is None or gains.convention == "unit":
-            hertz, integral_ms, position = 40.0, 20.0, 40.0
-            current_hz, torque_ms = 1000.0, 0.0
-        else:
-            hertz = value(gains.speed, 40.0)
-            integral_ms = value(gains.integral, 20.0)
-            position = value(gains.position, 40.0)
+        hertz, integral_ms, position, torque_ms, current_hz = 40.0, 20.0, 40.0, 0.0, 1000.0
+        if gains is not None and gains.convention == "unit":
+            # No meaning is printed: what stands there by default is taken as the moderate gains
+            # above, and everything else in proportion.
+            hertz *= self._share(od, gains.speed)
+            integral_ms /= self._share(od, gains.integral)
+            position *= self._share(od, gains.position)
+        elif gains is not None:
+            hertz = value(gains.speed, hertz)
+            integral_ms = value(gains.integral, integral_ms)
+            position = value(gains.position, position)
             unit = profile.by_key[gains.position].unit if gains.position else ""
             if "Hz" in unit or gains.convention == "bandwidth":
                 position *= TWO_PI
-            current_hz = value(gains.current_bandwidth, 1000.0)
-            torque_ms = value(gains.torque_filter, 0.0)
+            current_hz = value(gains.current_bandwidth, current_hz)
+            torque_ms = value(gains.torque_filter, torque_ms)
         kp = TWO_PI * hertz * inertia
         first = GainSet(position, kp, kp / (integral_ms * _MS))
         return LoopSettings(
@@ -189,6 +199,15 @@ class Cia402:
             brake_speed_rad_s=10 * RPM,
             brake_torque_nm=motor.rated_torque_nm,
         )
+
+    def _share(self, od: ObjectDictionary, key: str | None) -> float:
+        """A gain without a unit over its start value."""
+        parameter = self._profile.by_key.get(key or "")
+        if parameter is None:
+            return 1.0
+        printed = parameter.default_raw
+        start = float(printed) if isinstance(printed, (int, float)) and printed else _UNIT_GAIN
+        return max(float(od.number(parameter.key)), 1e-3 * start) / start
 
     def _torque_mode_speed(self, od: ObjectDictionary, motor: MotorData) -> float:
         key = self.traits.torque_speed_limit_key
