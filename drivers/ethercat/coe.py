@@ -186,26 +186,35 @@ def settle(box: Mailbox, *, force: bool = False) -> Steps[None]:
     box.unsettled = False
 
 
-def split_complete(data: bytes, sizes: list[int]) -> list[bytes] | None:
-    """Entries 1…n of a complete-access answer, or None where its layout is not certain.
+def split_complete(data: bytes, sizes: dict[int, int], *, proven: bool) -> dict[int, bytes]:
+    """Entries of a complete-access answer by subindex, or nothing where its layout is not certain.
 
-    Subindex 0 is padded to 16 bits (ETG.1000.6 clause 5.6.2.1); some slaves send it as one
-    byte. The length tells which; an answer that fits neither is not interpreted.
+    ``sizes`` are the lengths of the known entries. Subindex 0 is padded to 16 bits (ETG.1000.6
+    clause 5.6.2.1); some slaves send it as one byte, some leave reserved subindices out. An
+    answer is certain when every byte is accounted for *and* subindex 0 agrees: all of 1…n, or
+    the highest known one. Where it disagrees, ``proven`` says that this layout has been compared
+    with single reads.
     """
-    total = sum(sizes)
-    if not data or data[0] != len(sizes):
-        return None
-    if len(data) == total + 2 and data[1] == 0:
-        start = 2
-    elif len(data) == total + 1:
-        start = 1
-    else:
-        return None
-    parts = []
-    for size in sizes:
-        parts.append(data[start : start + size])
-        start += size
-    return parts
+    if not data:
+        return {}
+    first = [sub for sub in sorted(sizes) if sub <= data[0]]
+    candidates = [first] if first == list(range(1, data[0] + 1)) else []
+    if proven or data[0] == max(sizes, default=0):
+        candidates.append(sorted(sizes))
+    for order in candidates:
+        total = sum(sizes[sub] for sub in order)
+        if len(data) == total + 2 and data[1] == 0:
+            start = 2
+        elif len(data) == total + 1:
+            start = 1
+        else:
+            continue
+        parts = {0: data[:1]}
+        for sub in order:
+            parts[sub] = data[start : start + sizes[sub]]
+            start += sizes[sub]
+        return parts
+    return {}
 
 
 def list_objects(box: Mailbox) -> Steps[list[int]]:

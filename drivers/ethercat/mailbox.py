@@ -67,6 +67,7 @@ _ERRORS = {
 
 _RESEND_S = 0.02
 _DEAD_READS = 5
+_WORTH_WAITING_S = 0.0003
 
 
 class Mail(NamedTuple):
@@ -121,6 +122,8 @@ class Mailbox:
     unsettled: bool = field(default=False, init=False)
     """A request timed out: its answer may still come and must not answer the next one."""
     repeats: int = field(default=0, init=False)
+    usual_s: float = field(default=0.0, init=False)
+    """How long answers take as a rule: asking earlier only disturbs."""
 
     @property
     def payload_size(self) -> int:
@@ -186,9 +189,12 @@ class Mailbox:
     def _wait(
         self, mail: bytes, delivered: bool, matches: Callable[[Mail], bool], deadline: float
     ) -> Steps[bytes]:
-        resend_at = self.clock() + _RESEND_S
+        asked = self.clock()
+        resend_at = asked + _RESEND_S
         dead = 0
         pause_s = 0.0
+        if mail and self.usual_s > _WORTH_WAITING_S:
+            yield Pause(min(self.usual_s * 0.8, 0.01))
         while True:
             status = yield Read(SM1_STATUS, 1)
             dead = dead + 1 if status is None else 0
@@ -202,6 +208,7 @@ class Mailbox:
                 if answer.protocol == MAILBOX_ERROR:
                     self._raise_error(answer.payload)
                 if matches(answer):
+                    self.usual_s += (self.clock() - asked - self.usual_s) * 0.2
                     return answer.payload
                 continue
             now = self.clock()

@@ -45,6 +45,9 @@ class Station:
     complete_access: bool = True
     single_only: set[int] = field(default_factory=set)
     """Objects whose complete access was not certain."""
+    to_prove: dict[int, bytes] = field(default_factory=dict)
+    proven: dict[int, tuple[tuple[int, int], ...]] = field(default_factory=dict)
+    """Layouts of whole objects that were found equal to single reads, with their lengths."""
     notes: list[str] = field(default_factory=list)
     ports: esc.PortCounters | None = None
 
@@ -210,7 +213,8 @@ def read_items(
         groups.setdefault(item[0], []).append(item)
     dead: DriveError | None = None
     for index, members in groups.items():
-        if dead is None and (sizes := _sizes_of_whole(station, index, members)):
+        sizes = _sizes_of_whole(station, index, members) if dead is None else {}
+        if sizes:
             whole = yield from _read_whole(station, index, sizes)
             results.update({item: whole[item[1]] for item in members if item[1] in whole})
         for item in members:
@@ -225,23 +229,24 @@ def read_items(
                 results[item] = error
                 if isinstance(error, LinkLost | LinkTimeout):
                     dead = error
+        if index in station.to_prove:
+            read = {item[1]: results[item] for item in members}
+            good = {sub: value for sub, value in read.items() if isinstance(value, bytes)}
+            _prove(station, index, sizes, good)
         on_progress(len(results))
     return [results[item] for item in items]
 
 
-def _sizes_of_whole(station: Station, index: int, members: Sequence[Item]) -> list[int]:
-    """Lengths of subindices 1…n if ``members`` are all of them and reading at once is worth it."""
+def _sizes_of_whole(station: Station, index: int, members: Sequence[Item]) -> dict[int, int]:
+    """Subindex to length of what is wanted of an object, if reading it at once is worth it."""
     if not station.complete_access or index in station.single_only:
-        return []
-    sizes = {sub: size for _, sub, size in members if sub}
-    if len(sizes) < 2 or set(sizes) != set(range(1, len(sizes) + 1)):
-        return []
-    found = [size for _, size in sorted(sizes.items()) if size is not None]
-    return found if len(found) == len(sizes) else []
+        return {}
+    sizes = {sub: size for _, sub, size in members if sub and size is not None}
+    return sizes if len(sizes) >= 2 else {}
 
 
-def _read_whole(station: Station, index: int, sizes: list[int]) -> Steps[dict[int, bytes]]:
-    """Subindex to bytes, or nothing where the drive or its layout do not allow it."""
+def _read_whole(station: Station, index: int, sizes: dict[int, int]) -> Steps[dict[int, bytes]]:
+    """Subindex to bytes, as far as the drive and the certainty of the layout allow it."""
     try:
         data = yield from coe.upload(station.box, index, 0, complete=True)
     except Rejected as error:
@@ -252,11 +257,25 @@ def _read_whole(station: Station, index: int, sizes: list[int]) -> Steps[dict[in
     except DriveError:
         station.single_only.add(index)
         return {}
-    parts = coe.split_complete(data, sizes)
-    if parts is None:
+    proven = station.proven.get(index) == tuple(sorted(sizes.items()))
+    parts = coe.split_complete(data, sizes, proven=proven)
+    if not parts:
+        if coe.split_complete(data, sizes, proven=True):
+            station.to_prove[index] = data
+        else:
+            station.single_only.add(index)
+    return parts
+
+
+def _prove(station: Station, index: int, sizes: dict[int, int], singles: dict[int, bytes]) -> None:
+    """Compare an uncertain whole with the single reads that followed it."""
+    data = station.to_prove.pop(index)
+    if {s: singles.get(s) for s in sizes} == {
+        s: part for s, part in coe.split_complete(data, sizes, proven=True).items() if s
+    }:
+        station.proven[index] = tuple(sorted(sizes.items()))
+    else:
         station.single_only.add(index)
-        return {}
-    return {0: data[:1]} | dict(enumerate(parts, start=1))
 
 
 def enumerate_objects(

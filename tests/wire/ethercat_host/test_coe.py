@@ -172,10 +172,18 @@ def test_mailbox_errors_come_in_words() -> None:
 def test_complete_access_with_and_without_the_pad_byte() -> None:
     entries = [b"\x11", b"\x22\x33", b"\x44\x55\x66\x77"]
     body = b"".join(entries)
-    assert sdo.split_complete(b"\x03\x00" + body, [1, 2, 4]) == entries
-    assert sdo.split_complete(b"\x03" + body, [1, 2, 4]) == entries
-    assert sdo.split_complete(b"\x03\x00" + body + b"\0", [1, 2, 4]) is None, "unknown layout"
-    assert sdo.split_complete(b"\x04\x00" + body, [1, 2, 4]) is None, "an entry we do not know"
+    sizes = {1: 1, 2: 2, 3: 4}
+    whole = {0: b"\x03"} | dict(enumerate(entries, start=1))
+    split = sdo.split_complete
+    assert split(b"\x03\x00" + body, sizes, proven=False) == whole
+    assert split(b"\x03" + body, sizes, proven=False) == whole
+    assert split(b"\x03\x00" + body + b"\0", sizes, proven=False) == {}, "a byte too many"
+    assert split(b"\x04\x00" + body, sizes, proven=False) == {}, "an entry we do not know"
+    assert split(b"\x04\x00" + body, sizes, proven=True) == whole | {0: b"\x04"}
+    first = split(b"\x02\x00" + body[:3], sizes, proven=False)
+    assert first == {0: b"\x02", 1: entries[0], 2: entries[1]}, "only so many are in use"
+    gap = split(b"\x05\x00" + body, {1: 1, 2: 2, 5: 4}, proven=False)
+    assert gap == {0: b"\x05", 1: entries[0], 2: entries[1], 5: entries[2]}
 
 
 def test_information_service() -> None:

@@ -211,7 +211,7 @@ async def test_a_heap_of_late_frames_is_never_taken_for_answers(rig: Rig) -> Non
             value = number.to_bytes(2, "little")
             await bus.link.write(1, RECORD[1], value)
             assert await bus.link.read(1, RECORD[1]) == value
-        assert int(bus.link.quality().details["late_frames"]) > 0
+        await until(lambda: int(bus.link.quality().details["late_frames"]) > 0, 1.0)
 
 
 async def test_a_busy_eeprom_ends_in_words(rig: Rig) -> None:
