@@ -58,6 +58,9 @@ class CommunicationObjects:
     def __init__(self, device: Device, node_id: int) -> None:
         self._device = device
         self._node_id = node_id
+        link = device.profile.link("canopen")
+        self.offers_consumer = link is None or link.watchdog.present
+        """A family whose manual names no watchdog has no heartbeat consumer either (DS_C)."""
         self.heartbeat_ms = 0
         self.consumer = 0
         self.sync_cob = 0x80
@@ -92,7 +95,9 @@ class CommunicationObjects:
 
     def owns(self, index: int) -> bool:
         """Whether ``index`` is served here rather than by the drive."""
-        return index in (0x1005, 0x1014, 0x1016, 0x1017, 0x1200) or (
+        if index == 0x1016:
+            return self.offers_consumer
+        return index in (0x1005, 0x1014, 0x1017, 0x1200) or (
             index & 0xFFFC in (0x1400, 0x1600, 0x1800, 0x1A00)
         )
 

@@ -53,7 +53,7 @@ def small_profile() -> Profile:
         identity=Identity(
             maker="Test", model="Small", vendor_id=0x1234, product_code=0x56, revision=3
         ),
-        links=(LinkSpec(kind="canopen", watchdog=Watchdog(present=False), source="000:1"),),
+        links=(LinkSpec(kind="canopen", watchdog=Watchdog(present=True), source="000:1"),),
         units=UnitSpec(),
         supported_modes=(1, 3),
         parameters=tuple(
