@@ -40,6 +40,8 @@ class Modes:
         self._move: _Move | None = None
         self._waiting: _Move | None = None
         self._steps = 20
+        self._cycle_step = 0
+        self._cycle_steps = 0
         numbered = core.od.numbered
         self._cyclic_entries = tuple(
             numbered.get(key)
@@ -169,8 +171,19 @@ class Modes:
                 )
             )  # fmt: skip
 
-    def on_cyclic(self) -> None:
-        """New cyclic set-points arrived: interpolate to them over 60C2h."""
+    def on_cycle(self) -> None:
+        """One cycle of process data arrived.
+
+        Where the cycles come on an exact grid that is finer than 60C2h can say (it has steps of
+        100 µs at best, 004:7628), the drive interpolates over the grid's period.
+        """
+        now = int(self._axis.s[k.S_STEP])
+        spacing, self._cycle_step = now - self._cycle_step, now
+        steady, self._cycle_steps = spacing == self._cycle_steps, spacing
+        self.on_cyclic(spacing if steady and 0 < spacing < self._steps else None)
+
+    def on_cyclic(self, steps: int | None = None) -> None:
+        """New cyclic set-points: interpolate to them over ``steps``, by default 60C2h."""
         if not self.running or self.mode not in _CYCLIC_LOOP:
             return
         core, units = self._core, self._core.units
@@ -191,7 +204,7 @@ class Modes:
             omega = min(max(omega, -limit), limit)
         if self.mode == CST:
             nm += float(torque) / units.torque_per_nm
-        self._axis.set_cyclic(angle, omega, nm, self._steps)
+        self._axis.set_cyclic(angle, omega, nm, steps or self._steps)
 
     # --- for the status word ---------------------------------------------------------------
     def slow_ramp(self) -> float:

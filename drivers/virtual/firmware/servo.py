@@ -187,7 +187,7 @@ class VirtualServo:
         return OutputImage(parts, self.od, self._outputs_arrived)
 
     def _outputs_arrived(self) -> None:
-        self.control.modes.on_cyclic()
+        self.control.modes.on_cycle()
 
     # --- reactions to writes ---------------------------------------------------------------
     def _connect(self) -> None:

@@ -182,6 +182,22 @@ def test_csp_interpolates_between_cycles(bench) -> None:
     assert b.get("6062:00") == 1000
 
 
+def test_csp_interpolates_over_a_steady_grid_finer_than_60c2(bench) -> None:
+    """At 4 kHz with 60C2h at 1 ms: from the third equal spacing on, 5 steps per cycle."""
+    b = bench()
+    b.enable(8)
+    rx, _ = cyclic(b)
+    for cycle in range(1, 9):
+        rx.unpack(struct.pack("<HbiihH", 15, 8, cycle * 100, 0, 0, 0))  # type: ignore[attr-defined]
+        b.run(250e-6)
+        if cycle >= 4:
+            assert b.get("6062:00") == cycle * 100
+    b.run(50e-6)  # late: what comes off the grid is interpolated over 60C2h again
+    rx.unpack(struct.pack("<HbiihH", 15, 8, 1800, 0, 0, 0))  # type: ignore[attr-defined]
+    b.run(250e-6)
+    assert b.get("6062:00") == pytest.approx(800 + 1000 * 5 / 20, abs=1)
+
+
 def test_csp_follows_a_ramp_with_the_lag_of_its_gain(bench) -> None:
     """Following error v/Kp with Kp = 2π·20 Hz; speed feed-forward takes it away."""
     for feed_forward in (0, 4):
