@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from datetime import datetime
 from pathlib import Path
@@ -9,11 +10,20 @@ from typing import Annotated
 
 import typer
 
+from backend.commands.session import opened, show_progress
+from backend.description import profile_of_drive
+from drivers.errors import DriveError, NotAllowed
 from profiles import drive_names, load_profile
 from profiles.check import check as check_profile
 from profiles.check import coverage
 from profiles.export import show as shown
-from profiles.importer import ImportFailed, export_eds, import_file, write_profile
+from profiles.importer import (
+    ImportedProfile,
+    ImportFailed,
+    export_eds,
+    import_file,
+    write_profile,
+)
 from profiles.loader import ProfileError, user_folder
 
 app = typer.Typer(help="Drive profiles: show, check, import.")
@@ -70,6 +80,34 @@ def import_description(
     print(f"{imported.profile.title}: {len(imported.profile.parameters)} parameters, "
           f"{imported.report.summary()}")  # fmt: skip
     print(f"written to {target}; use it as {imported.profile.drive}")
+
+
+@app.command("from-drive")
+def import_from_drive(
+    url: Annotated[str, typer.Argument(metavar="BUS_URL")],
+    name: Annotated[str, typer.Option(help="name of the new profile")],
+    station: Annotated[int, typer.Option(help="station address on the bus")] = 1,
+) -> None:
+    """Make a generic profile from a drive's own dictionary (EtherCAT, SDO information)."""
+    if name in drive_names():
+        raise typer.BadParameter(f"there is a profile {name!r} already: choose another --name")
+
+    async def read() -> ImportedProfile:
+        async with opened(url) as link:
+            seen = await link.scan(show_progress, [station])
+            found = next((f for f in seen if f.station == station), None)
+            if found is None:
+                raise NotAllowed(f"nothing answers at station {station} of {url}")
+            return await profile_of_drive(link, found, name, show_progress)
+
+    try:
+        imported = asyncio.run(read())
+        target = write_profile(imported.profile, user_folder())
+    except (DriveError, ImportFailed, OSError) as error:
+        raise typer.BadParameter(str(error)) from error
+    for finding in imported.report.findings:
+        print(f"  {finding}")
+    print(f"{len(imported.profile.parameters)} parameters written to {target}; use it as {name}")
 
 
 @app.command("export-eds")

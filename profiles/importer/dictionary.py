@@ -5,13 +5,14 @@ Source: ETG.1000.6 clause 5.6.3 (object access flags), clause 5.6.7.3 (data type
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from profiles.importer.description import MAX_ENTRIES, DescribedEntry, Description
 from profiles.importer.report import ImportFailed, ImportReport
-from profiles.importer.values import TYPE_BY_CODE, named_type, tidy, unit_of_name
-from profiles.schema import Access, LinkKind, PdoMapping
+from profiles.importer.values import TYPE_BY_CODE, named_type, tidy, unit_of_code, unit_of_name
+from profiles.schema import INTEGER_RANGE, Access, DataType, LinkKind, PdoMapping
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +21,9 @@ class DictionaryEntry:
 
     ``type_code`` is the CANopen data type number, ``access`` the 16 access flags: bits 0 to 2
     read in Pre-Op, Safe-Op, Op; bits 3 to 5 write in the same states; bit 6 mappable as RxPDO,
-    bit 7 as TxPDO. ``object_name`` is the name of the whole object where it has subindices.
+    bit 7 as TxPDO. ``object_name`` is the name of the whole object where it has subindices,
+    ``members`` how many subindices it has. ``unit`` is a number of CiA 303-2; values are bytes as
+    they travel. All of these are left out where the drive tells none.
     """
 
     index: int
@@ -31,6 +34,10 @@ class DictionaryEntry:
     access: int
     object_name: str = ""
     members: int = 0
+    unit: int | None = None
+    default: bytes | None = None
+    minimum: bytes | None = None
+    maximum: bytes | None = None
 
 
 def describe_dictionary(
@@ -95,6 +102,10 @@ def _described(entry: DictionaryEntry, file: str, report: ImportReport) -> Descr
     plain, unit = unit_of_name(tidy(entry.name))
     title = tidy(entry.object_name)
     name = f"{title}: {plain}" if title and plain and title != plain else plain or title
+
+    def value(data: bytes | None) -> int | float | None:
+        return None if data is None or data_type is None else _number(data, data_type)
+
     return DescribedEntry(
         index=entry.index,
         subindex=entry.subindex,
@@ -102,6 +113,20 @@ def _described(entry: DictionaryEntry, file: str, report: ImportReport) -> Descr
         type=data_type,
         access=access,
         pdo=pdo,
-        unit=unit,
+        default_raw=value(entry.default),
+        min_raw=value(entry.minimum),
+        max_raw=value(entry.maximum),
+        unit=(unit_of_code(f"{entry.unit:#x}") if entry.unit else "") or unit,
         source=f"{file}:{place}",
     )
+
+
+def _number(data: bytes, data_type: DataType) -> int | float | None:
+    """A value of this type, or None for text and for another length."""
+    if data_type == "REAL32":
+        return float(struct.unpack("<f", data)[0]) if len(data) == 4 else None
+    limits = INTEGER_RANGE.get(data_type)
+    if limits is None or not data:
+        return None
+    value = int.from_bytes(data, "little", signed=limits[0] < 0)
+    return value if limits[0] <= value <= limits[1] else None

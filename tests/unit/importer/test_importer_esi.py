@@ -181,7 +181,19 @@ def test_the_drives_own_dictionary() -> None:
         _entry(0x6041, 0, 0x06, 0x87, name="Statusword"),
         _entry(0x6041, 0, 0x06, 0x87, name="Statusword"),
         _entry(0x2000, 0, 0x05, 0x07, members=2, object_name="Gains"),
-        _entry(0x2000, 1, 0x06, 0x3F, members=2, object_name="Gains", name="Speed loop (Hz)"),
+        _entry(
+            0x2000,
+            1,
+            0x06,
+            0x3F,
+            members=2,
+            object_name="Gains",
+            name="Speed loop (Hz)",
+            default=b"\x28\0",
+            minimum=b"\x01\0",
+            maximum=b"\xe8\x03",
+            unit=0x00200000,
+        ),
         _entry(0x2001, 0, 0x0999, 0x38, name="Odd", bit_length=32),
         _entry(0x2002, 0, 0x0999, 0x38, name="Nothing", bit_length=0),
     ]
@@ -193,6 +205,7 @@ def test_the_drives_own_dictionary() -> None:
     assert (profile.by_key["6041:00"].access, profile.by_key["6041:00"].pdo) == ("ro", "tx")
     gain = profile.by_key["2000:01"]
     assert (gain.name, gain.unit) == ("Gains: Speed loop", "Hz")
+    assert (gain.default_raw, gain.min_raw, gain.max_raw) == (40, 1, 1000)
     assert (profile.by_key["2001:00"].type, profile.by_key["2001:00"].access) == ("UINT32", "wo")
     assert [f.outcome for f in report.findings] == ["noted", "repaired", "left out"]
     with pytest.raises(ImportFailed, match="lists no objects"):

@@ -1,0 +1,67 @@
+"""A profile from what a drive lists of itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from backend.description import dictionary_entries, profile_of_drive
+from drivers.canopen.link import CanopenLink
+from drivers.errors import NotAllowed
+from drivers.ethercat.coe import EntryDescription, ObjectInfo
+from drivers.link import Found
+from profiles.importer import ImportFailed
+
+TOLD: list[EntryDescription | ObjectInfo] = [
+    ObjectInfo(0x6040, "Controlword", 6, 7, 0),
+    EntryDescription(0x6040, 0, 6, 16, 0x7F, "Controlword"),
+    ObjectInfo(0x6041, "Statusword", 6, 7, 0),
+    EntryDescription(0x6041, 0, 6, 16, 0x87, "Statusword"),
+    ObjectInfo(0x6091, "Gear ratio", 7, 9, 2),
+    EntryDescription(0x6091, 0, 5, 8, 0x07, "SubIndex 000"),
+    EntryDescription(0x6091, 1, 7, 32, 0x3F, "Motor revolutions", default=b"\x01\0\0\0"),
+    EntryDescription(0x6091, 2, 7, 32, 0x3F, "Shaft revolutions"),
+]
+
+
+class FakeEthercat:
+    kind = "ethercat"
+
+    def __init__(self, told: list[EntryDescription | ObjectInfo]) -> None:
+        self.told = told
+
+    async def enumerate(self, station: int, progress: Any) -> list[EntryDescription | ObjectInfo]:
+        assert station == 4
+        return self.told
+
+
+FOUND = Found(station=4, vendor_id=0xA2B, product_code=0x190, revision=2, name="ES4")
+
+
+async def test_the_drives_list_becomes_a_profile() -> None:
+    link: Any = FakeEthercat(TOLD)
+    imported = await profile_of_drive(link, FOUND, "my_es4", lambda *_: None)
+    profile = imported.profile
+    assert profile.drive == "my_es4"
+    assert (profile.identity.vendor_id, profile.identity.product_code) == (0xA2B, 0x190)
+    assert list(profile.by_key) == ["6040:00", "6041:00", "6091:01", "6091:02"]
+    gear = profile.by_key["6091:01"]
+    assert (gear.name, gear.default_raw) == ("Gear ratio: Motor revolutions", 1)
+    assert profile.by_role["control_word"].pdo == "rx"
+
+
+async def test_a_drive_that_lists_nothing_is_told() -> None:
+    link: Any = FakeEthercat([])
+    with pytest.raises(ImportFailed, match="lists no objects"):
+        await profile_of_drive(link, FOUND, "x", lambda *_: None)
+
+
+async def test_canopen_has_no_such_service() -> None:
+    with pytest.raises(NotAllowed, match="cannot list its own objects"):
+        await profile_of_drive(CanopenLink("canopen://virtual/x"), FOUND, "x", lambda *_: None)
+
+
+def test_entries_without_an_object_are_kept() -> None:
+    entries = dictionary_entries([EntryDescription(0x2000, 0, 6, 16, 7, "Alone")])
+    assert [(e.name, e.object_name, e.members) for e in entries] == [("Alone", "", 0)]
