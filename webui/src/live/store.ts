@@ -94,7 +94,10 @@ export function setState(state: AxisState): void {
   publish(`state ${state.drive}`)
 }
 
+/** A job that has ended stays ended: the answer to its start may come after word of its end. */
 export function setJob(job: JobInfo): void {
+  const known = contents.jobs.get(job.id)
+  if (known && known.state !== 'running' && job.state === 'running') return
   contents.jobs = new Map(contents.jobs).set(job.id, job)
   publish('jobs')
 }

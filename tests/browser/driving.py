@@ -1,0 +1,75 @@
+"""What the tests ask the bench past the page, and ways about the page."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from playwright.sync_api import Page
+
+from tests.support.station import Station, until
+
+#: Faster than the noise of the simulated encoder at standstill, slower than any jog here.
+MOVING_RPM = 20.0
+#: Renewal time-out 0.2 s, braking 0.1 s at 60 rpm and 600 rpm/s, and the time to ask.
+STOP_S = 2.0
+
+
+class Bench:
+    """One axis as the server and the virtual drive see it."""
+
+    def __init__(self, station: Station, drive: str) -> None:
+        self.station = station
+        self.drive = drive
+
+    def raw(self, key: str) -> Any:
+        """A parameter, read from the drive now."""
+        answer = self.station.http.get(f"/drives/{self.drive}/parameters/{key}")
+        return self.station.ok(answer)["raw"]
+
+    def write(self, key: str, raw: int) -> None:
+        path = f"/drives/{self.drive}/parameters/{key}"
+        self.station.ok(self.station.http.put(path, json={"raw": raw}))
+
+    def power_cycle(self) -> None:
+        self.station.drives.command(do="power_cycle", axis="X")
+
+    def state(self) -> Any:
+        return self.station.state(self.drive)
+
+    def moves(self) -> bool:
+        return abs(self.state()["velocity"]) > MOVING_RPM
+
+    def wait_moving(self) -> None:
+        until(self.moves, 8, "the axis moves")
+
+    def wait_standing(self) -> None:
+        """The axis stands, its job has ended, and it stays where it is."""
+        until(lambda: not self.moves(), STOP_S, "the axis stands")
+        until(lambda: self.state()["moving_job"] is None, 5, "the job has ended")
+        before = self.state()["position"]
+        for _ in range(5):
+            now = self.state()
+            assert abs(now["position"] - before) < 0.02, "the axis creeps"
+
+    def jog_job(self) -> Any:
+        """The jog that began last."""
+        jobs = self.station.ok(self.station.http.get("/jobs"))
+        return [job for job in jobs if job["kind"] == "jog"][-1]
+
+
+def open_axis(page: Page, drive: str, name: str) -> None:
+    """Go to a page of an axis, by the address."""
+    page.evaluate(f"location.hash = '#/axis/{drive}/{name}'")
+
+
+def row(page: Page, key: str) -> Any:
+    """The row of a parameter in the table."""
+    return page.locator(f'[id="row-{key}"]')
+
+
+def find(page: Page, key: str) -> Any:
+    """Search for a parameter, and wait for its row."""
+    page.get_by_role("searchbox").fill(key)
+    found = row(page, key)
+    found.wait_for()
+    return found
