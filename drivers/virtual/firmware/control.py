@@ -279,7 +279,8 @@ class DeviceControl:
         A drive with 6007h does what that says (CiA 402-2 object 6007h); the others report a
         fault (004:4903-4917).
         """
-        if self.state not in _OPERATING:
+        fault = self._core.family.traits.communication_fault
+        if self.state not in _OPERATING or not fault:
             return
         option = self._option("6007:00", 1) if "6007:00" in self._core.od.numbered else 1
         if option == 2:
@@ -288,7 +289,7 @@ class DeviceControl:
         elif option == 3 and self.state is State.OPERATION_ENABLED:
             self._leave_operation(State.QUICK_STOP_ACTIVE, Command.QUICK_STOP)
         elif option == 1:
-            self.raise_fault(self._core.family.traits.communication_fault)
+            self.raise_fault(fault)
 
     # --- status ----------------------------------------------------------------------------
     @property

@@ -13,6 +13,7 @@ from drivers.virtual.device import SdoAbort
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware import make_device
 from drivers.virtual.firmware.factory import FAMILIES
+from drivers.virtual.firmware.families.mms7 import Mms7
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import MechanicsSpec, TravelSpec
 from profiles.loader import drive_names, load_profile
@@ -301,6 +302,19 @@ def test_ds_c_triggers_stay_and_act_on_change(family) -> None:
     assert abs(b.get("6064:00")) <= 1
 
 
+def test_ds_c_runs_on_when_the_line_is_cut(family) -> None:
+    """No watchdog is documented: that is what the tools must cope with."""
+    b = family(DS_C)
+    b.set("6060:00", 3)
+    for word in (6, 7, 15):
+        b.set("6040:00", word)
+    b.set("60FF:00", 300)
+    b.run(1.0)
+    b.servo.communication_lost("heartbeat")
+    b.run(2.0)
+    assert b.get("606C:00") == pytest.approx(300, abs=2)
+
+
 def test_ds_c_electronic_gear(family) -> None:
     """Numerator 2: one pulse is worth twice as much, a turn has half the pulses."""
     b = family(DS_C)
@@ -376,3 +390,39 @@ def test_gains_without_a_unit_act_in_proportion(family) -> None:
     b.set("2511:00", 25)
     assert p[k.P_KP_POSITION_1] == pytest.approx(2 * position)
     assert p[k.P_KP_SPEED_1] == pytest.approx(0.5 * speed)
+
+
+def test_faults_are_those_of_the_real_profile() -> None:
+    """Bits of 200Bh:0B and codes of 603Fh, written down twice from table 70 by two people."""
+    printed = {
+        match.bit: fault.code_raw or 0
+        for fault in load_profile("mms7").faults
+        for match in fault.match
+        if match.key == "200B:0B"
+    }
+    known = {bit.bit_length() - 1: info.code for bit, info in Mms7.traits.faults.items()}
+    assert known == printed
+
+
+def test_commands_are_those_of_the_real_profile() -> None:
+    """Every value that a procedure writes to 200Dh is a command of the firmware."""
+    written = {
+        step.raw
+        for procedure in load_profile("mms7").procedures
+        for step in procedure.steps
+        if step.do == "write" and step.key == "200D:00"
+    }
+    assert written <= set(Mms7.traits.commands["200D:00"])
+
+
+def test_homing_methods_of_the_real_profile_are_all_known(family) -> None:
+    """None of them fails at once, as an unknown method does."""
+    profile = load_profile("mms7")
+    for method in profile.homing_methods:
+        b = family(profile)
+        b.set("6098:00", method.method)
+        b.set("6060:00", 6)
+        b.set("6040:00", 6)
+        b.set("6040:00", 15)
+        b.set("6040:00", 31)
+        assert not b.status & 1 << 13, method.method

@@ -74,6 +74,7 @@ class Traits:
 
     ``commands`` names what writing a raw value to a parameter does: save, restore, reset, zero,
     clear_history, write_settings, fault_reset. ``self_clearing`` commands read 0 afterwards.
+    ``communication_fault`` is 0 for a drive that does not watch its bus.
     """
 
     buffered_setpoints: bool = True

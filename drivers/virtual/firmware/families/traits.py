@@ -37,7 +37,8 @@ EP3E = Traits(
 )
 
 #: Xinlichuan DS_C: 2200h to 2203h are triggers that stay until they are written back to 0
-#: (003:411-422); own status word (003:298-308); 607Dh:01 is the positive limit.
+#: (003:411-422); own status word (003:298-308); 607Dh:01 is the positive limit. The manual prints
+#: no watchdog of any kind: with the line cut, the drive goes on with what it was told.
 DS_C = Traits(
     commands={
         "2200:00": {1: "zero"},
@@ -50,6 +51,7 @@ DS_C = Traits(
     home_found_bit=8,
     positive_limit_first=True,
     torque_speed_limit_key="2406:00",
+    communication_fault=0,
 )
 
 #: Any other CiA 402 drive: 1010h and 1011h with the texts of CiA 301.
