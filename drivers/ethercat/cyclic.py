@@ -24,6 +24,7 @@ DISTRUST_S = 0.03
 
 _DISTRUST_CYCLES = 5
 _RECEIVE_US = 300
+_LEAST_WAIT_S = 100e-6
 _MARGIN_NS = 120_000
 _LATE_BINS = 16
 
@@ -90,7 +91,6 @@ class CyclicLoop:
         self._ring = ring
         self._slaves = [segment.slaves[image.station - 1] for image in images]
         self._fd = segment.socket_fd
-        self._wait_s = max(cycle_ns * 0.6e-9, 150e-6)
         self._distrust = max(round(DISTRUST_S * 1e9 / cycle_ns), _DISTRUST_CYCLES)
         self._invalid_run = 0
         self._integral_ns = 0.0
@@ -182,7 +182,8 @@ class CyclicLoop:
         self._segment.discard_late_frames()
         self._master.send_processdata()
         if self._fd is not None:
-            ready, _, _ = select.select((self._fd,), (), (), self._wait_s)
+            left_s = (self.next_ns + self.cycle_ns - time.monotonic_ns()) * 0.95e-9
+            ready, _, _ = select.select((self._fd,), (), (), max(left_s, _LEAST_WAIT_S))
             if not ready:
                 # Tells SOEM to give the frame up; it returns at once.
                 self._master.receive_processdata(0)
