@@ -76,6 +76,9 @@ M6L_GAINS = (
     parameter("2008:02", "UINT16", 500, unit="ms", scale=0.1),
     parameter("2008:03", "UINT16", 60, unit="rad/s"),
     parameter("2008:04", "UINT16", 2, unit="ms", scale=0.1),
+    parameter("2008:0F", "UINT16", 50, unit="ms", scale=0.01),
+    parameter("2008:10", "UINT16", 0, unit="%", scale=0.01),
+    parameter("2005:11", "UINT16", 1),
     parameter("2009:27", "UINT16", 300, scale=0.01),
     parameter("2009:0B", "UINT16", 0, unit="Hz"),
     parameter("2009:0C", "UINT16", 100, unit="Hz"),
@@ -155,6 +158,27 @@ def test_following_error_is_a_fault_with_the_maker_s_code(family) -> None:
         rx.unpack((15).to_bytes(2, "little") + (cycle * 100).to_bytes(4, "little"))
         b.run(1e-3)
     assert b.get("603F:00") == 0xFF20
+
+
+def test_feed_forward_takes_the_lag_away(family) -> None:
+    """v/Kp without, nothing with 100 % (P08.15), and again v/Kp when deselected (P05.16)."""
+    b = family(M6L)
+    b.set("2009:27", 0)
+    lags = []
+    for gain, select in ((0, 1), (10000, 1), (10000, 0)):
+        b.set("2008:10", gain)
+        b.set("2005:11", select)
+        b.enable(1)
+        b.set("607A:00", b.get("6064:00") + 10 * REV)
+        b.set("6040:00", 0x0F)
+        b.set("6040:00", 0x1F)
+        b.run(0.7)
+        lags.append(b.get("60F4:00"))
+        b.run(1.0)
+        b.set("6040:00", 6)
+    assert lags[0] == pytest.approx(10 * REV / 60, rel=0.02)
+    assert abs(lags[1]) < 20
+    assert lags[2] == pytest.approx(lags[0], rel=0.02)
 
 
 def test_hz_width_notch_removes_its_centre(family) -> None:

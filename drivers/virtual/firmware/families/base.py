@@ -65,6 +65,18 @@ class Autosave:
     last_index: int
 
 
+@dataclass(frozen=True, slots=True)
+class FeedForward:
+    """Parameters of the feed-forwards: gains in %, filter times in ms, selections (1 is on)."""
+
+    speed_gain: str
+    speed_filter: str
+    torque_gain: str
+    torque_filter: str
+    speed_select: str | None = None
+    torque_select: str | None = None
+
+
 StatusStyle = Literal["cia402", "echo"]
 
 
@@ -91,6 +103,7 @@ class Traits:
     limit_bits_swapped: bool = False
     autosave: tuple[Autosave, ...] = ()
     torque_speed_limit_key: str | None = None
+    feed_forward: FeedForward | None = None
     assigns_terminals: bool = False
 
 

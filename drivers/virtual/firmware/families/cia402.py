@@ -184,6 +184,7 @@ class Cia402:
                 position *= TWO_PI
             current_hz = value(gains.current_bandwidth, current_hz)
             torque_ms = value(gains.torque_filter, torque_ms)
+        speed_ff, speed_ff_s, torque_ff, torque_ff_s = self._feed_forward(od)
         kp = TWO_PI * hertz * inertia
         first = GainSet(position, kp, kp / (integral_ms * _MS))
         return LoopSettings(
@@ -193,11 +194,36 @@ class Cia402:
             current_loop_hz=current_hz if current_hz >= 100.0 else 1000.0,
             inertia_kgm2=inertia,
             torque_filter_s=torque_ms * _MS,
+            speed_feed_forward=speed_ff,
+            speed_feed_forward_s=speed_ff_s,
+            torque_feed_forward=torque_ff,
+            torque_feed_forward_s=torque_ff_s,
             notches=self._notches(od),
             speed_output_nm=3.0 * motor.rated_torque_nm,
             torque_mode_speed_rad_s=self._torque_mode_speed(od, motor),
             brake_speed_rad_s=10 * RPM,
             brake_torque_nm=motor.rated_torque_nm,
+        )
+
+    def _feed_forward(self, od: ObjectDictionary) -> tuple[float, float, float, float]:
+        """Shares and time constants [s] of speed and torque feed-forward."""
+        keys = self.traits.feed_forward
+        if keys is None:
+            return (0.0, 0.0, 0.0, 0.0)
+
+        def value(key: str, per_unit: float) -> float:
+            parameter = self._profile.by_key.get(key)
+            raw = od.number(key)
+            return 0.0 if parameter is None else float(parameter.to_value(raw)) * per_unit
+
+        def selected(key: str | None) -> bool:
+            return key is None or od.number(key) == 1
+
+        return (
+            value(keys.speed_gain, 0.01) if selected(keys.speed_select) else 0.0,
+            value(keys.speed_filter, _MS),
+            value(keys.torque_gain, 0.01) if selected(keys.torque_select) else 0.0,
+            value(keys.torque_filter, _MS),
         )
 
     def _share(self, od: ObjectDictionary, key: str | None) -> float:

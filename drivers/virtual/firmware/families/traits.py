@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from drivers.virtual.firmware.families.base import Autosave, Traits
+from drivers.virtual.firmware.families.base import Autosave, FeedForward, Traits
 
 #: Megmeet M6-L: parameters of the bus go to the EEPROM while P17.24 is 1 (000:3669-3673), saving
-#: and restoring by P17.26 (000:3675), history and defaults by P02.22 (000:3254).
+#: and restoring by P17.26 (000:3675), history and defaults by P02.22 (000:3254), feed-forward by
+#: P08.14 to P08.17 with the selections P05.16 and P06.18 (000:3407-3410, 000:3310, 000:3360).
 M6L = Traits(
     commands={
         "2011:1B": {1: "restore", 2: "save"},
         "2002:17": {1: "clear_history", 2: "restore"},
     },
     autosave=(Autosave("2011:19", 1, 0x2000, 0x6FFF),),
+    feed_forward=FeedForward(
+        speed_gain="2008:10",
+        speed_filter="2008:0F",
+        torque_gain="2008:12",
+        torque_filter="2008:11",
+        speed_select="2005:11",
+        torque_select="2006:13",
+    ),
 )
 
-#: Rtelligent R6L: 200Ch (002:11782 on); what 2008h:0C permits is stored when written.
+#: Rtelligent R6L: 200Ch (002:11782 on); what 2008h:0C permits is stored when written;
+#: feed-forward in 2006h (002:10669-10705).
 R6L = Traits(
     commands={
         "200C:01": {1: "restore", 2: "clear_history"},
@@ -26,6 +36,12 @@ R6L = Traits(
         Autosave("2008:0C", 4, 0x6000, 0x6FFF),
     ),
     limit_bits_swapped=True,
+    feed_forward=FeedForward(
+        speed_gain="2006:10",
+        speed_filter="2006:0F",
+        torque_gain="2006:12",
+        torque_filter="2006:11",
+    ),
 )
 
 #: Maxsine EP3E: 1010h:01 saves and restores (001:1209); 6041h bit 15 (001:372); the home offset
