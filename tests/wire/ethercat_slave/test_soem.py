@@ -55,7 +55,12 @@ def start(namespace: Namespace, scenario: str, interface: str = MASTER) -> subpr
 
 
 def finish(process: subprocess.Popen[str]) -> dict[str, Any]:
-    out, err = process.communicate(timeout=60)
+    try:
+        out, err = process.communicate(timeout=60)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+        raise
     assert process.returncode == 0, err
     answer: dict[str, Any] = json.loads(out.splitlines()[-1])
     return answer
@@ -130,8 +135,15 @@ class Master:
         answer = self._answer()
         return answer["wkc"], answer["states"]
 
-    def close(self) -> None:
-        self._process.communicate(timeout=20)
+    def __enter__(self) -> Master:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        try:
+            self._process.communicate(timeout=20)
+        finally:
+            self._process.kill()
+            self._process.wait()
 
     def _answer(self) -> dict[str, Any]:
         assert self._process.stdout is not None
@@ -142,39 +154,38 @@ class Master:
 def test_trouble_on_the_wire_as_the_master_sees_it(
     namespace: Namespace, shared: VirtualSegment
 ) -> None:
-    master = Master(namespace)
-    assert master.cycles(3)[0] == [6, 6, 6]
+    with Master(namespace) as master:
+        assert master.cycles(3)[0] == [6, 6, 6]
 
-    shared.command("lose", count=2, cyclic=True)
-    assert master.cycles(4)[0] == [-1, -1, 6, 6]
+        shared.command("lose", count=2, cyclic=True)
+        assert master.cycles(4)[0] == [-1, -1, 6, 6]
 
-    shared.command("counter", by=-3, count=1)
-    assert master.cycles(3)[0] == [3, 6, 6]
+        shared.command("counter", by=-3, count=1)
+        assert master.cycles(3)[0] == [3, 6, 6]
 
-    # 200 ms late: the master has given up after 80 ms.
-    shared.command("late", by_s=0.2, count=1, cyclic=True)
-    assert master.cycles(20)[0][0] == -1
-    assert shared.command("state")["trouble"]["late"] == 1
+        # 400 ms late: the master has given up after 250 ms.
+        shared.command("late", by_s=0.4, count=1, cyclic=True)
+        assert master.cycles(20)[0][0] == -1
+        assert shared.command("state")["trouble"]["late"] == 1
 
-    shared.command("late", by_s=0.02, count=3, cyclic=True, direction="out")
-    wkcs, _ = master.cycles(3)
-    assert wkcs == [6, 6, 6]  # late, and still in the master's time
-    assert shared.command("state")["trouble"]["late"] == 4
+        shared.command("late", by_s=0.02, count=3, cyclic=True, direction="out")
+        wkcs, _ = master.cycles(3)
+        assert wkcs == [6, 6, 6]  # late, and still in the master's time
+        assert shared.command("state")["trouble"]["late"] == 4
 
-    shared.command("cut", cable=1)
-    wkcs, _ = master.cycles(200)  # at least 400 ms
-    assert wkcs[-1] == 3
-    shared.command("heal")
-    wkcs, states = master.cycles(3)
-    # Back on the cable, in Safe-Op by its watchdog; there it still exchanges data.
-    assert wkcs[-1] == 6
-    assert states == [[8, 0], [0x14, 0x1B]]
+        shared.command("cut", cable=1)
+        wkcs, _ = master.cycles(250)  # at least 500 ms
+        assert wkcs[-1] == 3
+        shared.command("heal")
+        wkcs, states = master.cycles(3)
+        # Back on the cable, in Safe-Op by its watchdog; there it still exchanges data.
+        assert wkcs[-1] == 6
+        assert states == [[8, 0], [0x14, 0x1B]]
 
-    shared.command("cut", cable=0)
-    assert set(master.cycles(2)[0]) == {-1}
-    shared.command("heal", cable=0)
-    assert master.cycles(10)[0][-1] == 6
-    master.close()
+        shared.command("cut", cable=0)
+        assert set(master.cycles(2)[0]) == {-1}
+        shared.command("heal", cable=0)
+        assert master.cycles(10)[0][-1] == 6
 
 
 def test_one_segment_per_interface(namespace: Namespace, shared: VirtualSegment) -> None:
