@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import heapq
 import os
 import selectors
 import socket
 import struct
 import time
-from pathlib import Path
 from typing import IO
 
 from drivers.errors import LinkLost
@@ -29,18 +27,16 @@ _IDLE_S = 0.05
 
 
 class InterfaceLock:
-    """One slave segment per interface; held as long as the object lives."""
+    """One slave segment per interface: an abstract socket name, which belongs to the network
+    namespace as the interface does and goes with its process.
+    """
 
     def __init__(self, interface: str) -> None:
-        # The inode of the network namespace tells equal names in different namespaces apart.
-        space = Path("/proc/self/ns/net").stat().st_ino
-        folder = Path(os.environ.get("XDG_RUNTIME_DIR") or "/tmp")  # noqa: S108
-        path = folder / f"servodeck-ec-{os.getuid()}-{space}-{interface}.lock"
-        self._handle = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
-            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._socket.bind(f"\0servodeck-virtual-segment-{interface}")
         except OSError as error:
-            os.close(self._handle)
+            self._socket.close()
             raise LinkLost(
                 f"another virtual segment already answers on {interface}",
                 remedy="stop it or choose another interface",
@@ -48,7 +44,7 @@ class InterfaceLock:
 
     def release(self) -> None:
         """Let go."""
-        os.close(self._handle)
+        self._socket.close()
 
 
 def open_socket(interface: str) -> socket.socket:
