@@ -6,14 +6,14 @@ import errno
 from pathlib import Path
 
 import can
-import serial
 
 from drivers.canopen.slcan import SlcanBus
 from drivers.canopen.url import CanUrl
 from drivers.errors import LinkLost
 
-#: What python-can and the libraries beneath it raise when an adapter is missing or dies.
-ADAPTER_ERRORS = (can.CanError, OSError, serial.SerialException, ValueError)
+#: What python-can and the makers' libraries beneath it raise when an adapter is missing or dies.
+#: They agree on nothing narrower: ctypes bindings raise TypeError, AttributeError, NameError …
+ADAPTER_ERRORS = (Exception,)
 
 
 def open_bus(url: CanUrl) -> can.BusABC:
@@ -24,8 +24,7 @@ def open_bus(url: CanUrl) -> can.BusABC:
     """
     try:
         return _open(url)
-    except (*ADAPTER_ERRORS, ImportError, NameError, AttributeError) as error:
-        # Vendor bindings raise the last three when their library is not installed.
+    except ADAPTER_ERRORS as error:
         raise translate(url, error) from error
 
 

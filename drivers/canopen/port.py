@@ -182,5 +182,5 @@ class CanPort:
         if bus is not None:
             try:
                 bus.shutdown()
-            except (*ADAPTER_ERRORS, TypeError):
+            except ADAPTER_ERRORS:
                 return  # a dead adapter cannot be told to close; its descriptor is gone with it

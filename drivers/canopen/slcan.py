@@ -7,10 +7,13 @@ Source of the commands: Lawicel CAN232 manual V3, "F" status flags and "t" retur
 
 from __future__ import annotations
 
+import time
+
 import can
 import serial
 from can.interfaces.slcan import slcanBus
 
+_ASK_AGAIN_S = 0.5
 _BUS_ERROR = 0x80
 _ERROR_PASSIVE = 0x20
 
@@ -21,6 +24,8 @@ ERROR_CONTROLLER = 0x04
 
 class SlcanBus(slcanBus):
     """As python-can's, but a BEL makes it ask for the flags, which come back as error frames."""
+
+    _asked_s = float("-inf")
 
     def _read(self, timeout: float | None) -> str | None:
         try:
@@ -35,8 +40,15 @@ class SlcanBus(slcanBus):
             # TypeError: pyserial reads a descriptor that another thread has closed.
             raise can.CanOperationError(f"the adapter is gone: {error}") from error
         if line == "\a":
-            self._write("F")
+            self._ask_for_flags()
         return line
+
+    def _ask_for_flags(self) -> None:
+        """At most twice a second: an adapter that does not know F answers it with BEL again."""
+        now_s = time.monotonic()
+        if now_s - self._asked_s >= _ASK_AGAIN_S:
+            self._asked_s = now_s
+            self._write("F")
 
     def _buffered_line(self) -> str | None:
         for position, byte in enumerate(self._buffer):

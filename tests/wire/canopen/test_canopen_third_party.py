@@ -19,6 +19,7 @@ from conftest import Bench, until
 
 from drivers.canopen.frames import Frame, exact_bits, worst_case_bits
 from drivers.canopen.link import CanopenLink
+from drivers.canopen.slcan import SlcanBus
 from drivers.link import Address
 from drivers.virtual.wires.can_wire import CanWire
 from drivers.virtual.wires.canopen import CanopenNode
@@ -138,6 +139,44 @@ def test_python_cans_own_slcan_client_sees_a_refused_frame_as_nothing(tmp_path: 
         bus.send(request)
         assert bus.recv(0.1) is None
         assert side.refused == 1
+
+
+class _Refusing:
+    """A serial port whose adapter answers BEL to everything, F included."""
+
+    timeout: float | None = None
+
+    def __init__(self) -> None:
+        self.sent: list[bytes] = []
+        self.waiting = 0
+
+    @property
+    def in_waiting(self) -> int:
+        return 0
+
+    def write(self, data: bytes) -> None:
+        self.sent.append(data)
+        self.waiting += 1
+
+    def flush(self) -> None:
+        return
+
+    def read(self, count: int) -> bytes:
+        if self.waiting == 0:
+            return b""
+        self.waiting -= 1
+        return b"\a"
+
+
+def test_an_adapter_that_does_not_know_flags_is_asked_twice_a_second_at_most() -> None:
+    bus = SlcanBus.__new__(SlcanBus)
+    port = _Refusing()
+    bus.serialPortOrig = port
+    bus._buffer = bytearray()
+    port.write(b"t605000\r")
+    for _ in range(50):
+        bus._read(0)
+    assert port.sent.count(b"F\r") == 1
 
 
 async def test_wire_time_is_emulated_on_request(tmp_path: Path) -> None:
