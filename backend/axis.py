@@ -101,6 +101,8 @@ class Axis:
                 drive=self.drive.name,
                 remedy="start a new motion when it is safe",
             )
+        if enables:
+            self.drive.require_identity()
         await self.drive.command(self.drive.require("control_word"), word)
         self.control_word = word
 

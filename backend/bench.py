@@ -7,7 +7,7 @@ import contextlib
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -21,8 +21,8 @@ from backend.journal import Journal
 from backend.library import SetLibrary
 from backend.monitor import Monitor, Snapshot
 from backend.scope import ScopeHub
-from drivers.errors import Busy, DriveError, NotAllowed
-from drivers.link import Found, Link, LinkEvent, NeedsProfile
+from drivers.errors import Busy, DriveError, NotAllowed, Rejected
+from drivers.link import Address, Found, Link, LinkEvent, NeedsProfile
 from drivers.urls import link_for
 from profiles import load_all, load_profile
 from profiles.schema import Profile
@@ -59,6 +59,19 @@ def match_profiles(kind: str, found: Found) -> list[Match]:
             matches.append(Match(profile, "possible", text))
     order = ("certain", "likely", "possible")
     return sorted(matches, key=lambda m: order.index(m.confidence))
+
+
+async def read_serial(drive: Drive) -> int | None:
+    """Serial number of the drive that answers now (1018h:04), or None where it has none."""
+    for port in drive.ports:
+        if port.link.kind == "modbus":
+            continue
+        try:
+            data = await port.link.read(port.station, Address(0x1018, 4, "UINT32"))
+        except (Rejected, NotAllowed):
+            continue
+        return int.from_bytes(data, "little") or None
+    return None
 
 
 class Member:
@@ -140,14 +153,18 @@ class Bench:
         return next((u for u, link in self.links.items() if link is port.link), port.link.url)
 
     async def scan(
-        self, url: str, stations: Sequence[int] | None, progress: Progress
+        self, url: str, stations: Sequence[int] | None, progress: Callable[[float, str], None]
     ) -> list[Found]:
         """Look for drives on a bus.
 
         Raises:
             LinkLost: the bus cannot be opened.
+            Busy: a drive of it is moving; a scan may reset what it finds.
         """
         link = await self.link(url)
+        for member in self.members.values():
+            if any(port.link is link for port in member.drive.ports):
+                self.require_idle(member)
         found = await link.scan(progress, stations)
         self.journal.add(f"{url}: found {len(found)} drives")
         return found
@@ -370,11 +387,36 @@ class Bench:
         member.axis.forget()
 
         async def reread(progress: Progress) -> dict[str, object]:
+            await self._check_identity(member)
             await member.drive.read_many(keys, progress)
             return {"parameters": len(keys)}
 
-        if keys:
-            self.jobs.start("reread", f"Read {member.drive.name} anew", reread, drive=drive_id)
+        self.jobs.start("reread", f"Read {member.drive.name} anew", reread, drive=drive_id)
+
+    async def _check_identity(self, member: Member) -> None:
+        """Notice another drive at this place before anything is written to it."""
+        drive = member.drive
+        known = drive.found.serial if drive.found else None
+        serial = await read_serial(drive)
+        if known is None or serial is None or serial == known:
+            return
+        drive.identity_warning = (
+            f"{drive.name} had serial number {known}; the drive that answers here now has {serial}"
+        )
+        self.journal.add(drive.identity_warning, level="error", drive=drive.id)
+        self._drives_changed()
+
+    async def accept_identity(self, drive_id: str) -> Member:
+        """The user says that the drive at this place is the right one."""
+        member = self.member(drive_id)
+        drive = member.drive
+        serial = await read_serial(drive)
+        drive.found = replace(drive.found or Found(drive.ports[0].station), serial=serial)
+        drive.identity_warning = ""
+        self.journal.add(f"{drive.name}: serial number {serial} accepted", drive=drive.id)
+        self._save()
+        self._drives_changed()
+        return member
 
     # --- over restarts ----------------------------------------------------------------
 
@@ -408,6 +450,9 @@ class Bench:
                     port["url"], port["station"], item["profile"], item["name"]
                 )
                 member.drive.notes = item.get("notes", "")
+                if isinstance(serial := item.get("serial"), int):
+                    member.drive.found = Found(port["station"], serial=serial)
+                    self._returned(member.drive.id)
             except (DriveError, KeyError, IndexError, TypeError) as error:
                 self.journal.add(f"{item}: not connected: {error}", level="warning")
 

@@ -367,6 +367,7 @@ class Drive:
             LinkTimeout: the outcome is unknown, and reading back failed as well.
         """
         parameter = self.parameter(key)
+        self.require_identity()
         if not raw and isinstance(value, (int, float)):
             value = parameter.to_raw(value)
         value = self.check(parameter, value)
@@ -385,6 +386,19 @@ class Drive:
         if parameter.effective not in ("now", "stopped") and parameter.key not in self._transient:
             self._changes.pending[parameter.key] = parameter.effective
         return await self.read(parameter.key)
+
+    def require_identity(self) -> None:
+        """The drive at this place is the one that was connected.
+
+        Raises:
+            NotAllowed: another one answers, and nobody has accepted it.
+        """
+        if self.identity_warning:
+            raise NotAllowed(
+                f"{self.identity_warning}: nothing is written to it",
+                drive=self.name,
+                remedy="check the cables; if it was exchanged, accept it on the Connect page",
+            )
 
     async def command(self, key: str, raw: int) -> None:
         """Write a motion object without reading back (set-points, control word).

@@ -169,6 +169,9 @@ class DriveUpdate(Message):
 
     name: str | None = Field(default=None, min_length=1, max_length=60)
     notes: str | None = Field(default=None, max_length=4000)
+    accept_identity: bool = Field(
+        default=False, description="the drive at this place was exchanged on purpose"
+    )
 
 
 class PortInfo(Message):

@@ -132,8 +132,7 @@ async def drives(bench: TheBench, connection: Connection = None) -> list[DriveSu
 @router.post("/drives", status_code=201)
 async def connect(bench: TheBench, request: ConnectRequest) -> DriveSummary:
     """Make a station a drive of the bench. Its identity is asked for first."""
-    link = await bench.link(request.url)
-    seen = await link.scan(lambda _fraction, _step: None, [request.station])
+    seen = await bench.scan(request.url, [request.station], lambda _fraction, _step: None)
     found = next((f for f in seen if f.station == request.station), None)
     member = await bench.connect(
         request.url, request.station, request.profile, request.name, found=found
@@ -152,8 +151,10 @@ async def drive(bench: TheBench, member: TheMember, connection: Connection = Non
 async def update_drive(
     bench: TheBench, member: Controlled, change: DriveUpdate, connection: Connection = None
 ) -> DriveSummary:
-    """Change name or notes."""
+    """Change name or notes, or accept an exchanged drive."""
     bench.rename(member.drive.id, change.name, change.notes)
+    if change.accept_identity:
+        await bench.accept_identity(member.drive.id)
     return convert.drive_summary(bench, member, connection)
 
 

@@ -152,6 +152,7 @@ class Wires:
             "pull": lambda c: self._cable(c).pull(),
             "heal": lambda c: self._cable(c).heal(),
             "mute": self._mute,
+            "swap": self._swap,
             "power_cycle": self._power_cycle,
             "inject": self._inject,
             "read": self._read,
@@ -179,6 +180,14 @@ class Wires:
 
     def _mute(self, command: dict[str, object]) -> None:
         self._slave(command).mute = bool(command.get("on", True))
+
+    def _swap(self, command: dict[str, object]) -> None:
+        """Two drives change places on their wire."""
+        slave = self._slave(command)
+        first, second = int(str(command["first"])), int(str(command["second"]))
+        with self._lock:
+            stations = slave.stations
+            stations[first], stations[second] = stations[second], stations[first]
 
     def _power_cycle(self, command: dict[str, object]) -> None:
         with self._lock:

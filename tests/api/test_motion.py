@@ -262,3 +262,22 @@ def test_scope_delivers_samples_with_their_times(station: Station, x: str, page:
         assert dt >= 0
         sequences.append(sequence)
     assert sequences == list(range(1, len(sequences) + 1))
+
+
+def test_power_cut_while_jogging(station: Station, x: str, page: Live) -> None:
+    jog_until_fast(station, page, x)
+    station.drives.command(do="power_cycle", axis="Feed screw", off_s=0.5)
+    end = time.monotonic() + 1.0
+    while time.monotonic() < end:
+        page.send(type="jog_renew", drive=x)
+        time.sleep(0.02)
+    ended = page.wait("jog_ended", drive=x)
+    assert ended["problem"] is not None
+    until(lambda: station.state(x)["fresh"], 15, "the drive answers again")
+    now = until(lambda: at_rest(station, x) and station.state(x), 5)
+    assert now["state"] != "Operation enabled"
+    start_jog(page, x)  # and it can be moved again without a restart of anything
+    hold(page, x, 1.0)
+    page.send(type="jog_stop", drive=x)
+    ended = page.wait("jog_ended", drive=x)
+    assert ended["problem"] is None, ended

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.station import Station
+from tests.support.station import Station, until
 
 
 def test_scan_finds_both_drives(station: Station) -> None:
@@ -149,3 +149,23 @@ def test_drives_are_back_after_a_restart_of_the_server(station: Station, x: str)
     station.start_server()
     (drive,) = station.ok(station.http.get("/drives"))
     assert (drive["id"], drive["name"], drive["notes"]) == (x, "X", "belt side")
+
+
+def test_exchanged_drive_is_noticed_before_anything_is_written(station: Station) -> None:
+    """The cable is moved to another drive: both of the wire answer with their own serial."""
+    x = station.add(1, name="Swapped")
+    try:
+        station.drives.command(do="swap", wire="mlink://virtual0", first=1, second=2)
+        station.drives.command(do="pull", wire="mlink://virtual0")
+        until(lambda: not station.state(x)["fresh"], 5)
+        station.drives.command(do="heal", wire="mlink://virtual0")
+        warned = until(lambda: station.ok(station.http.get(f"/drives/{x}"))["identity_warning"], 15)
+        assert "serial number" in warned
+        answer = station.http.put(f"/drives/{x}/parameters/6081:00", json={"raw": 1000})
+        assert answer.status_code == 409
+        assert "nothing is written" in answer.json()["detail"]
+        station.ok(station.http.patch(f"/drives/{x}", json={"accept_identity": True}))
+        station.ok(station.http.put(f"/drives/{x}/parameters/6081:00", json={"raw": 1000}))
+    finally:
+        station.drives.command(do="swap", wire="mlink://virtual0", first=1, second=2)
+        station.ok(station.http.delete(f"/drives/{x}"))
