@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 from typing import Any
 
 import pytest
@@ -118,9 +120,11 @@ def _blur(page: Page, _cable: Cable) -> None:
     page.evaluate("window.dispatchEvent(new Event('blur'))")
 
 
-def _freeze(page: Page, _cable: Cable) -> None:
-    """The browser freezes the page: none of its code runs any more."""
-    page.context.new_cdp_session(page).send("Page.setWebLifecycleState", {"state": "frozen"})
+def _pause(page: Page, _cable: Cable) -> None:
+    """None of the page's code runs any more; the worker's does."""
+    session = page.context.new_cdp_session(page)
+    session.send("Debugger.enable")
+    session.send("Debugger.pause")
 
 
 def _hang(page: Page, _cable: Cable) -> None:
@@ -146,7 +150,7 @@ def _stall(_page: Page, cable: Cable) -> None:
     cable.stall()
 
 
-@pytest.mark.parametrize("trouble", [_hide, _blur, _freeze, _hang, _leave, _close, _cut, _stall])
+@pytest.mark.parametrize("trouble", [_hide, _blur, _pause, _hang, _leave, _close, _cut, _stall])
 def test_the_jog_ends(laptop: Page, bench: Bench, cable: Cable, trouble: Any) -> None:
     """The button stays pressed; the axis stops all the same."""
     _press(laptop, bench)
@@ -154,6 +158,23 @@ def test_the_jog_ends(laptop: Page, bench: Bench, cable: Cable, trouble: Any) ->
     bench.wait_standing()
     assert bench.jog_job()["state"] != "running"
     cable.mend()
+
+
+def test_the_jog_ends_when_page_and_worker_are_frozen(laptop: Page, bench: Bench) -> None:
+    """A closed lid: the browser's processes get no time at all, and close no connection."""
+    _press(laptop, bench)
+    browser = laptop.context.browser
+    assert browser is not None
+    told = browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
+    frozen = [process["id"] for process in told["processInfo"] if process["type"] == "renderer"]
+    try:
+        for process in frozen:
+            os.kill(process, signal.SIGSTOP)
+        bench.wait_standing()
+        assert "no sign of life" in bench.jog_job()["result"]["reason"]
+    finally:
+        for process in frozen:
+            os.kill(process, signal.SIGCONT)
 
 
 def test_lost_connection_is_said_and_comes_back(laptop: Page, bench: Bench, cable: Cable) -> None:

@@ -25,19 +25,25 @@ export function dismissReport(): void {
  * worker) and a request of its own that nothing else in the page can hold up.
  */
 export async function stopEverything(): Promise<void> {
-  live.send({ type: 'stop', drive: null })
-  live.jogStop('STOP')
+  // First the request of its own: nothing that fails below can hold it back any more.
+  const request = fetch(`${API_ROOT}/api/v1/stop`, {
+    method: 'POST',
+    headers: { 'Content-Type': 'application/json' },
+    body: '{}',
+    keepalive: true,
+    priority: 'high',
+  })
   const mine: StopReport = { at: Date.now(), answer: null, failure: null }
+  try {
+    live.send({ type: 'stop', drive: null })
+    live.jogStop('STOP')
+  } catch (error) {
+    console.error('STOP could not be sent over the websocket', error)
+  }
   report = mine
   publish('stop')
   try {
-    const answer = await fetch(`${API_ROOT}/api/v1/stop`, {
-      method: 'POST',
-      headers: { 'Content-Type': 'application/json' },
-      body: '{}',
-      keepalive: true,
-      priority: 'high',
-    })
+    const answer = await request
     if (!answer.ok) throw new Error(`HTTP ${answer.status}`)
     finish(mine, { answer: (await answer.json()) as StopResult, failure: null })
   } catch (error) {

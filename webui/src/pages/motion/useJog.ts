@@ -42,6 +42,7 @@ export function useJog(drive: string, settings: JogSettings | null) {
   )
   useEffect(() => {
     const hidden = () => document.visibilityState !== 'visible' && hold.release('page hidden')
+    const frozen = () => hold.release('page hidden')
     const blur = () => hold.release('window lost the focus')
     const leave = () => hold.release('page left')
     const key = (event: KeyboardEvent) => event.key === 'Escape' && hold.release('Esc')
@@ -58,7 +59,7 @@ export function useJog(drive: string, settings: JogSettings | null) {
     document.addEventListener('visibilitychange', hidden)
     window.addEventListener('blur', blur)
     window.addEventListener('pagehide', leave)
-    document.addEventListener('freeze', hidden)
+    document.addEventListener('freeze', frozen)
     window.addEventListener('keydown', key, { capture: true })
     return () => {
       hold.release('axis changed')
@@ -66,7 +67,7 @@ export function useJog(drive: string, settings: JogSettings | null) {
       document.removeEventListener('visibilitychange', hidden)
       window.removeEventListener('blur', blur)
       window.removeEventListener('pagehide', leave)
-      document.removeEventListener('freeze', hidden)
+      document.removeEventListener('freeze', frozen)
       window.removeEventListener('keydown', key, { capture: true })
     }
   }, [drive, hold])
