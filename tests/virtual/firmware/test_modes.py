@@ -597,3 +597,43 @@ def test_inertia_identification(bench) -> None:
     assert b.get("2001:06") == b.get("200C:0A")
     b.set("6040:00", 0x000F)
     assert b.status & 0x6F == 0x27
+
+
+@pytest.mark.parametrize("rounds", [2, 6])
+def test_identification_stays_inside_its_rounds(bench, rounds: int) -> None:
+    """200Ch:04 limits the revolutions of the inertia test (004:6332-6337)."""
+    load = LoadSpec(inertia_kgm2=1e-3, stiffness_nm_per_rad=5000, damping_nms_per_rad=0.05)
+    b = bench(rigid(friction=FrictionSpec(coulomb_nm=0.04), load=(load,)))
+    b.set("200C:01", 1)
+    b.set("200C:04", rounds)
+    b.enable(1)
+    b.set("6040:00", 0x080F)
+    turns = []
+    while b.status & 1 << 14:
+        b.run(0.005)
+        turns.append(b.servo.axis.angle_rad / TURN)
+    assert max(turns) - min(turns) < rounds * 1.1
+    assert b.get("200C:05") == 12
+    assert b.get("200C:0A") == pytest.approx(1.05e-3 * 1e7, rel=0.03)
+
+
+def test_identification_fails_on_an_axis_that_cannot_move(bench) -> None:
+    b = bench(rigid(friction=FrictionSpec(coulomb_nm=10.0)))
+    before = b.get("2001:06")
+    b.enable(1)
+    b.set("6040:00", 0x080F)
+    b.run_until(lambda: not b.status & 1 << 14, 60.0, 0.1)
+    assert b.get("200C:05") == 16
+    assert b.get("2001:06") == before
+
+
+def test_identification_ends_with_bit_11(bench) -> None:
+    b = bench()
+    b.enable(1)
+    b.set("6040:00", 0x080F)
+    b.run(0.3)
+    b.set("6040:00", 0x000F)
+    assert not b.status & 1 << 14
+    assert b.get("200C:05") == 0
+    b.run(0.5)
+    assert abs(b.get("606C:00")) < REV // 10

@@ -416,3 +416,32 @@ def test_holding_brake_keeps_a_vertical_axis(bench) -> None:
     before = b.get("6064:00")
     b.run(0.5)
     assert b.get("6064:00") == before
+
+
+@pytest.mark.parametrize("mode", [1, 4, 8, 9, 10])
+def test_quick_stop_ramp_from_every_mode(bench, mode: int) -> None:
+    """About 5 rev/s down at 100 rev/s² takes 50 ms whatever loop was closed before."""
+    b = bench()
+    b.set("6085:00", 100 * REV)
+    b.set("6087:00", 100000)
+    b.enable(mode)
+    if mode == 1:
+        b.set("6081:00", 5 * REV)
+        b.set("607A:00", 50 * REV)
+        b.set("6040:00", 0x1F)
+        b.run(0.3)
+    elif mode == 8:
+        for cycle in range(1, 301):
+            b.set("607A:00", cycle * 5 * REV // 1000)
+            b.run(1e-3)
+    elif mode == 9:
+        b.set("60FF:00", 5 * REV)
+        b.run(0.3)
+    else:
+        b.set("6071:00", 20)
+        b.run_until(lambda: b.get("606C:00") > 5 * REV, 1.0)
+    assert b.get("606C:00") / REV == pytest.approx(5, abs=0.2)
+    b.set("6040:00", 0x02)
+    start = b.get("6064:00")
+    b.run_until(lambda: state(b) == SOD, 0.2)
+    assert (b.get("6064:00") - start) / REV == pytest.approx(5**2 / 200, abs=0.06)
