@@ -7,12 +7,13 @@ several makers' stacks differ there.
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
-from drivers.errors import ProtocolError
+from drivers.errors import LinkTimeout, ProtocolError
 from drivers.ethercat.mailbox import COE, Mail, Mailbox, Steps
 from drivers.sdo_abort import rejected
 
@@ -20,6 +21,7 @@ _REQUEST = 2 << 12
 _RESPONSE = 3
 _INFO = 8
 _MAX_BYTES = 1 << 20
+_DROPPED_S = 0.1
 
 ABORT_COMMAND = 0x05040001
 ABORT_TOGGLE = 0x05030000
@@ -180,6 +182,11 @@ def settle(box: Mailbox, *, force: bool = False) -> Steps[None]:
     if not (box.unsettled or force):
         return
     yield from box.drain()
+    if force:
+        # SOEM used this mailbox: the slave drops our mail if its counter happens to be SOEM's last.
+        with contextlib.suppress(LinkTimeout):
+            request = struct.pack("<HBHB4x", _REQUEST, 0x40, 0x1000, 0)
+            yield from box.request(COE, request, _answer_to(0x1000, 0), _DROPPED_S)
     for fence in ((0x1018, 1), (0x1000, 0)):
         request = struct.pack("<HBHB4x", _REQUEST, 0x40, *fence)
         yield from box.request(COE, request, _answer_to(*fence))

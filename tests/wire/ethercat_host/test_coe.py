@@ -209,3 +209,13 @@ def test_information_service_abort() -> None:
     slave = ScriptedSlave(lambda _: [coe(8, bytes.fromhex("07 00 0000 00000206"))])
     with pytest.raises(Rejected, match="no such object"):
         slave.run(sdo.describe_object(slave.box(), 0x7777))
+
+
+def test_a_mailbox_taken_over_from_soem_may_drop_the_first_mail() -> None:
+    """Its last counter may be the one that we begin with (ETG.1000.4 clause 5.6)."""
+    slave = ScriptedSlave(lambda r: [expedited(*struct.unpack_from("<HB", r, 3), b"\1\0\0\0")])
+    slave.counters.append(2)
+    box = slave.box()
+    slave.run(sdo.settle(box, force=True))
+    assert slave.run(sdo.upload(box, 0x6041, 0)) == b"\1\0\0\0"
+    assert slave.now < 0.2

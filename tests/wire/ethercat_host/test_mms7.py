@@ -1,0 +1,83 @@
+"""Our own MMS7 firmware behind the host: everything read, and moved by cyclic position."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from drivers.cia402 import Mode, State
+from drivers.errors import Rejected
+from drivers.ethercat.link import EthercatLink
+from drivers.link import Address, CyclicSignal, Envelope, Trajectory
+from drivers.virtual.wires.ethercat.launch import VirtualSegment
+from drivers.virtual.wires.netns import Namespace
+from profiles.loader import load_profile
+from tests.wire.ethercat_host.conftest import Bus, until
+
+POSITION = Address(0x607A, 0, "INT32")
+ACTUAL = Address(0x6064, 0, "INT32")
+
+
+@pytest.fixture(scope="module")
+def mms7(namespace: Namespace) -> Iterator[VirtualSegment]:
+    with VirtualSegment.start("ec0s", ["--drive", "mms7", "--sdo-ms", "0.3"], namespace) as made:
+        yield made
+
+
+async def position(link: EthercatLink) -> int:
+    return int.from_bytes(await link.read(1, ACTUAL), "little", signed=True)
+
+
+async def test_mms7_is_read_whole_and_moves(namespace: Namespace, mms7: VirtualSegment) -> None:
+    profile = load_profile("mms7")
+    addresses = [
+        Address(p.index, p.subindex or 0, p.type)
+        for p in profile.parameters
+        if p.index is not None and p.access != "wo"
+    ]
+    link = EthercatLink("ec0m", launcher=namespace.command([]))
+    bus = Bus(link)
+    await link.open()
+    try:
+        found = await link.scan(lambda _share, _text: None)
+        assert (
+            found[0].vendor_id == profile.identity.vendor_id or profile.identity.vendor_id is None
+        )
+        link.know(1, profile)
+        once = await link.read_many(1, addresses)
+        again = await link.read_many(1, addresses)
+        singles = [await link.read(1, address) for address in addresses[::7]]
+        assert not [a for a in once if isinstance(a, Rejected)]
+        steady = [
+            (a, b, c) for a, b, c in zip(once[::7], again[::7], singles, strict=True) if a == b
+        ]
+        assert len(steady) > 0.9 * len(singles)
+        assert all(b == c for _, b, c in steady), "whole objects and single reads agree"
+        cyclic = link.process_data
+        await cyclic.configure(
+            [
+                CyclicSignal(1, Address(0x6041, 0, "UINT16"), "status"),
+                CyclicSignal(1, ACTUAL, "position"),
+            ],
+            [
+                CyclicSignal(1, POSITION, "target"),
+                CyclicSignal(1, Address(0x6060, 0, "INT8"), "mode"),
+            ],
+            0.002,
+        )
+        await cyclic.start()
+        await cyclic.drive_to(1, State.OPERATION_ENABLED, Mode.CSP)
+        await until(lambda: cyclic.axis_state(1)[0] == "Operation enabled", 5.0)
+        here = int.from_bytes(
+            await link.read(1, Address(0x6064, 0, "INT32")), "little", signed=True
+        )
+        there = (here + 20000 * (1 - np.cos(np.linspace(0, np.pi, 500))) / 2).astype(np.int64)
+        there[0] = here
+        await cyclic.run([Trajectory(1, POSITION, there, Envelope(position_max=here + 40000.0))])
+        assert await position(link) == pytest.approx(here + 20000, abs=2000)
+        assert not [t for t in bus.texts if "beyond" in t]
+        await cyclic.stop()
+    finally:
+        await link.close()
