@@ -16,11 +16,12 @@ import contextlib
 import select
 import signal
 import socket
+import struct
 import sys
 import time
 from types import FrameType
 
-from drivers.errors import DriveError, LinkLost
+from drivers.errors import DriveError, LinkLost, ProtocolError
 from drivers.ethercat import protocol, realtime
 from drivers.ethercat.operations import Operations
 from drivers.ethercat.protocol import Message
@@ -116,6 +117,9 @@ class Host:
             self.operations.handle(message, done)
         except DriveError as error:
             done(None, error)
+        except (KeyError, TypeError, ValueError, struct.error) as error:
+            # A wrong request must not end the process that moves axes.
+            done(None, ProtocolError(f"a request that cannot be carried out ({error!r})"))
 
     def send(self, message: Message) -> None:
         """Queue a message; a slow server never holds up the wire."""

@@ -7,12 +7,13 @@ process data go out between any two frames.
 
 from __future__ import annotations
 
+import struct
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
-from drivers.errors import DriveError, LinkLost
+from drivers.errors import DriveError, LinkLost, ProtocolError
 from drivers.ethercat.mailbox import Pause, Read, Steps
 
 LaneName = Literal["mailbox", "register"]
@@ -120,6 +121,11 @@ class Lanes:
         except DriveError as error:
             lane.steps = lane.done = None
             done(None, error)
+            return False
+        except (struct.error, ValueError, IndexError) as error:
+            # Whatever a slave sends, the process that moves axes goes on.
+            lane.steps = lane.done = None
+            done(None, ProtocolError(f"the drive sent something that cannot be read ({error})"))
             return False
         if isinstance(step, Pause):
             lane.wake_s = self._clock() + step.seconds

@@ -232,3 +232,17 @@ def test_percentiles_of_the_lateness() -> None:
     bins[3], bins[8] = 99, 1
     assert percentile_us(bins, 0.5) == 8
     assert percentile_us(bins, 0.995) == 256
+
+
+def test_what_a_slave_sends_never_ends_the_process() -> None:
+    def job() -> Steps[int]:
+        data = yield Read(0, 1)
+        assert data is not None
+        return data[5]
+
+    ended: list[DriveError | None] = []
+    lanes = Lanes(FakeWire(), lambda: 0.0)
+    lanes.submit(1, "mailbox", job(), lambda _r, e: ended.append(e))
+    while lanes.pending():
+        lanes.step()
+    assert isinstance(ended[0], errors.ProtocolError)
