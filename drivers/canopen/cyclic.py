@@ -33,6 +33,7 @@ from profiles.schema import INTEGER_RANGE
 
 SHORTEST_CYCLE_S = 0.001
 _MODE = 0x6060
+_SEEN_S = 0.25
 _OWNED = (CONTROL_WORD, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2)
 
 InWorker = Callable[[Callable[[], None]], Awaitable[None]]
@@ -186,7 +187,17 @@ class CanopenCyclic:
             self._require_axis(trajectory.station)
             if trajectory.target.subindex:
                 raise NotAllowed(f"{trajectory.target} is no setpoint of CiA 402")
+            await self._until_seen_enabled(loop, trajectory.station)
         return loop.play(motions)
+
+    async def _until_seen_enabled(self, loop: SyncLoop, station: int) -> None:
+        """An SDO may tell of Operation enabled a cycle or two before the process data do."""
+        axis = loop.images.axes[station]
+        waited_s = 0.0
+        enabled = State.OPERATION_ENABLED
+        while axis.goal is enabled and axis.state is not enabled and waited_s < _SEEN_S:
+            await asyncio.sleep(loop.cycle_s)
+            waited_s += loop.cycle_s
 
     async def renew(self, station: int) -> None:
         """Extend the life of the setpoints of ``station``."""

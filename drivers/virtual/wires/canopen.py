@@ -189,7 +189,11 @@ class CanopenNode:
         if self._objects.owns(index):
             return self._objects.read(index, subindex)
         try:
-            return self.device.read(index, subindex)
+            value = self.device.read(index, subindex)
+            if (index, subindex) == (0x1000, 0) and not any(value):
+                # Manuals print no value for the device type; a drive has one nevertheless.
+                return struct.pack("<I", _SERVO_DEVICE_TYPE)
+            return value
         except SdoAbort as refusal:
             if refusal.code not in (ABORT_NO_OBJECT, ABORT_NO_SUBINDEX):
                 raise

@@ -1,0 +1,80 @@
+"""The station's own tools on a CANopen drive: jog without and with process data."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import time
+from collections.abc import AsyncIterator
+
+import can
+import pytest
+
+from backend.axis import Axis
+from backend.cyclic import CyclicSession
+from backend.drive import Drive, Port
+from backend.tools.cyclic_motion import jog_cyclic
+from backend.tools.jog import Hold, JogSettings, jog
+from drivers.canopen.link import CanopenLink
+from drivers.cia402 import State
+from drivers.virtual.firmware.factory import make_device
+from drivers.virtual.wires.can_wire import CanWire, PythonCanSide
+from drivers.virtual.wires.canopen import CanopenNode
+from profiles.loader import load_profile
+
+_numbers = itertools.count()
+SETTINGS = JogSettings(
+    direction=1, speed_rpm=60.0, acceleration_rpm_s=600.0, travel_rev=20.0, torque_percent=200.0
+)
+
+
+@pytest.fixture
+async def axis() -> AsyncIterator[Axis]:
+    profile = load_profile("generic402")
+    device = make_device(profile, station=3)
+    # Compiles the physics before anybody waits for an answer.
+    device.advance(time.monotonic_ns())
+    device.advance(time.monotonic_ns() + 10_000_000)
+    channel = f"axis-{next(_numbers)}"
+    bus = can.Bus(interface="virtual", channel=channel)
+    with CanWire(PythonCanSide(bus), [CanopenNode(device, 3, time.monotonic_ns)]):
+        link = CanopenLink(f"canopen://virtual/{channel}")
+        await link.open()
+        link.configure_station(3, profile)
+        drive = Drive("d", "Drive", profile, [Port(link, 3, profile.link("canopen"))])
+        yield Axis(drive)
+        await link.close()
+
+
+async def _hold_for(hold: Hold, seconds: float) -> None:
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        hold.renew()
+        await asyncio.sleep(0.02)
+    hold.release("let go")
+
+
+async def test_jog_by_short_moves(axis: Axis) -> None:
+    start = await axis.position_raw()
+    hold = Hold()
+    holding = asyncio.create_task(_hold_for(hold, 0.6))
+    result = await jog(axis, SETTINGS, hold, lambda *_: None)
+    await holding
+    assert result["reason"] == "let go"
+    assert await axis.position_raw() > start
+    assert await axis.state() is not State.OPERATION_ENABLED
+
+
+async def test_jog_with_process_data(axis: Axis) -> None:
+    session = CyclicSession(axis.drive.ports[0].link, [axis.drive])
+    axis.session = session
+    await session.start(0.004)
+    start = await axis.position_raw()
+    hold = Hold()
+    holding = asyncio.create_task(_hold_for(hold, 0.6))
+    result = await jog_cyclic(axis, session, SETTINGS, hold, lambda *_: None)
+    await holding
+    assert result["reason"] == "let go"
+    assert await axis.position_raw() > start
+    assert await axis.state() is not State.OPERATION_ENABLED
+    await session.stop()
