@@ -72,10 +72,10 @@ class SlcanSide:
         self._buffer.clear()
         master, slave = self._master, self._slave
         self._master = self._slave = -1
-        if slave >= 0 and self.path.is_symlink():
-            # A wire that was made later at the same path is not ours to remove.
-            if str(self.path.readlink()) == os.ttyname(slave):
-                self.path.unlink()
+        # A wire that was made later at the same path is not ours to remove.
+        mine = slave >= 0 and self.path.is_symlink()
+        if mine and str(self.path.readlink()) == os.ttyname(slave):
+            self.path.unlink()
         for descriptor in (slave, master):
             if descriptor >= 0:
                 os.close(descriptor)
