@@ -99,7 +99,7 @@ export interface paths {
         head?: never;
         /**
          * Update Drive
-         * @description Change name or notes.
+         * @description Change name or notes, or accept an exchanged drive.
          */
         patch: operations["update_drive"];
         trace?: never;
@@ -998,6 +998,12 @@ export interface components {
          * @description Name or notes of a drive.
          */
         DriveUpdate: {
+            /**
+             * Accept Identity
+             * @description the drive at this place was exchanged on purpose
+             * @default false
+             */
+            accept_identity: boolean;
             /** Name */
             name?: string | null;
             /** Notes */

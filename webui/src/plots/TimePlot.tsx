@@ -2,6 +2,7 @@ import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import type { Columns } from '../live/decimate'
+import { figure } from '../widgets/format'
 
 export interface PlotSeries {
   label: string
@@ -133,7 +134,7 @@ function yRange(
     max = Math.max(max, frame.level.value)
   }
   if (min > max) return { min: -1, max: 1 }
-  const air = (max - min) * 0.08 || Math.max(Math.abs(max) * 0.1, 1e-3)
+  const air = (max - min) * 0.08 || Math.abs(max) * 0.1 || 1
   return { min: min - air, max: max + air }
 }
 
@@ -154,6 +155,7 @@ function options(
     labelFont: font,
     grid: { stroke: grid, width: 1 },
     ticks: { stroke: grid, width: 1 },
+    values: (_plot, splits) => splits.map((value) => figure(value, 6)),
     ...extra,
   })
   const names = units(series)

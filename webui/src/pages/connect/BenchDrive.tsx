@@ -15,7 +15,17 @@ export function BenchDrive({ drive }: { drive: DriveSummary }) {
   const t = useT()
   const [editing, setEditing] = useState(false)
   const [removing, setRemoving] = useState(false)
+  const accept = useAction()
   const look = linkLook(drive.quality)
+  const acceptIdentity = () =>
+    accept.run(() =>
+      ask(
+        api.PATCH('/api/v1/drives/{drive_id}', {
+          params: { path: { drive_id: drive.id } },
+          body: { accept_identity: true },
+        }),
+      ),
+    )
   return (
     <article className="bench-drive">
       <div className="row middle">
@@ -31,9 +41,15 @@ export function BenchDrive({ drive }: { drive: DriveSummary }) {
         {drive.partial && <em className="warn-text"> {t('connect.partial')}</em>}
       </p>
       {drive.identity_warning && (
-        <p className="note fault" role="alert">
-          <strong>{t('connect.swapped')}</strong> {drive.identity_warning}
-        </p>
+        <div className="note fault" role="alert">
+          <p>
+            <strong>{t('connect.swapped')}</strong> {drive.identity_warning}
+          </p>
+          <Button loading={accept.busy} onClick={() => void acceptIdentity()}>
+            {t('connect.accept')}
+          </Button>
+          <ProblemNote problem={accept.problem} onClose={accept.clear} />
+        </div>
       )}
       <p className="dim">
         {drive.serial !== null && `${t('identity.serial')} ${drive.serial} · `}
@@ -95,7 +111,7 @@ function Rename({ drive, onClose }: { drive: DriveSummary; onClose: () => void }
               ask(
                 api.PATCH('/api/v1/drives/{drive_id}', {
                   params: { path: { drive_id: drive.id } },
-                  body: { name: name.trim(), notes },
+                  body: { name: name.trim(), notes, accept_identity: false },
                 }),
               ),
             )

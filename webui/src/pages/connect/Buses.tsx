@@ -1,36 +1,20 @@
 import { Button } from '@mantine/core'
-import { useCallback, useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
-import type { Bus } from '../../api/schema'
 import { useT } from '../../i18n'
-import { useDrives, useLink } from '../../live/store'
+import { useDrives } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { CyclicExchange } from './CyclicExchange'
 import { QualityTable } from './QualityTable'
-
-const PERIOD_MS = 2000
+import { useBuses } from './useBuses'
 
 /** Opened buses and how well they work. */
 export function Buses() {
   const t = useT()
-  const link = useLink()
   const drives = useDrives() ?? []
-  const [buses, setBuses] = useState<Bus[]>([])
+  const { buses, refresh } = useBuses()
   const close = useAction()
-  const refresh = useCallback(async () => {
-    try {
-      setBuses(await ask(api.GET('/api/v1/buses')))
-    } catch {
-      // Shown by the connection banner; the next round tries again.
-    }
-  }, [])
-  useEffect(() => {
-    if (!link.open) return
-    void refresh()
-    const timer = setInterval(() => void refresh(), PERIOD_MS)
-    return () => clearInterval(timer)
-  }, [link.open, refresh])
   if (buses.length === 0) return null
   const used = new Set(drives.flatMap((drive) => drive.ports.map((port) => port.url)))
   return (
@@ -55,6 +39,7 @@ export function Buses() {
             )}
           </div>
           <QualityTable quality={bus.quality} />
+          {bus.cyclic_possible && <CyclicExchange bus={bus} onChange={refresh} />}
         </div>
       ))}
     </Panel>

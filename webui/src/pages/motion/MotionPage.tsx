@@ -12,8 +12,9 @@ import { HomingPanel } from './HomingPanel'
 import { JogPanel } from './JogPanel'
 import { MovePanel } from './MovePanel'
 import { SequencePanel } from './SequencePanel'
+import { hasCyclicModes, SignalPanel } from './SignalPanel'
 
-const TABS = ['jog', 'move', 'sequence', 'homing'] as const
+const TABS = ['jog', 'move', 'sequence', 'homing', 'signal'] as const
 
 export function MotionPage({ drive }: { drive: string }) {
   const t = useT()
@@ -41,11 +42,15 @@ export function MotionPage({ drive }: { drive: string }) {
             fullWidth
             value={tab}
             onChange={(next) => setTab(next)}
-            data={TABS.map((name) => ({ value: name, label: t(`motion.tab.${name}`) }))}
+            data={TABS.filter((name) => name !== 'signal' || hasCyclicModes(state)).map((name) => ({
+              value: name,
+              label: t(`motion.tab.${name}`),
+            }))}
           />
           {tab === 'jog' && <JogPanel drive={drive} state={state} />}
           {tab === 'move' && <MovePanel drive={summary} state={state} onStarted={started} />}
           {tab === 'sequence' && <SequencePanel drive={drive} state={state} onStarted={started} />}
+          {tab === 'signal' && <SignalPanel drive={summary} state={state} onStarted={started} />}
           {tab === 'homing' && <HomingPanel drive={drive} state={state} onStarted={started} />}
           {moving && moving.id !== mine && moving.kind !== 'jog' && <JobNote id={moving.id} />}
           <JobNote id={mine} onClose={() => started('')} />

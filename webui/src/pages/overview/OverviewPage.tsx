@@ -61,10 +61,13 @@ export function OverviewPage({ drive }: { drive: string }) {
         </Panel>
       )}
       <div className="columns">
-        <Panel title={t('overview.now')}>
-          <Quantities state={state} />
-          <Words state={state} />
-        </Panel>
+        <div className="stack">
+          <Panel title={t('overview.now')}>
+            <Quantities state={state} />
+            <Words state={state} />
+          </Panel>
+          <Procedures drive={drive} />
+        </div>
         <Panel title={t('overview.machine')}>
           <StateMachine
             state={state?.fresh ? state.state : null}
@@ -77,7 +80,6 @@ export function OverviewPage({ drive }: { drive: string }) {
           <ProblemNote problem={change.problem} onClose={change.clear} />
         </Panel>
       </div>
-      <Procedures drive={drive} />
     </div>
   )
 }

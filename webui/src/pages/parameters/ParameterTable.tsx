@@ -10,11 +10,17 @@ import { ProcedureButton } from '../../widgets/Procedures'
 import { useAction } from '../../widgets/useAction'
 import { Detail } from './Detail'
 import { discardEdits, useEdits, useFavourites, writeEdits } from './edits'
-import { FILTERS, type Filter, groups, select } from './filters'
+import { FILTERS, type Filter, groups, select, settingsFirst } from './filters'
 import { Grid } from './Grid'
 
 /** The parameters of one drive with search, filters, and what can be done with all of them. */
-export function ParameterTable({ drive, rows }: { drive: DriveSummary; rows: ParameterRow[] }) {
+export function ParameterTable({
+  drive,
+  rows: inProfileOrder,
+}: {
+  drive: DriveSummary
+  rows: ParameterRow[]
+}) {
   const t = useT()
   const [search, setSearch] = useState('')
   const [filter, setFilter] = useState<Filter>('all')
@@ -23,6 +29,7 @@ export function ParameterTable({ drive, rows }: { drive: DriveSummary; rows: Par
   const [live, setLive] = useState(false)
   const [chosen, setChosen] = useState<string | null>(null)
   const searchBox = useRef<HTMLInputElement>(null)
+  const rows = useMemo(() => settingsFirst(inProfileOrder), [inProfileOrder])
   const readings = useReadings(drive.id)
   const { edits, differs } = useEdits(drive.id)
   const favourites = useFavourites(drive.profile)

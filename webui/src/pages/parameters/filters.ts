@@ -78,3 +78,9 @@ export function groups(rows: ParameterRow[]): [string, number][] {
   for (const row of rows) counts.set(row.group, (counts.get(row.group) ?? 0) + 1)
   return [...counts]
 }
+
+/** The communication area 1000h to 1FFFh is rarely wanted: it comes after everything else. */
+export function settingsFirst(rows: ParameterRow[]): ParameterRow[] {
+  const communication = (row: ParameterRow) => /^1[0-9A-F]{3}:/.test(row.key)
+  return [...rows.filter((row) => !communication(row)), ...rows.filter(communication)]
+}

@@ -1,0 +1,202 @@
+import { Button, NativeSelect, SegmentedControl } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { AxisState, DriveSummary, GenerateRequest } from '../../api/schema'
+import { useT } from '../../i18n'
+import { setJob } from '../../live/store'
+import { NumberField } from '../../widgets/NumberField'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { useBuses } from '../connect/useBuses'
+import { startValue, useRemembered } from './remembered'
+
+/** Cyclic synchronous modes of CiA 402 and the quantity that each commands. */
+const MODES = {
+  CSP: { number: 8, quantity: 'position' },
+  CSV: { number: 9, quantity: 'velocity' },
+  CST: { number: 10, quantity: 'torque' },
+} as const
+type Mode = keyof typeof MODES
+const SHAPES = ['step', 'ramp', 'trapezoid', 'sine', 'chirp'] as const
+
+/** Whether a drive has cyclic modes that this panel can command. */
+export const hasCyclicModes = (state: AxisState | null) =>
+  Object.values(MODES).some(({ number }) => state?.modes.includes(number))
+
+/** A test signal in a cyclic mode, one value per bus cycle. */
+export function SignalPanel({
+  drive,
+  state,
+  onStarted,
+}: {
+  drive: DriveSummary
+  state: AxisState | null
+  onStarted: (job: string) => void
+}) {
+  const t = useT()
+  const { buses } = useBuses()
+  const units = state?.units ?? {}
+  const possible = (Object.keys(MODES) as Mode[]).filter((mode) =>
+    state?.modes.includes(MODES[mode].number),
+  )
+  const [chosen, setMode] = useState<Mode>('CSV')
+  const mode = possible.includes(chosen) ? chosen : (possible[0] ?? 'CSV')
+  const [shape, setShape] = useState<GenerateRequest['shape']>('sine')
+  const [amplitude, setAmplitude] = useState<number | null>(null)
+  const [frequency, setFrequency] = useState<number | null>(1)
+  const [last, setLast] = useState<number | null>(10)
+  const [duration, setDuration] = useState<number | null>(5)
+  const [acceleration, setAcceleration] = useRemembered(drive.id, 'signal.acceleration', 10)
+  const [travel, setTravel] = useRemembered(
+    drive.id,
+    'signal.travel',
+    startValue(units.position, 5),
+  )
+  const [speed, setSpeed] = useRemembered(drive.id, 'signal.speed', startValue(units.velocity, 300))
+  const [torque, setTorque] = useRemembered(drive.id, 'signal.torque', 50)
+  const start = useAction()
+  const key = `${drive.id} ${mode}`
+  useEffect(() => {
+    // An amplitude of another axis or mode is never carried over.
+    setAmplitude(null)
+  }, [key])
+  const bus = buses.find((each) => drive.ports.some((port) => port.url === each.url && each.cyclic))
+  const values = [amplitude, frequency, last, duration, acceleration, travel, speed, torque]
+  const go = () =>
+    start.run(async () => {
+      if (
+        amplitude === null ||
+        frequency === null ||
+        last === null ||
+        duration === null ||
+        acceleration === null ||
+        travel === null ||
+        speed === null ||
+        torque === null
+      )
+        return
+      const job = await ask(
+        api.POST('/api/v1/drives/{drive_id}/jobs/generate', {
+          params: { path: { drive_id: drive.id } },
+          body: {
+            mode,
+            shape,
+            amplitude,
+            duration_s: duration,
+            frequency_hz: frequency,
+            frequency_end_hz: last,
+            acceleration,
+            travel_limit: travel,
+            speed_limit: speed,
+            torque_limit: torque,
+          },
+        }),
+      )
+      setJob(job)
+      onStarted(job.id)
+    })
+  return (
+    <Panel title={t('signal.title')}>
+      <p className="dim">{t('signal.help')}</p>
+      {!bus?.cyclic?.running && (
+        <p className="note warn">
+          {t('signal.notRunning')} <a href="#/connect">{t('page.connect')}</a>
+        </p>
+      )}
+      <SegmentedControl
+        fullWidth
+        value={mode}
+        onChange={(next) => setMode(next)}
+        data={possible.map((each) => ({ value: each, label: t(`signal.mode.${each}`) }))}
+      />
+      <div className="fields">
+        <NativeSelect
+          label={t('signal.shape')}
+          value={shape}
+          onChange={(event) => setShape(event.currentTarget.value as GenerateRequest['shape'])}
+          data={SHAPES.map((each) => ({ value: each, label: t(`signal.${each}`) }))}
+        />
+        <NumberField
+          label={t('signal.amplitude')}
+          unit={units[MODES[mode].quantity] ?? ''}
+          value={amplitude}
+          onChange={setAmplitude}
+        />
+        {(shape === 'sine' || shape === 'chirp') && (
+          <NumberField
+            label={t(shape === 'chirp' ? 'signal.from' : 'signal.frequency')}
+            unit="Hz"
+            value={frequency}
+            onChange={setFrequency}
+            above={0}
+            max={2000}
+          />
+        )}
+        {shape === 'chirp' && (
+          <NumberField
+            label={t('signal.to')}
+            unit="Hz"
+            value={last}
+            onChange={setLast}
+            above={0}
+            max={2000}
+          />
+        )}
+        {(shape === 'ramp' || shape === 'trapezoid') && (
+          <NumberField
+            label={t('signal.slope')}
+            unit={`${units[MODES[mode].quantity] ?? ''}/s`}
+            value={acceleration}
+            onChange={setAcceleration}
+            above={0}
+          />
+        )}
+        <NumberField
+          label={t('signal.duration')}
+          unit="s"
+          value={duration}
+          onChange={setDuration}
+          above={0}
+          max={120}
+        />
+        <NumberField
+          label={t('motion.travelLimit')}
+          unit={units.position ?? ''}
+          value={travel}
+          onChange={setTravel}
+          above={0}
+        />
+        <NumberField
+          label={t('move.speedLimit')}
+          unit={units.velocity ?? ''}
+          value={speed}
+          onChange={setSpeed}
+          above={0}
+        />
+        <NumberField
+          label={t('motion.torqueLimit')}
+          unit="%"
+          value={torque}
+          onChange={setTorque}
+          above={0}
+          max={400}
+        />
+      </div>
+      <Button
+        variant="filled"
+        disabled={
+          values.includes(null) ||
+          !bus?.cyclic?.running ||
+          state?.moving_job != null ||
+          !state?.fresh
+        }
+        loading={start.busy}
+        onClick={() => void go()}
+      >
+        {t('signal.start')}
+      </Button>
+      <ProblemNote problem={start.problem} onClose={start.clear} />
+    </Panel>
+  )
+}
