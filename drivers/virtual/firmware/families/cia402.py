@@ -244,8 +244,8 @@ class Cia402:
         gains = self._profile.gains
         rotor = motor.rotor_inertia_kgm2
         parameter = self._profile.by_key.get(gains.inertia or "") if gains else None
-        if gains is None or parameter is None:
-            return rotor
+        if gains is None or parameter is None or gains.inertia_meaning is None:
+            return rotor  # what a ratio without a printed unit means, nobody knows (003:711)
         number = float(parameter.to_value(od.number(parameter.key)))
         if gains.inertia_meaning == "ratio_percent":
             return rotor * (1 + number / 100)
