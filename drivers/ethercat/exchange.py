@@ -4,31 +4,25 @@ from __future__ import annotations
 
 import array
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TypeVar
 
 from drivers.cia402 import State
-from drivers.errors import DriveError, LinkTimeout, NotAllowed, ProtocolError
-from drivers.ethercat import coe
+from drivers.errors import DriveError, NotAllowed
 from drivers.ethercat import setup as setup_
 from drivers.ethercat.al_status import ERROR_BIT, AlState
-from drivers.ethercat.cyclic import CyclicLoop, Image, layout, percentile_us, places
-from drivers.ethercat.lanes import Done, LaneName, Lanes
+from drivers.ethercat.cyclic import CyclicLoop, Image, layout, percentile_us
+from drivers.ethercat.lanes import Done, Lanes
 from drivers.ethercat.mailbox import Pause, Steps
-from drivers.ethercat.mapping import Entry, Pdo
 from drivers.ethercat.playback import AxisLoop, Limits, Motion
+from drivers.ethercat.preparation import Preparation, Report
 from drivers.ethercat.protocol import Message
 from drivers.ethercat.ring import Ring
-from drivers.ethercat.segment import IO_MAP_BYTES, Segment
+from drivers.ethercat.segment import Segment
 from drivers.ethercat.setup import Snapshot, StationSetup
-from drivers.ethercat.station import Station, al_status, change_state, identify
+from drivers.ethercat.station import Station, al_status, change_state
 
-CYCLE_NS = (250_000, 10_000_000)
-_SETUP_S, _LEAVE_S, _SETTLE_DC_S, _SETTLE_S = 30.0, 0.5, 0.4, 0.02
-T = TypeVar("T")
-Report = Callable[[str, int | None, str], None]
-"""Kind of event, station, text."""
+_LEAVE_S, _SETTLE_DC_S, _SETTLE_S = 0.5, 0.4, 0.02
 
 
 class Exchange:
@@ -47,175 +41,31 @@ class Exchange:
         self._cycle_ns = 1_000_000
         self._dc = False
         self._leaving: tuple[float, Done] | None = None
+        self._preparation = Preparation(segment, ring, lanes, report)
         self._healing: set[int] = set()
         self.operational = False
         """All configured stations have reached OP and none was asked to leave it."""
 
-    # Set-up --------------------------------------------------------------------------------
-
     def prepare(self, stations: Sequence[Station]) -> None:
         """Identify all stations after a search, which leaves those that can in PREOP."""
         self._images = []
-        jobs = {s.number: identify(s, time.monotonic) for s in stations}
-        self._run("mailbox", jobs, "identifying the stations")
+        self._preparation.identify(stations)
 
     def configure(self, stations: Sequence[Station], message: Message) -> Message:
-        """Write mappings, build the IO map, set clocks and watchdogs; ends in SAFEOP.
-
-        All stations must be in PREOP with an address, as after a search.
-
-        Raises:
-            NotAllowed: cycle, mapping or watchdog is not possible, with drive and reason.
-        """
-        cycle_ns = int(message["cycle_ns"])
-        if not CYCLE_NS[0] <= cycle_ns <= CYCLE_NS[1]:
-            raise NotAllowed(
-                f"a cycle of {cycle_ns / 1000:g} µs is not possible", limit="250 µs to 10 ms"
-            )
-        setup_.interpolation_period(cycle_ns)
+        """Set everything up; see `Preparation.configure`."""
+        prepared = self._preparation.configure(stations, message)
         self._stations = stations
-        self._cycle_ns = cycle_ns
-        self._dc = bool(message["dc"]) and all(s.distributed_clock for s in stations)
-        watchdog_ms = max(float(message["watchdog_ms"]), 5 * cycle_ns / 1e6)
-        self.setups = {
-            number: StationSetup(
-                _pdo(plan["rx"]), _pdo(plan["tx"]), cycle_ns, self._dc, watchdog_ms
-            )
-            for number, plan in message["stations"].items()
-        }
-        self._write_mappings()
-        initial = self._map()
-        self._clocks_and_watchdogs()
-        self._images = [self._image(number, initial[number]) for number in sorted(self.setups)]
-        self._ring.prepare(sum(i.output_size + i.input_size for i in self._images))
+        self._cycle_ns, self._dc = prepared.cycle_ns, prepared.dc
+        self.setups, self._snapshots = prepared.setups, prepared.snapshots
+        self._images = prepared.images
         return {
-            "dc": self._dc,
-            "watchdog_ms": watchdog_ms,
+            "dc": prepared.dc,
+            "watchdog_ms": prepared.watchdog_ms,
             "images": [
                 {"station": i.station, "outputs": i.output_size, "inputs": i.input_size}
                 for i in self._images
             ],
         }
-
-    def _write_mappings(self) -> None:
-        jobs = {
-            number: setup_.write_mapping(self._stations[number - 1], plan)
-            for number, plan in self.setups.items()
-        }
-        self._run("mailbox", jobs, "writing the process data mapping")
-
-    def _map(self) -> dict[int, list[int]]:
-        """Build the IO map; returns the values that the outputs begin with."""
-        sizes = {
-            station.number: setup_.assigned_bytes(station)
-            for station in self._stations
-            if station.mailbox is not None
-        }
-        total = sum(self._run("mailbox", sizes, "reading the process data sizes").values())
-        initial = self._run(
-            "mailbox",
-            {
-                number: setup_.initial_outputs(self._stations[number - 1], plan.rx.entries)
-                for number, plan in self.setups.items()
-            },
-            "reading the values of the mapped objects",
-        )
-        # An emergency that lies in a mailbox would make SOEM's mapping fail.
-        drains = {s.number: s.box.drain() for s in self._stations if s.mailbox is not None}
-        self._run("mailbox", drains, "emptying the mailboxes")
-        if total > IO_MAP_BYTES:
-            self._segment.map(total)
-        self._promise("building the process data map")
-        self._segment.map(total)
-        for number, plan in self.setups.items():
-            told = self._segment.sizes(number)
-            if told != (plan.rx.size, plan.tx.size):
-                raise ProtocolError(
-                    f"station {number} maps {told[0]} bytes of outputs and {told[1]} of inputs,"
-                    f" {plan.rx.size} and {plan.tx.size} were written",
-                    remedy="the drive keeps a mapping of its own: use its fixed process data",
-                )
-        return initial
-
-    def _clocks_and_watchdogs(self) -> None:
-        self._promise("starting the distributed clocks")
-        if self._segment.master.config_dc() and self._dc:
-            for number in self.setups:
-                self._segment.slaves[number - 1].dc_sync(True, self._cycle_ns)
-        # SOEM used the mailboxes by itself: its counter is unknown to us.
-        fences = {
-            s.number: coe.settle(s.box, force=True) for s in self._stations if s.mailbox is not None
-        }
-        self._run("mailbox", fences, "taking the mailboxes over")
-        guards = {
-            number: setup_.arm_watchdog(self._stations[number - 1], plan.watchdog_ms)
-            for number, plan in self.setups.items()
-        }
-        self._run("register", guards, "setting the watchdogs")
-        self._snapshots = self._run(
-            "register", {n: setup_.take_snapshot() for n in self.setups}, "noting the registers"
-        )
-        states = {
-            station.number: change_state(station, AlState.SAFEOP, time.monotonic)
-            for station in self._stations
-        }
-        self._run("register", states, "going to SAFEOP", optional=set(states) - set(self.setups))
-
-    def _image(self, number: int, initial: list[int]) -> Image:
-        plan = self.setups[number]
-        rx, tx = layout(plan.rx.entries), layout(plan.tx.entries)
-        axis = AxisLoop(
-            number,
-            inputs=places(plan.tx.entries),
-            outputs=places(plan.rx.entries),
-            output_count=len(initial),
-            cycle_s=self._cycle_ns / 1e9,
-            report=lambda station, text: self._report("fault", station, text),
-        )
-        axis.outputs[:] = initial
-        wkc = (2 if rx.size else 0) + (1 if tx.size else 0)
-        return Image(
-            number, axis, tx.unpack, rx.pack, rx.size, tx.size, wkc, bytes(rx.size), bytes(tx.size)
-        )
-
-    def _promise(self, doing: str) -> None:
-        self._ring.host_lives_until(time.monotonic_ns() + int(_SETUP_S * 1e9), doing)
-
-    def _run(
-        self,
-        lane: LaneName,
-        jobs: Mapping[int, Steps[T]],
-        doing: str,
-        optional: set[int] | frozenset[int] = frozenset(),
-    ) -> dict[int, T]:
-        """Run one transaction per station, all at once, to the end."""
-        self._promise(doing)
-        results: dict[int, T] = {}
-        errors: dict[int, DriveError] = {}
-
-        def done_for(number: int) -> Done:
-            def done(result: T, error: DriveError | None) -> None:
-                if error is None:
-                    results[number] = result
-                else:
-                    errors[number] = error
-
-            return done
-
-        for number, steps in jobs.items():
-            self._lanes.submit(number, lane, steps, done_for(number))
-        deadline = time.monotonic() + _SETUP_S
-        while len(results) + len(errors) < len(jobs):
-            if time.monotonic() > deadline:
-                self._lanes.drop(f"{doing} takes longer than {_SETUP_S:g} s")
-                raise LinkTimeout(f"{doing} takes longer than {_SETUP_S:g} s")
-            if not self._lanes.step():
-                time.sleep(0.0002)
-        for number, error in errors.items():
-            if number not in optional:
-                raise error
-            self._report("state", number, error.message)
-        return results
 
     # Start and stop ------------------------------------------------------------------------
 
@@ -448,10 +298,6 @@ class Exchange:
                 for image in loop.images
             },
         }
-
-
-def _pdo(plan: Message) -> Pdo:
-    return Pdo(plan["index"], tuple(Entry(*entry) for entry in plan["entries"]), plan["write"])
 
 
 def _motion(item: Message, cycle_ns: int) -> Motion:

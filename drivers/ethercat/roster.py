@@ -1,0 +1,275 @@
+"""The stations of a segment: finding them, watching them, taking them up again."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable
+
+from drivers.errors import Busy, DriveError, LinkLost
+from drivers.ethercat import sii
+from drivers.ethercat import station as transactions
+from drivers.ethercat.al_status import ERROR_BIT, AlState, al_status_text, state_name
+from drivers.ethercat.exchange import Exchange
+from drivers.ethercat.lanes import Lanes
+from drivers.ethercat.mailbox import Mailbox, Steps
+from drivers.ethercat.protocol import Message
+from drivers.ethercat.ring import Ring
+from drivers.ethercat.segment import Segment
+from drivers.ethercat.setup import restore_mailbox
+from drivers.ethercat.station import Station
+
+_FIND_S, _WATCH_S, _REOPEN_S = 30.0, 0.25, 1.0
+_MIN_MAILBOX = 16
+
+Send = Callable[[Message], None]
+
+
+class Roster:
+    """Knows which stations there are and how they are; tells of every change."""
+
+    def __init__(self, segment: Segment, lanes: Lanes, ring: Ring, send: Send) -> None:
+        self.segment = segment
+        self.lanes = lanes
+        self.exchange = Exchange(segment, ring, lanes, self.event)
+        self.stations: list[Station] = []
+        self.attached = False
+        self.is_open = False
+        self.new_aliases: set[int] = set()
+        self._ring = ring
+        self._send = send
+        self._next_watch = 0.0
+        self._next_open = 0.0
+        self._search_due = False
+        self._managers: dict[int, bytes] = {}
+        self._emergencies: dict[int, tuple[bytes, float]] = {}
+
+    def open(self) -> None:
+        """Open the interface; see `Segment.open`."""
+        self.segment.open()
+        self.is_open = True
+
+    # Watching ------------------------------------------------------------------------------
+
+    def housekeeping(self, now: float) -> None:
+        """Look after lost and returned stations, and after the interface itself."""
+        self.exchange.housekeeping()
+        if now < self._next_watch:
+            return
+        self._next_watch = now + _WATCH_S
+        if not self.is_open:
+            self._reopen(now)
+            return
+        if self.segment.replaced():
+            self._interface_gone()
+            return
+        if self._search_due:
+            self._search_again(now)
+        for station in self.stations:
+            if not self.lanes.busy(station.number, "register"):
+                self.lanes.submit(station.number, "register", self._watch(station), _ignore)
+            if (
+                station.mailbox is not None
+                and not station.lost
+                and station.al_state & 0x0F > AlState.INIT
+                and not self.lanes.busy(station.number, "mailbox")
+            ):
+                self.lanes.submit(station.number, "mailbox", station.box.drain(), _ignore)
+
+    def _search_again(self, now: float) -> None:
+        if now < self._next_open or self.exchange.loop is not None:
+            return
+        self._next_open = now + _REOPEN_S
+        before = len(self.stations)
+        self.attach_and_identify()
+        if len(self.stations) == before:
+            self._search_due = False
+            for number in self.new_aliases:
+                self.event("back", number, f"station {number} was switched on again")
+            self.new_aliases.clear()
+
+    def _interface_gone(self) -> None:
+        why = f"the interface {self.segment.interface} is gone"
+        self.exchange.abandon()
+        self.lanes.drop(why)
+        self.segment.close()
+        self.is_open = self.attached = False
+        self.stations = []
+        self.event("lost", None, why)
+
+    def _reopen(self, now: float) -> None:
+        if now < self._next_open:
+            return
+        self._next_open = now + _REOPEN_S
+        try:
+            self.segment.open()
+        except DriveError:
+            return
+        self.is_open = True
+        self.event("back", None, f"the interface {self.segment.interface} is back")
+
+    def _watch(self, station: Station) -> Steps[None]:
+        before = station.al_state
+        answers = False
+        for _ in range(3):
+            answers = yield from transactions.al_status(station)
+            if answers:
+                break
+        if not answers:
+            self._missing(station)
+            return
+        if station.lost:
+            self._returned(station, restarted=False)
+        elif self.exchange.operational and station.number in self.exchange.setups:
+            if station.al_state != AlState.OP:
+                self._fell_back(station, before)
+        elif station.al_state != before and station.al_state & ERROR_BIT:
+            self.event("state", station.number, self.al_words(station))
+
+    def _fell_back(self, station: Station, before: int) -> None:
+        if self.exchange.healing(station.number):
+            return
+        if station.al_state != before:
+            self.event("state", station.number, self.al_words(station))
+        self.exchange.station_lost(station.number)
+        self.exchange.heal(station, restarted=False)
+
+    def _missing(self, station: Station) -> None:
+        if not station.lost:
+            station.lost = True
+            station.al_state = 0
+            self.event(
+                "lost", station.number,
+                f"station {station.number} ({station.name}) no longer answers:"
+                " supply off or cable cut",
+            )  # fmt: skip
+            self.exchange.station_lost(station.number)
+        if self.segment.recover(station.number):
+            self._returned(station, restarted=True)
+        elif station.number in self.new_aliases and self.exchange.loop is None:
+            # SOEM knows a slave by its old alias and refuses it with the new one.
+            self._search_due = True
+
+    def _returned(self, station: Station, *, restarted: bool) -> None:
+        station.lost = False
+        how = "was switched on again" if restarted else "answers again"
+        self.event("back", station.number, f"station {station.number} {how}")
+        if self.exchange.loop is not None and station.number in self.exchange.setups:
+            self.exchange.heal(station, restarted=restarted)
+        elif restarted and station.mailbox is not None:
+            managers = self._managers[station.number]
+            steps = restore_mailbox(station, managers, time.monotonic)
+            self.lanes.submit(station.number, "mailbox", steps, _ignore)
+
+    def al_words(self, station: Station) -> str:
+        """AL state and status of a station in words."""
+        words = f"station {station.number} is in {state_name(station.al_state)}"
+        if station.al_state & ERROR_BIT:
+            words += f": {al_status_text(station.al_code).text}"
+        return words
+
+    def event(self, kind: str, station: int | None, text: str, code: int | None = None) -> None:
+        """Tell the server; the figures go first, so that who looks at them sees the same."""
+        self._send({"event": "status"} | self.status())
+        self._send({"event": "link", "kind": kind, "station": station, "text": text, "code": code})
+
+    def _emergency(self, number: int) -> Callable[[bytes], None]:
+        def received(data: bytes) -> None:
+            # SOEM-era firmware repeats an emergency until it is read: once a second is enough.
+            last, at = self._emergencies.get(number, (b"", 0.0))
+            now = time.monotonic()
+            if data == last and now - at < 1.0:
+                return
+            self._emergencies[number] = (data, now)
+            code, register = struct.unpack_from("<HB", data)
+            text = (
+                f"station {number}: emergency {code:#06x}, error register {register:#04x},"
+                f" data {data[3:8].hex(' ')}"
+                if code
+                else f"station {number}: the error is gone"
+            )
+            self.event("emergency", number, text, code)
+
+        return received
+
+    # Finding -------------------------------------------------------------------------------
+
+    def attach(self) -> None:
+        """Search the segment and make the stations; blocks for as long as SOEM takes."""
+        if self.exchange.loop is not None:
+            raise Busy(
+                "the cyclic exchange runs on this segment",
+                remedy="stop it first: a search resets every drive",
+            )
+        self.lanes.drop("the segment is being searched again")
+        self._ring.host_lives_until(
+            time.monotonic_ns() + int(_FIND_S * 1e9), "searching the segment"
+        )
+        self.segment.find()
+        self.stations = [self._make_station(n + 1) for n in range(len(self.segment.slaves))]
+        self.attached = True
+
+    def attach_and_identify(self) -> None:
+        """Search the segment and begin to identify what is there."""
+        self.attach()
+        for found in self.stations:
+            steps = transactions.identify(found, time.monotonic)
+            self.lanes.submit(found.number, "mailbox", steps, _ignore)
+
+    def _make_station(self, number: int) -> Station:
+        slave = self.segment.slaves[number - 1]
+        station = Station(number, slave.man, slave.id, slave.rev, slave.name)
+        serial = int.from_bytes(slave.eeprom_read(sii.SERIAL_WORD), "little")
+        station.serial = serial or None
+        managers = self.segment.read(number, 0x800, 16)
+        if managers is not None:
+            self._managers[number] = managers
+            out_at, out_size, in_at, in_size = struct.unpack("<HH4xHH4x", managers)
+            if min(out_size, in_size) >= _MIN_MAILBOX:
+                station.mailbox = Mailbox(
+                    out_at, out_size, in_at, in_size, time.monotonic, self._emergency(number)
+                )
+        return station
+
+    def station(self, message: Message) -> Station:
+        """The station a message is about; searches the segment if that was not done yet."""
+        number = int(message["station"])
+        if not self.attached:
+            self.attach_and_identify()
+        if not 1 <= number <= len(self.stations):
+            self.attached = self.attached and bool(self.stations)
+            raise LinkLost(
+                f"there is no station {number} on {self.segment.interface}:"
+                f" {len(self.stations)} were found",
+                remedy="check supply and cables, then scan again",
+            )
+        station = self.stations[number - 1]
+        if station.lost:
+            raise LinkLost(
+                f"station {number} ({station.name}) does not answer",
+                remedy="check supply and cable; it is taken up again by itself",
+            )
+        return station
+
+    def status(self) -> Message:
+        """The state of everything, sent several times a second."""
+        return {
+            "attached": self.attached,
+            "open": self.is_open,
+            "frames": self.lanes.frames,
+            "late_frames": self.segment.late_frames,
+            "stations": {
+                s.number: {
+                    "lost": s.lost,
+                    "al": s.al_state,
+                    "words": "no answer" if s.lost else self.al_words(s),
+                    "repeats": s.mailbox.repeats if s.mailbox is not None else 0,
+                }
+                for s in self.stations
+            },
+            "cyclic": self.exchange.status(),
+        }
+
+
+def _ignore(_result: object, _error: DriveError | None) -> None:
+    """For transactions that report by events."""
