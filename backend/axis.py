@@ -19,7 +19,7 @@ from backend.faults import active_faults, fault_keys
 from backend.units import AxisUnits, read_units
 from drivers import cia402
 from drivers.cia402 import Mode, State
-from drivers.errors import DriveError, LinkTimeout, NotAllowed
+from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange
 from drivers.link import OwnsPowerState
 from profiles.schema import Fault, Raw
 
@@ -371,8 +371,7 @@ class Axis:
             for role in ("torque_limit_positive", "torque_limit_negative", "max_torque")
             if (key := drive.key(role)) is not None
         ]
-        mode_before = drive.key("mode")
-        async with self.restoring(*limits, *([mode_before] if mode_before else [])):
+        async with self.restoring(*limits, *await self._restorable_mode()):
             await self._limit_torque(limits, envelope.torque_percent)
             await self.set_mode(mode)
             # A stale set-point must not start to move the axis when it is enabled.
@@ -382,6 +381,17 @@ class Axis:
                 yield
             finally:
                 await shielded(lambda: self._leave(before, mode), CLEANUP_TIMEOUT_S, drive.name)
+
+    async def _restorable_mode(self) -> list[str]:
+        """The mode's key, unless the drive shows one that cannot be written (none, at power-on)."""
+        key = self.drive.key("mode")
+        if key is None:
+            return []
+        try:
+            self.drive.check(self.drive.parameter(key), await self.drive.raw(key))
+        except OutOfRange:
+            return []
+        return [key]
 
     async def _limit_torque(self, limits: list[str], percent: float) -> None:
         units = await self.units()

@@ -23,6 +23,7 @@ from backend.monitor import Monitor, Snapshot
 from backend.scope import ScopeHub
 from drivers.errors import Busy, DriveError, NotAllowed, Rejected
 from drivers.link import Address, Found, Link, LinkEvent, NeedsProfile
+from drivers.modbus.link import RegisterLink
 from drivers.urls import link_for
 from profiles import load_all, load_profile
 from profiles.schema import Profile
@@ -153,7 +154,12 @@ class Bench:
         return next((u for u, link in self.links.items() if link is port.link), port.link.url)
 
     async def scan(
-        self, url: str, stations: Sequence[int] | None, progress: Callable[[float, str], None]
+        self,
+        url: str,
+        stations: Sequence[int] | None,
+        progress: Callable[[float, str], None],
+        *,
+        stop_after_first: bool = False,
     ) -> list[Found]:
         """Look for drives on a bus.
 
@@ -165,7 +171,11 @@ class Bench:
         for member in self.members.values():
             if any(port.link is link for port in member.drive.ports):
                 self.require_idle(member)
-        found = await link.scan(progress, stations)
+        if stop_after_first and isinstance(link, RegisterLink):
+            # Only there is one address asked after the other, each at the price of a time-out.
+            found = await link.scan(progress, stations, stop_after=1)
+        else:
+            found = await link.scan(progress, stations)
         self.journal.add(f"{url}: found {len(found)} drives")
         return found
 
@@ -266,13 +276,7 @@ class Bench:
             Busy: another drive uses this station. LinkLost: the bus cannot be opened.
         """
         link = await self.link(url)
-        for member in self.members.values():
-            if any(p.link is link and p.station == station for p in member.drive.ports):
-                raise Busy(
-                    f"{url} station {station} is already connected as {member.drive.name}",
-                    drive=member.drive.name,
-                    remedy="use that drive, or remove it first",
-                )
+        self._require_free(link, url, station)
         facts = load_profile(profile)
         spec = facts.link(link.kind)
         if isinstance(link, NeedsProfile):
@@ -281,6 +285,43 @@ class Bench:
         drive = Drive(drive_id, name or drive_id, facts, [Port(link, station, spec)])
         drive.found = found
         return self._add(drive)
+
+    async def add_port(self, drive_id: str, url: str, station: int) -> Member:
+        """Connect a drive over a second bus, so that each parameter goes the way that carries it.
+
+        Raises:
+            NotAllowed: its family has no such link. Busy: the station is in use.
+        """
+        member = self.member(drive_id)
+        drive = member.drive
+        self.require_idle(member)
+        link = await self.link(url)
+        self._require_free(link, url, station)
+        spec = drive.profile.link(link.kind)
+        if spec is None:
+            raise NotAllowed(
+                f"{drive.profile.title} has no {link.kind} port",
+                drive=drive.name,
+                value=url,
+                limit=", ".join(known.kind for known in drive.profile.links),
+                remedy="choose one of its links",
+            )
+        if isinstance(link, NeedsProfile):
+            link.configure_station(station, drive.profile)
+        drive.ports = (*drive.ports, Port(link, station, spec))
+        self._save()
+        self.journal.add(f"{drive.name} is reached over {url} too", drive=drive.id)
+        self._drives_changed()
+        return member
+
+    def _require_free(self, link: Link, url: str, station: int) -> None:
+        for member in self.members.values():
+            if any(p.link is link and p.station == station for p in member.drive.ports):
+                raise Busy(
+                    f"{url} station {station} is already connected as {member.drive.name}",
+                    drive=member.drive.name,
+                    remedy="use that drive, or remove it first",
+                )
 
     def _add(self, drive: Drive) -> Member:
         axis = Axis(drive)
@@ -450,6 +491,8 @@ class Bench:
                     port["url"], port["station"], item["profile"], item["name"]
                 )
                 member.drive.notes = item.get("notes", "")
+                for other in item["ports"][1:]:
+                    await self.add_port(member.drive.id, other["url"], other["station"])
                 if isinstance(serial := item.get("serial"), int):
                     member.drive.found = Found(port["station"], serial=serial)
                     self._returned(member.drive.id)

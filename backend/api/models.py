@@ -164,6 +164,13 @@ class ConnectRequest(Message):
     name: str = Field(default="", max_length=60)
 
 
+class PortRequest(Message):
+    """A further port of a drive that is already connected."""
+
+    url: str
+    station: int = Field(ge=0, le=65535)
+
+
 class DriveUpdate(Message):
     """Name or notes of a drive."""
 

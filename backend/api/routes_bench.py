@@ -21,6 +21,7 @@ from backend.api.models import (
     Interfaces,
     JobInfo,
     LogEntry,
+    PortRequest,
     ProfileInfo,
     ScanRequest,
     Session,
@@ -115,7 +116,9 @@ async def scan(bench: TheBench, request: ScanRequest) -> JobInfo:
     """Look for drives; the job's result is ``{"found": [FoundDrive]}``."""
 
     async def work(progress: Progress) -> JobResult:
-        seen: list[Found] = await bench.scan(request.url, request.stations, progress)
+        seen: list[Found] = await bench.scan(
+            request.url, request.stations, progress, stop_after_first=request.stop_after_first
+        )
         kind = (await bench.link(request.url)).kind
         drives = [convert.found_drive(bench, request.url, kind, found) for found in seen]
         return {"found": [drive.model_dump(mode="json") for drive in drives]}
@@ -155,6 +158,15 @@ async def update_drive(
     bench.rename(member.drive.id, change.name, change.notes)
     if change.accept_identity:
         await bench.accept_identity(member.drive.id)
+    return convert.drive_summary(bench, member, connection)
+
+
+@router.post("/drives/{drive_id}/ports")
+async def add_port(
+    bench: TheBench, member: Controlled, request: PortRequest, connection: Connection = None
+) -> DriveSummary:
+    """Connect a drive over a second bus; each parameter then goes the way that carries it."""
+    await bench.add_port(member.drive.id, request.url, request.station)
     return convert.drive_summary(bench, member, connection)
 
 

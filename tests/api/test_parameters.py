@@ -15,6 +15,12 @@ def test_scan_finds_both_drives(station: Station) -> None:
     assert "mms7" in [match["profile"] for match in found[1]["matches"]]
 
 
+def test_scan_may_stop_at_the_first_drive(station: Station) -> None:
+    body = {"url": "mlink://virtual0", "stations": [1, 2, 3], "stop_after_first": True}
+    result = station.done(station.http.post("/scan", json=body))
+    assert [drive["station"] for drive in result["found"]] == [1]
+
+
 def test_read_all(station: Station, x: str) -> None:
     result = station.done(station.http.post(f"/drives/{x}/jobs/read_all", json={}))
     rows = station.ok(station.http.get(f"/drives/{x}/parameters"))

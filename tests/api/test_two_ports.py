@@ -1,0 +1,80 @@
+"""DS_C on CANopen and Modbus: one drive, and each parameter goes by the port that carries it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from tests.support.station import Station, until
+
+CAN, MODBUS = "canopen://virtual0", "modbus://virtual0"
+
+
+@pytest.fixture
+def z(station: Station) -> Iterator[str]:
+    drive = station.add(3, CAN, "ds_c", "Z")
+    yield drive
+    station.http.post("/stop", json={})
+    station.ok(station.http.delete(f"/drives/{drive}"))
+
+
+def test_scan_finds_it_on_the_can_bus(station: Station) -> None:
+    result = station.done(station.http.post("/scan", json={"url": CAN, "stations": [2, 3, 4]}))
+    assert [drive["station"] for drive in result["found"]] == [3]
+
+
+def test_one_port_says_what_is_missing_and_why(station: Station, z: str) -> None:
+    rows = {row["key"]: row for row in station.ok(station.http.get(f"/drives/{z}/parameters"))}
+    assert rows["6064:00"]["reachable"]
+    assert not rows["PA_38"]["reachable"]
+    assert "only over Modbus" in rows["PA_38"]["unreachable_why"]
+    answer = station.http.put(f"/drives/{z}/parameters/PA_38", json={"raw": 100})
+    assert answer.status_code == 409
+
+
+def test_two_ports_carry_everything(station: Station, z: str) -> None:
+    drive = station.ok(station.http.post(f"/drives/{z}/ports", json={"url": MODBUS, "station": 1}))
+    assert [port["kind"] for port in drive["ports"]] == ["canopen", "modbus"]
+    answer = station.ok(station.http.put(f"/drives/{z}/parameters/PA_38", json={"raw": 123}))
+    assert answer["raw"] == 123
+    station.ok(station.http.put(f"/drives/{z}/parameters/6083:00", json={"raw": 250}))
+    result = station.done(station.http.post(f"/drives/{z}/jobs/read_all", json={}), 60)
+    assert result["failed"] == {}
+    again = station.http.post("/drives", json={"url": MODBUS, "station": 1, "profile": "ds_c"})
+    assert again.status_code == 409
+    assert "already connected as Z" in again.json()["detail"]
+
+
+def test_units_are_rpm_and_times(station: Station, z: str) -> None:
+    state = station.state(z)
+    assert state["units"]["velocity"] == "rpm"
+    assert state["state"] == "Switch on disabled"
+
+
+def test_jog_and_move(station: Station, z: str) -> None:
+    with station.live() as page:
+        page.send(type="jog_start", drive=z, direction=1, speed=200, acceleration=4000,
+                  travel_limit=10, torque_limit=100)  # fmt: skip
+        end = time.monotonic() + 1.5
+        while time.monotonic() < end:
+            page.send(type="jog_renew", drive=z)
+            time.sleep(0.02)
+        assert float(station.state(z)["velocity"]) == pytest.approx(200, rel=0.1)
+        page.send(type="jog_stop", drive=z)
+        ended = page.wait("jog_ended", drive=z)
+        assert ended["problem"] is None, ended
+    until(lambda: abs(station.state(z)["velocity"]) < 5, 3)
+    before = float(station.state(z)["position"])
+    body = {"mode": "PP", "target": 1.5, "relative": True, "speed": 600, "acceleration": 6000,
+            "deceleration": 6000, "travel_limit": 3, "torque_limit": 100}  # fmt: skip
+    station.done(station.http.post(f"/drives/{z}/jobs/move", json=body))
+    assert float(station.state(z)["position"]) - before == pytest.approx(1.5, abs=0.02)
+
+
+def test_unplugged_adapter_recovers(station: Station, z: str) -> None:
+    station.drives.command(do="pull", wire=CAN)
+    until(lambda: not station.state(z)["fresh"], 5)
+    station.drives.command(do="heal", wire=CAN)
+    until(lambda: station.state(z)["fresh"], 20, "the drive answers again")
