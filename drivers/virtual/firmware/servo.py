@@ -80,6 +80,7 @@ class VirtualServo:
         self.core = Core(self.profile, self._family, self.od, self.axis)
         self.core.zero_rad = self._zero_rad
         self.control = DeviceControl(self.core)
+        self.control.modes.mode = int(self.core.number("6060:00", 0))
         self.panel = Panel(self.core)
         self.core.apply_settings()
         self._connect()

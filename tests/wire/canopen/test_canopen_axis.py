@@ -20,17 +20,17 @@ from drivers.cia402 import State
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.wires.can_wire import CanWire, PythonCanSide
 from drivers.virtual.wires.canopen import CanopenNode
-from profiles.loader import load_profile
+from profiles.loader import drive_names, load_profile
 
 _numbers = itertools.count()
 SETTINGS = JogSettings(
-    direction=1, speed_rpm=60.0, acceleration_rpm_s=600.0, travel_rev=20.0, torque_percent=200.0
+    direction=1, speed_rpm=60.0, acceleration_rpm_s=3000.0, travel_rev=20.0, torque_percent=200.0
 )
 
 
 @pytest.fixture
-async def axis() -> AsyncIterator[Axis]:
-    profile = load_profile("generic402")
+async def axis(request: pytest.FixtureRequest) -> AsyncIterator[Axis]:
+    profile = load_profile(getattr(request, "param", "generic402"))
     device = make_device(profile, station=3)
     # Compiles the physics before anybody waits for an answer.
     device.advance(time.monotonic_ns())
@@ -54,6 +54,7 @@ async def _hold_for(hold: Hold, seconds: float) -> None:
     hold.release("let go")
 
 
+@pytest.mark.parametrize("axis", sorted({"generic402", "ds_c"} & set(drive_names())), indirect=True)
 async def test_jog_by_short_moves(axis: Axis) -> None:
     start = await axis.position_raw()
     hold = Hold()

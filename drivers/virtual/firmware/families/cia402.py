@@ -103,6 +103,10 @@ class Cia402:
         if gains is not None and gains.convention == "unit":
             keys = (gains.position, gains.speed, gains.integral)
             fallback |= {key: _UNIT_GAIN for key in keys if key is not None}
+        mode = self._profile.by_key.get("6060:00")
+        if mode is not None and mode.enum and 0 not in mode.enum:
+            # A drive without "no mode" starts in one of those that it has (003:230).
+            fallback["6060:00"] = min(self._profile.supported_modes)
         if self.traits.positive_limit_first:
             fallback |= {"607D:01": 2**31 - 1, "607D:02": -(2**31)}
         return fallback
