@@ -194,9 +194,11 @@ class Mailbox:
         dead = 0
         pause_s = 0.0
         if mail and self.usual_s > _WORTH_WAITING_S:
-            yield Pause(min(self.usual_s * 0.8, 0.01))
+            yield Pause(min(self.usual_s * 0.7, 0.01))
+        polls = 0
         while True:
             status = yield Read(SM1_STATUS, 1)
+            polls += 1
             dead = dead + 1 if status is None else 0
             if dead >= _DEAD_READS:
                 self.unsettled = True
@@ -208,7 +210,7 @@ class Mailbox:
                 if answer.protocol == MAILBOX_ERROR:
                     self._raise_error(answer.payload)
                 if matches(answer):
-                    self.usual_s += (self.clock() - asked - self.usual_s) * 0.2
+                    self._learn(self.clock() - asked, polls)
                     return answer.payload
                 continue
             now = self.clock()
@@ -225,6 +227,13 @@ class Mailbox:
             if pause_s:
                 yield Pause(pause_s)
             pause_s = min(pause_s + 0.00002, 0.0005)
+
+    def _learn(self, took_s: float, polls: int) -> None:
+        """An answer that was there at the first look may have been waited for too long."""
+        if polls == 1:
+            self.usual_s *= 0.9
+        else:
+            self.usual_s += (took_s - self.usual_s) * 0.2
 
     def _fetch(self) -> Steps[Mail | None]:
         """Read the full mailbox, asking for a repeat when the frame with it was lost."""

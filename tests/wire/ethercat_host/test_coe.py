@@ -219,3 +219,16 @@ def test_a_mailbox_taken_over_from_soem_may_drop_the_first_mail() -> None:
     slave.run(sdo.settle(box, force=True))
     assert slave.run(sdo.upload(box, 0x6041, 0)) == b"\1\0\0\0"
     assert slave.now < 0.2
+
+
+def test_waiting_for_the_usual_answer_time_does_not_make_it_longer() -> None:
+    """A pause that is learnt from its own length would grow for ever."""
+    slave = ScriptedSlave(lambda _: [expedited(0x6041, 0, b"\0\0")], delay_s=0.001)
+    box = slave.box()
+    for _ in range(30):
+        slave.run(sdo.upload(box, 0x6041, 0))
+    began, frames = slave.now, slave.frames
+    for _ in range(30):
+        slave.run(sdo.upload(box, 0x6041, 0))
+    assert (slave.now - began) / 30 < 0.00135, "1 ms and little more"
+    assert (slave.frames - frames) / 30 < 8, "and without asking all the time"
