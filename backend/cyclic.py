@@ -9,7 +9,15 @@ import numpy as np
 
 from backend.drive import Drive, Port, address_of
 from drivers.errors import Busy, NotAllowed
-from drivers.link import Cyclic, CyclicSignal, Link, OwnsPowerState, ScopeBlock, Unsubscribe
+from drivers.link import (
+    Cyclic,
+    CyclicSignal,
+    KnowsFamilies,
+    Link,
+    OwnsPowerState,
+    ScopeBlock,
+    Unsubscribe,
+)
 
 #: Signals mapped as far as they fit, the important ones first.
 INPUT_ROLES = (
@@ -57,6 +65,8 @@ class CyclicSession:
         inputs, outputs = [], []
         for drive in self.drives:
             port = self._port(drive)
+            if isinstance(self.link, KnowsFamilies):
+                self.link.know(port.station, drive.profile)
             inputs += _signals(drive, port, INPUT_ROLES, ("tx", "rxtx"))
             outputs += _signals(drive, port, OUTPUT_ROLES, ("rx", "rxtx"))
         outputs = _fitting_outputs(self.drives, outputs)

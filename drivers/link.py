@@ -224,6 +224,14 @@ class Cyclic(Protocol):
 
 
 @runtime_checkable
+class KnowsFamilies(Protocol):
+    """A link whose process data depend on what the drive family can map."""
+
+    def know(self, station: int, profile: Profile | None) -> None:
+        """Tell which family a station is; None: unknown."""
+
+
+@runtime_checkable
 class OwnsPowerState(Protocol):
     """A cyclic exchange whose loop writes the control word, so that nobody else may."""
 
