@@ -150,6 +150,7 @@ describe('filters', () => {
     expect(keys('favourites')).toEqual(['6064:00'])
     expect(keys('stopped')).toEqual(['2001:01'])
     expect(keys('differs')).toEqual([])
+    expect(keys('unread')).toEqual(['2005:03', '6064:00', '2001:01'])
   })
   it('do not call a value changed that was never read', () => {
     expect(isChanged(rows[0]!, undefined)).toBe(false)

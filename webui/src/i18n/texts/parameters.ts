@@ -75,6 +75,7 @@ export const parameters = {
   'filter.changed': ['Not default', '非默认'],
   'filter.differs': ['Differs', '有差异'],
   'filter.favourites': ['Favourites', '收藏'],
+  'filter.unread': ['Unread', '未读取'],
   'filter.stopped': ['Set at stop', '停机设置'],
   'column.key': ['Key', '索引'],
   'column.name': ['Name', '名称'],

@@ -37,7 +37,7 @@ export function BenchDrive({ drive }: { drive: DriveSummary }) {
         </span>
       </div>
       <p>
-        {drive.maker} {drive.title}
+        {drive.title.startsWith(drive.maker) ? drive.title : `${drive.maker} ${drive.title}`}
         {drive.partial && <em className="warn-text"> {t('connect.partial')}</em>}
       </p>
       {drive.identity_warning && (
@@ -52,8 +52,12 @@ export function BenchDrive({ drive }: { drive: DriveSummary }) {
         </div>
       )}
       <p className="dim">
-        {drive.serial !== null && `${t('identity.serial')} ${drive.serial} · `}
-        {drive.firmware && `${t('identity.firmware')} ${drive.firmware}`}
+        {[
+          drive.serial !== null && `${t('identity.serial')} ${drive.serial}`,
+          drive.firmware && `${t('identity.firmware')} ${drive.firmware}`,
+        ]
+          .filter(Boolean)
+          .join(' · ')}
       </p>
       {drive.ports.map((port) => (
         <p key={`${port.url} ${port.station}`} className="dim mono">

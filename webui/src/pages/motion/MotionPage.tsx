@@ -12,7 +12,7 @@ import { HomingPanel } from './HomingPanel'
 import { JogPanel } from './JogPanel'
 import { MovePanel } from './MovePanel'
 import { SequencePanel } from './SequencePanel'
-import { hasCyclicModes, SignalPanel } from './SignalPanel'
+import { SignalPanel, useCyclic } from './SignalPanel'
 
 const TABS = ['jog', 'move', 'sequence', 'homing', 'signal'] as const
 
@@ -24,6 +24,7 @@ export function MotionPage({ drive }: { drive: string }) {
   const [jobs, setJobs] = useState<Record<string, string>>({})
   const moving = useJob(state?.moving_job ?? null)
   const mine = jobs[drive] ?? null
+  const cyclic = useCyclic(summary, state)
   if (!summary) return null
   const started = (id: string) => setJobs((old) => ({ ...old, [drive]: id }))
   return (
@@ -42,7 +43,7 @@ export function MotionPage({ drive }: { drive: string }) {
             fullWidth
             value={tab}
             onChange={(next) => setTab(next)}
-            data={TABS.filter((name) => name !== 'signal' || hasCyclicModes(state)).map((name) => ({
+            data={TABS.filter((name) => name !== 'signal' || cyclic).map((name) => ({
               value: name,
               label: t(`motion.tab.${name}`),
             }))}

@@ -20,9 +20,17 @@ const MODES = {
 type Mode = keyof typeof MODES
 const SHAPES = ['step', 'ramp', 'trapezoid', 'sine', 'chirp'] as const
 
-/** Whether a drive has cyclic modes that this panel can command. */
-export const hasCyclicModes = (state: AxisState | null) =>
-  Object.values(MODES).some(({ number }) => state?.modes.includes(number))
+/** Whether an axis has a cyclic mode, and a bus that can exchange process data. */
+export function useCyclic(drive: DriveSummary | null, state: AxisState | null): boolean {
+  const { buses } = useBuses()
+  const has = Object.values(MODES).some(({ number }) => state?.modes.includes(number))
+  return (
+    has &&
+    buses.some(
+      (bus) => bus.cyclic_possible && drive?.ports.some((port) => port.url === bus.url) === true,
+    )
+  )
+}
 
 /** A test signal in a cyclic mode, one value per bus cycle. */
 export function SignalPanel({

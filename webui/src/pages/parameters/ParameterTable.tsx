@@ -129,6 +129,7 @@ function Actions({ drive, shown }: { drive: DriveSummary; shown: ParameterRow[] 
   const act = useAction()
   const jobs = useJobs()
   const [closed, setClosed] = useState<string | null>(null)
+  const [opened] = useState(() => Date.now())
   const job = newest(
     [...jobs.values()].filter((each) => each.drive === drive.id && each.kind === 'read_all'),
   )
@@ -172,12 +173,11 @@ function Actions({ drive, shown }: { drive: DriveSummary; shown: ParameterRow[] 
             ? t('parameters.writing', { done: writing.done, total: writing.total })
             : t('parameters.writeEdited', { count: edits.size })}
         </Button>
-        <Button
-          disabled={edits.size === 0 || writing !== null}
-          onClick={() => discardEdits(drive.id)}
-        >
-          {t('parameters.discard')}
-        </Button>
+        {edits.size > 0 && (
+          <Button disabled={writing !== null} onClick={() => discardEdits(drive.id)}>
+            {t('parameters.discard')}
+          </Button>
+        )}
         <span className="gap" />
         <ProcedureButton drive={drive.id} name="write_settings" label={t('parameters.apply')} />
         <ProcedureButton
@@ -198,7 +198,7 @@ function Actions({ drive, shown }: { drive: DriveSummary; shown: ParameterRow[] 
           {t('parameters.refused', { count: problems.size })}
         </p>
       )}
-      {job && job.id !== closed && (
+      {job && job.id !== closed && !isOld(job, opened) && (
         <>
           <JobNote id={job.id} onClose={() => setClosed(job.id)} />
           <ReadFailures job={job} />
@@ -225,6 +225,9 @@ function ReadFailures({ job }: { job: JobInfo }) {
     </details>
   )
 }
+
+/** A job that had ended before this page was opened is no news. */
+const isOld = (job: JobInfo, opened: number) => job.ended !== null && Date.parse(job.ended) < opened
 
 function newest(jobs: JobInfo[]): JobInfo | null {
   return jobs.reduce<JobInfo | null>(

@@ -8,6 +8,7 @@ export const FILTERS = [
   'differs',
   'favourites',
   'stopped',
+  'unread',
 ] as const
 export type Filter = (typeof FILTERS)[number]
 
@@ -45,6 +46,8 @@ function passes(row: ParameterRow, filter: Filter, marks: Marks): boolean {
       return marks.differs.has(row.key)
     case 'favourites':
       return marks.favourites.has(row.key)
+    case 'unread':
+      return row.reachable && row.access !== 'wo' && (!reading?.time || reading.error !== '')
     case 'stopped':
       return row.settable === 'stopped'
   }
