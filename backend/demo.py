@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -22,10 +22,20 @@ from drivers.virtual.wires.netns import Namespace, NamespaceUnavailable
 class DemoBench:
     """Starts the wires of a bench file and knows their real addresses.
 
+    ``segment_options`` go to the EtherCAT segments (see drivers.virtual.wires.ethercat).
+
     Use as a context manager; leaving it ends all virtual drives.
     """
 
-    def __init__(self, bench: Path | None, folder: Path, nvm: Path | None = None) -> None:
+    def __init__(
+        self,
+        bench: Path | None,
+        folder: Path,
+        nvm: Path | None = None,
+        *,
+        segment_options: Sequence[str] = (),
+    ) -> None:
+        self._segment_options = tuple(segment_options)
         self._file = bench or STANDARD_BENCH
         self._folder = folder
         self._nvm = nvm
@@ -85,7 +95,7 @@ class DemoBench:
             self.problems.append(f"{url} is left out: {error}")
             return
         self._namespaces.append(namespace)
-        arguments = ["--bench", str(self._file), "--on", url]
+        arguments = ["--bench", str(self._file), "--on", url, *self._segment_options]
         if self._nvm is not None:
             arguments += ["--nvm", str(self._nvm)]
         self.segments[url] = VirtualSegment.start(slave, arguments, namespace)

@@ -31,6 +31,7 @@ from backend.analysis.sampling import (
     command_response,
     delay_response,
     hold_response,
+    reported_response,
     sampled_command,
 )
 
@@ -229,7 +230,7 @@ def _continuous_input(
             f, path.command_delay_s + path.response_delay_s
         )
         return [r * whole for r in s.sent]
-    late = delay_response(f, path.response_delay_s)
+    late = reported_response(f, path)
     direct = command_response(f, path)
     inputs: list[ComplexArray] = [r * direct * late for r in s.sent]
     if quantity == "torque_injection":

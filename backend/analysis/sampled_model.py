@@ -25,6 +25,7 @@ from backend.analysis.sampling import (
     delay_response,
     hold_response,
     lag_response,
+    reported_response,
 )
 
 TURN = 2.0 * np.pi
@@ -160,13 +161,13 @@ def seen_response(
     hold = hold_response(all_f, path.sample_rate_hz, path.hold)
     lag = lag_response(all_f, path.current_bandwidth_hz)
     command = delay_response(all_f, path.command_delay_s)
-    plant = model.response(all_f) * delay_response(all_f, delay_s + path.response_delay_s)
+    plant = model.response(all_f) * delay_response(all_f, delay_s) * reported_response(all_f, path)
     controller = lag * loop.response(all_f) * delay_response(all_f, path.loop_delay_s)
     torque = hold * lag * command / (1.0 + controller * plant)
     measured = np.sum(plant * torque, axis=0)
     own = -np.sum(controller * plant * torque, axis=0)
     u = base * delay_response(f, path.command_delay_s) + own
-    return np.asarray(measured / (u * delay_response(f, path.response_delay_s)))
+    return np.asarray(measured / (u * reported_response(f, path)))
 
 
 def _unpack(x: FloatArray, scale: float) -> tuple[MechanicalModel, float]:
@@ -326,7 +327,8 @@ def loop_image_factor(frequency_hz: FloatArray, fit: SampledFit) -> ComplexArray
     images = int(np.clip(np.ceil(6000.0 / path.sample_rate_hz), 2, 6))
     all_f = f[None, :] + np.arange(-images, images + 1)[:, None] * path.sample_rate_hz
     lag = lag_response(all_f, path.current_bandwidth_hz)
-    plant = fit.model.response(all_f) * delay_response(all_f, fit.delay_s + path.response_delay_s)
+    reported = delay_response(all_f, fit.delay_s) * reported_response(all_f, path)
+    plant = fit.model.response(all_f) * reported
     controller = lag * fit.loop.response(all_f) * delay_response(all_f, path.loop_delay_s)
     hold = hold_response(all_f, path.sample_rate_hz, path.hold)
     torque = hold * lag * delay_response(all_f, path.command_delay_s) / (1.0 + controller * plant)

@@ -32,6 +32,8 @@ class SignalPath:
     the true and the reported velocity. ``direct_gain`` is the torque that one unit of injection
     causes at once: 1 for torque offsets, the speed gain for velocity offsets. ``loop_delay_s``
     is what the drive's own loop adds by computing in steps (half of its 50 µs period).
+    ``response_bandwidth_hz`` is the corner of the drive's speed filter, where the reported speed
+    passes one (None: not filtered).
     """
 
     sample_rate_hz: float
@@ -41,6 +43,7 @@ class SignalPath:
     response_delay_s: float = 0.0
     direct_gain: float = 1.0
     loop_delay_s: float = 25e-6
+    response_bandwidth_hz: float | None = None
 
 
 def hold_response(frequency_hz: FloatArray, sample_rate_hz: float, hold: Hold) -> ComplexArray:
@@ -72,6 +75,13 @@ def command_response(frequency_hz: FloatArray, path: SignalPath) -> ComplexArray
         * hold_response(frequency_hz, path.sample_rate_hz, path.hold)
         * lag_response(frequency_hz, path.current_bandwidth_hz)
         * delay_response(frequency_hz, path.command_delay_s)
+    )
+
+
+def reported_response(frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
+    """From the true to the reported quantity: speed filter and delay."""
+    return lag_response(frequency_hz, path.response_bandwidth_hz) * delay_response(
+        frequency_hz, path.response_delay_s
     )
 
 

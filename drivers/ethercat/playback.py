@@ -133,6 +133,8 @@ class AxisLoop:
             and goal is not State.QUICK_STOP_ACTIVE
             and self.phase is not Phase.IDLE
         ):
+            if self.phase is Phase.BRAKING:
+                self._after_brake = goal
             self.stop("the axis is being disabled", goal)
             return
         self.goal = goal

@@ -6,7 +6,7 @@ import asyncio
 import json
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,9 +35,13 @@ def until(condition: Callable[[], object], timeout_s: float = 10.0, what: str = 
 class Station:
     """Server and virtual drives. ``http`` talks to the interface, ``drives`` causes trouble."""
 
-    def __init__(self, folder: Path, bench_file: Path | None = None) -> None:
+    def __init__(
+        self, folder: Path, bench_file: Path | None = None, segment_options: Sequence[str] = ()
+    ) -> None:
         self.folder = folder
-        self.drives = DemoBench(bench_file, folder / "wires", folder / "nvm")
+        self.drives = DemoBench(
+            bench_file, folder / "wires", folder / "nvm", segment_options=segment_options
+        )
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
         self.http = httpx.Client()

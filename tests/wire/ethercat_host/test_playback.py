@@ -267,3 +267,17 @@ def test_play_while_braking_is_refused() -> None:
     bench.axis.stop("stopped by the user")
     with pytest.raises(NotAllowed, match="braking: stopped by the user"):
         bench.play([550])
+
+
+def test_a_goal_given_while_braking_is_kept() -> None:
+    bench = Bench().enabled()
+    bench.play([500 + 5 * n for n in range(200)])
+    bench.step(50)
+    bench.axis.stop("released")
+    bench.step(5)
+    assert bench.axis.phase is Phase.BRAKING
+    bench.axis.drive_to(State.SWITCH_ON_DISABLED, None)
+    bench.step(5)
+    assert bench.axis.phase is Phase.BRAKING, "the brake ramp is not cut short"
+    bench.obey(round(STOP_S / CYCLE_S) + 10)
+    assert bench.axis.state is State.SWITCH_ON_DISABLED

@@ -1,0 +1,193 @@
+"""EtherCAT through the interface: from scan to motion with one set-point per cycle.
+
+The segment's clock follows the frames, so a busy test machine changes nothing but the time that
+the tests take.
+"""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.virtual.wires.netns import unavailable
+from tests.support.station import Live, Station, until
+
+URL = "ethercat://virtual0"
+BENCH = """
+[[axis]]
+name = "A"
+drive = "mms7"
+on = "ethercat://virtual0"
+station = 1
+
+[[axis]]
+name = "B"
+drive = "mms7"
+on = "ethercat://virtual0"
+station = 2
+"""
+JOG = {"speed": 300.0, "acceleration": 3000.0, "travel_limit": 20.0, "torque_limit": 200.0}
+
+
+@pytest.fixture(scope="module")
+def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+    if reason := unavailable():
+        pytest.skip(f"no private network here: {reason}")
+    folder = Path(tmp_path_factory.mktemp("ethercat"))
+    bench = folder / "bench.toml"
+    bench.write_text(BENCH)
+    running = Station(folder, bench, ["--lockstep"])
+    running.start()
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def axes(station: Station) -> Iterator[tuple[str, str]]:
+    names = station.add(1, URL, name="A"), station.add(2, URL, name="B")
+    yield names
+    station.http.post("/stop", json={})
+    station.http.delete("/buses/cyclic", params={"url": URL})
+    for name in names:
+        station.ok(station.http.delete(f"/drives/{name}"))
+
+
+@pytest.fixture
+def cyclic(station: Station, axes: tuple[str, str]) -> tuple[str, str]:
+    bus = station.ok(station.http.post("/buses/cyclic", json={"url": URL, "cycle_us": 1000}))
+    assert bus["cyclic"]["running"]
+    return axes
+
+
+def traces(blocks: list[bytes]) -> tuple[np.ndarray, np.ndarray, int]:
+    """Times [n], samples [n, k] and dropped samples of scope frames."""
+    times, rows_, dropped = [], [], 0
+    for block in blocks:
+        _magic, _sub, _seq, lost, rows, count, flags, t0, dt = struct.unpack_from(
+            "<IIIIHHIdd", block
+        )
+        assert flags == 0, "synchronous blocks need no times of their own"
+        times.append(t0 + dt * np.arange(rows))
+        rows_.append(np.frombuffer(block, "<f4", rows * count, 40).reshape(rows, count))
+        dropped += lost
+    return np.concatenate(times), np.concatenate(rows_), dropped
+
+
+def hold(page: Live, drive: str, seconds: float) -> None:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        page.send(type="jog_renew", drive=drive)
+        time.sleep(0.02)
+
+
+def test_scan_read_write_save(station: Station, axes: tuple[str, str]) -> None:
+    result = station.done(station.http.post("/scan", json={"url": URL}))
+    assert [drive["station"] for drive in result["found"]] == [1, 2]
+    assert result["found"][0]["matches"][0]["profile"] == "mms7"
+    a, _ = axes
+    result = station.done(station.http.post(f"/drives/{a}/jobs/read_all", json={}), 60)
+    assert result["failed"] == {}
+    answer = station.ok(station.http.put(f"/drives/{a}/parameters/2005:03", json={"value": 150}))
+    assert answer["raw"] == 1500
+    assert answer["pending"] == "write_settings"
+    station.done(station.http.post(f"/drives/{a}/procedures/save", json={"confirmed": True}))
+    answer = station.ok(station.http.get(f"/drives/{a}/parameters/2005:03"))
+    assert (answer["pending"], answer["unsaved"]) == ("", False)
+
+
+def test_cyclic_exchange_tells_what_it_carries(station: Station, cyclic: tuple[str, str]) -> None:
+    (bus,) = station.ok(station.http.get("/buses"))
+    assert bus["cyclic"]["cycle_us"] == 1000
+    a, b = cyclic
+    for name in (a, b):
+        assert f"{name}/6064:00" in bus["cyclic"]["channels"]
+    again = station.http.post("/buses/cyclic", json={"url": URL})
+    assert again.status_code == 409
+    refused = station.job(station.http.post("/scan", json={"url": URL}))
+    assert refused["state"] == "failed", "a scan would reset drives that exchange process data"
+
+
+def test_jog_plays_one_position_per_cycle(station: Station, cyclic: tuple[str, str]) -> None:
+    a, b = cyclic
+    with station.live() as page:
+        channels = [{"drive": a, "key": "607A:00"}, {"drive": b, "key": "6064:00"}]
+        page.send(type="scope_start", subscription=1, channels=channels)
+        info = page.wait("scope_info", subscription=1)
+        assert all(channel["synchronous"] for channel in info["channels"])
+        page.send(type="jog_start", drive=a, direction=1, **JOG)
+        hold(page, a, 2.0)
+        page.send(type="jog_stop", drive=a)
+        ended = page.wait("jog_ended", drive=a, timeout_s=20)
+        assert ended["problem"] is None, ended
+        page.send(type="scope_stop", subscription=1)
+    times, samples, _dropped = traces(page.binary)
+    # A cycle that the host missed is no sample; only neighbours in time are compared.
+    neighbours = np.diff(times) < 0.0015
+    steps = np.diff(samples[:, 0])[neighbours]
+    steps = steps[~np.isnan(steps)]
+    # 300 rpm are 327.68 increments in 1 ms: nothing faster, and that for most of the run.
+    assert steps.max() <= 329
+    assert np.count_nonzero(np.abs(steps - 327.68) < 1.5) > 300
+    assert len(times) == len(samples)
+    assert station.state(a)["state"] == "Switch on disabled"
+
+
+def test_silence_of_the_page_brakes(station: Station, cyclic: tuple[str, str]) -> None:
+    a, _ = cyclic
+    with station.live() as page:
+        page.send(type="jog_start", drive=a, direction=1, **JOG)
+        hold(page, a, 1.5)
+        ended = page.wait("jog_ended", drive=a, timeout_s=20)
+    assert "200 ms" in ended["reason"]
+    until(lambda: abs(station.state(a)["velocity"]) < 2, 5)
+
+
+def test_stop_brakes_cyclic_motion(station: Station, cyclic: tuple[str, str]) -> None:
+    a, _ = cyclic
+    with station.live() as page:
+        page.send(type="jog_start", drive=a, direction=-1, **JOG)
+        hold(page, a, 1.5)
+        assert a in station.ok(station.http.post("/stop", json={}))["stopped"]
+        hold(page, a, 0.3)
+        page.wait("jog_ended", drive=a, timeout_s=20)
+        now = until(lambda: abs(station.state(a)["velocity"]) < 2 and station.state(a), 5)
+    assert now["state"] != "Operation enabled"
+
+
+@pytest.mark.parametrize(("mode", "amplitude"), [("CSP", 0.25), ("CSV", 120.0), ("CST", 4.0)])
+def test_signal_generator(
+    station: Station, cyclic: tuple[str, str], mode: str, amplitude: float
+) -> None:
+    a, _ = cyclic
+    body = {"mode": mode, "shape": "sine", "amplitude": amplitude, "duration_s": 1.0,
+            "frequency_hz": 4.0, "travel_limit": 5, "speed_limit": 1500,
+            "torque_limit": 250}  # fmt: skip
+    result = station.done(station.http.post(f"/drives/{a}/jobs/generate", json=body), 60)
+    assert result["cycles"] == 1000
+    assert station.state(a)["state"] == "Switch on disabled"
+
+
+def test_signal_outside_the_envelope_moves_nothing(
+    station: Station, cyclic: tuple[str, str]
+) -> None:
+    a, _ = cyclic
+    before = station.state(a)["position"]
+    body = {"mode": "CSP", "shape": "trapezoid", "amplitude": 8.0, "duration_s": 2.0,
+            "travel_limit": 1, "speed_limit": 300, "torque_limit": 100}  # fmt: skip
+    job = station.job(station.http.post(f"/drives/{a}/jobs/generate", json=body), 60)
+    assert job["state"] == "failed"
+    assert "envelope allows" in job["problem"]["detail"]
+    assert station.state(a)["position"] == pytest.approx(before, abs=0.001)
+
+
+def test_profile_moves_are_refused_while_cyclic(station: Station, cyclic: tuple[str, str]) -> None:
+    a, _ = cyclic
+    body = {"mode": "PP", "target": 1.0, "relative": True, "travel_limit": 3, "torque_limit": 100}
+    job = station.job(station.http.post(f"/drives/{a}/jobs/move", json=body), 60)
+    assert job["state"] == "failed"
+    assert "cyclic" in job["problem"]["detail"]
