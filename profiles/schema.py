@@ -7,6 +7,7 @@ is added only for something a manual documents.
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
@@ -280,7 +281,9 @@ class StiffnessTable(Frozen):
     table_raw: int | None = None
     columns: tuple[str, ...]
     column_units: tuple[str, ...] = ()
-    rows: dict[int, tuple[float, ...]]
+    rows: dict[int, tuple[float, ...]] = Field(
+        description="level to values: raw, or in ``column_units`` where those are given"
+    )
     source: str
     notes: str = ""
 
@@ -298,6 +301,9 @@ class GainSpec(Frozen):
     integral: str | None = None
     torque_filter: str | None = None
     current_bandwidth: str | None = None
+    speed_filter: str | None = Field(
+        default=None, description="low-pass of the speed that the loop and the bus see"
+    )
     inertia: str | None = Field(default=None, description="load or total inertia parameter")
     inertia_meaning: Literal["ratio_percent", "ratio", "total", "load"] | None = None
     source: str
@@ -320,6 +326,7 @@ class Signal(Frozen):
         "homing_speed_switch", "homing_speed_zero", "homing_acceleration",
         "software_limit_min", "software_limit_max", "following_error_window",
         "following_error_time", "supported_modes", "motor_inertia", "load_inertia",
+        "torque_constant",
     ]  # fmt: skip
     key: str
     notes: str = ""
@@ -508,8 +515,8 @@ class Profile(Frozen):
     @model_validator(mode="after")
     def _references_exist(self) -> Profile:
         if len(self.by_key) != len(self.parameters):
-            seen: set[str] = set()
-            twice = sorted({p.key for p in self.parameters if p.key in seen or seen.add(p.key)})
+            counts = Counter(p.key for p in self.parameters)
+            twice = sorted(key for key, count in counts.items() if count > 1)
             raise ValueError(f"{self.drive}: parameter keys appear twice: {', '.join(twice)}")
         missing = sorted({key for key in _referenced_keys(self) if key not in self.by_key})
         if missing:

@@ -190,14 +190,14 @@ class CanopenNode:
             return self._objects.read(index, subindex)
         try:
             value = self.device.read(index, subindex)
-            if (index, subindex) == (0x1000, 0) and not any(value):
-                # Manuals print no value for the device type; a drive has one nevertheless.
-                return struct.pack("<I", _SERVO_DEVICE_TYPE)
-            return value
         except SdoAbort as refusal:
             if refusal.code not in (ABORT_NO_OBJECT, ABORT_NO_SUBINDEX):
                 raise
             return self._standard(index, subindex, refusal)
+        if (index, subindex) == (0x1000, 0) and not any(value):
+            # Manuals print no value for the device type; a drive has one nevertheless.
+            return struct.pack("<I", _SERVO_DEVICE_TYPE)
+        return value
 
     def _standard(self, index: int, subindex: int, refusal: SdoAbort) -> bytes:
         """What every node has, for drives whose dictionary leaves it out."""
