@@ -155,7 +155,9 @@ class Connection:
             task.cancel()
         await asyncio.wait((sender, receiver))
         for task in done:
-            if not task.cancelled() and (error := task.exception()) is not None:
+            error = None if task.cancelled() else task.exception()
+            # A page may go in the middle of a message; that is its ordinary end.
+            if error is not None and not isinstance(error, WebSocketDisconnect):
                 raise error
 
     async def close(self) -> None:
