@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from backend.drive import Drive
-from profiles.schema import UnitSpec
+from profiles.schema import Parameter, UnitSpec
 
 #: Raw units per rpm for families that count speed in turns; inc/s depends on the gearing.
 _RAW_PER_RPM = {"rpm": 1.0, "0.1 rpm": 10.0}
@@ -61,6 +61,15 @@ class AxisUnits:
     def velocity_raw(self, rpm: float) -> int:
         """Rpm to raw speed."""
         return round(rpm * (self._raw_per_rpm or 1.0))
+
+    def velocity_raw_of(self, parameter: Parameter, rpm: float) -> int:
+        """Rpm to the raw speed of an object whose own unit may differ from that of 60FFh.
+
+        6099h of the M6-L is in rpm beside velocities in increments per second (000:2167).
+        """
+        if parameter.unit == "rpm":
+            return round(parameter.to_raw(rpm))
+        return self.velocity_raw(rpm)
 
     def acceleration_raw(self, rpm_per_s: float) -> int:
         """Rpm/s to the raw ramp: a rate, or a time in ms for families that say so."""

@@ -52,7 +52,8 @@ async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobR
         ("homing_speed_zero", settings.speed_zero_rpm),
     ):
         if value is not None:
-            writes[drive.require(role)] = units.velocity_raw(value)
+            key = drive.require(role)
+            writes[key] = units.velocity_raw_of(drive.parameter(key), value)
     if settings.acceleration_rpm_s is not None:
         key = drive.require("homing_acceleration")
         writes[key] = units.acceleration_raw(settings.acceleration_rpm_s)

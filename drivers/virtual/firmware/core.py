@@ -6,7 +6,7 @@ import math
 
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
-from drivers.virtual.firmware.families.base import Family, Units
+from drivers.virtual.firmware.families.base import RPM, Family, Units
 from profiles.schema import Profile
 
 _INT32 = (-(2**31), 2**31 - 1)
@@ -47,6 +47,17 @@ class Core:
     def speed_of(self, raw: float) -> float:
         """User speed to rad/s, with the sign of the polarity."""
         return raw / self.units.speed_per_rad_s
+
+    def speed_at(self, key: str, default: Number = 0) -> float:
+        """A speed parameter in rad/s, in rpm where its own unit says so (M6-L, 000:2167)."""
+        return self.number(key, default) / self.speed_raw_per_rad_s(key)
+
+    def speed_raw_per_rad_s(self, key: str) -> float:
+        """Raw units of a speed object per rad/s: those of its own unit where that is rpm."""
+        parameter = self.profile.by_key.get(key)
+        if parameter is not None and parameter.unit == "rpm":
+            return 1.0 / (RPM * parameter.scale)
+        return self.units.speed_per_rad_s
 
     def torque_of(self, raw: float) -> float:
         """‰ of rated torque to Nm."""
@@ -135,12 +146,11 @@ class Core:
     def apply_motion(self) -> None:
         """Windows and limits of the motion objects, which act at once."""
         per_rad = abs(self.units.position_per_rad)
-        per_rad_s = abs(self.units.speed_per_rad_s)
         following = self.number("6065:00", 2**32 - 1)
         self.axis.apply_windows(
             self.number("6067:00") / per_rad,
-            self.number("606D:00") / per_rad_s,
-            self.number("606F:00") / per_rad_s,
+            abs(self.speed_at("606D:00")),
+            abs(self.speed_at("606F:00")),
             math.inf if following == 2**32 - 1 else following / per_rad,
         )
         largest = min(self.number("6072:00", 3000), self.number("6073:00", 3000))

@@ -128,8 +128,8 @@ class Homing:
         return self._core.units.ramp(raw or self._core.number("6083:00", 3276800))
 
     def _speed(self, key: str, fallback: int) -> float:
-        raw = self._core.number(key) or fallback
-        return min(abs(self._core.speed_of(raw)), self._core.max_speed())
+        speed = self._core.speed_at(key) or self._core.speed_of(fallback)
+        return min(abs(speed), self._core.max_speed())
 
     def _signals(self) -> int:
         return int(self._axis.s[k.S_SIGNALS])

@@ -71,7 +71,7 @@ def live_values(
         "6063:00": lambda: round((item(k.S_THETA) - core.zero_rad) * inc_per_rad),
         "6064:00": position,
         "606B:00": lambda: (
-            round(item(k.S_SPEED_REFERENCE) * core.units.speed_per_rad_s)
+            round(item(k.S_SPEED_REFERENCE) * core.speed_raw_per_rad_s("606B:00"))
             if control.state is State.OPERATION_ENABLED
             else 0
         ),

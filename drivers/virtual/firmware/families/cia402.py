@@ -99,6 +99,11 @@ class Cia402:
             "60C2:01": 1, "60C2:02": -3, "605A:00": 2, "605D:00": 1, "605E:00": 2, "6007:00": 1,
             "6502:00": sum(1 << (mode - 1) for mode in self._profile.supported_modes if mode > 0),
         }  # fmt: skip
+        turns_per_s = {"606D:00": 1.0, "606F:00": 1.0, "6099:01": 2.0, "6099:02": 0.25}
+        for key, turns in turns_per_s.items():
+            parameter = self._profile.by_key.get(key)
+            if parameter is not None and parameter.unit == "rpm":
+                fallback[key] = round(parameter.to_raw(60.0 * turns))
         gains = self._profile.gains
         if gains is not None and gains.convention == "unit":
             keys = (gains.position, gains.speed, gains.integral)
