@@ -34,6 +34,17 @@ def test_targets_and_width_on_a_phone(phone: Page, bench: Bench) -> None:
         assert phone.evaluate(SIDEWAYS) == 0, name
 
 
+def test_only_rows_in_sight_are_drawn(phone: Page, laptop: Page, bench: Bench) -> None:
+    for page in (phone, laptop):
+        open_axis(page, bench.drive, "parameters")
+        page.get_by_role("row").first.wait_for()
+        total = int(page.get_by_role("grid").get_attribute("aria-rowcount") or 0)
+        assert page.get_by_role("row").count() < 60 < total
+        page.get_by_role("grid").focus()
+        page.keyboard.press("End")
+        expect(page.locator(f"[aria-rowindex='{total}']")).to_be_visible()
+
+
 def test_language(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "overview")

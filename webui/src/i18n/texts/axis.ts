@@ -63,6 +63,7 @@ export const axis = {
   'jog.minus': ['Held: negative', '按住：负向'],
   'jog.keys': ['Keyboard: focus this area, then hold ← or →.', '键盘：聚焦此区域后按住 ← 或 →。'],
   'jog.invalid': ['Fill in speed, acceleration and limits first.', '请先填写速度、加速度和限制。'],
+  'jog.taken': ['Something else moves the axis now.', '轴正由其他任务移动。'],
   'jog.ended': ['Ended: {reason}', '已结束：{reason}'],
   'reason.released': ['released', '已松开'],
   'reason.page hidden': ['page hidden', '页面被隐藏'],

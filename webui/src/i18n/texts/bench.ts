@@ -133,6 +133,7 @@ export const bench = {
   'scope.cursors': ['Cursors', '光标'],
   'scope.csv': ['CSV', 'CSV'],
   'scope.time': ['time [s]', '时间 [s]'],
+  'scope.measurements': ['Measurements', '测量'],
   'scope.trace': ['Trace', '曲线'],
   'scope.timing': ['Timing', '时序'],
   'scope.synchronous': ['synchronous', '同步'],

@@ -28,7 +28,8 @@ export function JogPanel({ drive, state }: { drive: string; state: AxisState | n
       ? { speed, acceleration, travel_limit: travel, torque_limit: torque }
       : null
   const { direction, ended, hold, press } = useJog(drive, settings)
-  const ready = settings !== null && link.open && (state?.fresh ?? false)
+  const taken = direction === null && state?.moving_job != null
+  const ready = settings !== null && link.open && (state?.fresh ?? false) && !taken
   const pad = useRef<HTMLDivElement>(null)
   const keys: Record<string, -1 | 1> = { ArrowLeft: -1, ArrowRight: 1 }
   const keyDown = (event: KeyboardEvent) => {
@@ -120,6 +121,7 @@ export function JogPanel({ drive, state }: { drive: string; state: AxisState | n
         />
       </div>
       <p className="dim keys-help">{t('jog.keys')}</p>
+      {taken && <p className="warn-text">{t('jog.taken')}</p>}
       {!settings && <p className="warn-text">{t('jog.invalid')}</p>}
       {ended && !ended.problem && (
         <p className="note" role="status">

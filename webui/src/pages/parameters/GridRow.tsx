@@ -48,16 +48,18 @@ export const GridRow = memo(function GridRow(props: Props) {
       onClick={() => props.onChoose(row.key)}
       onDoubleClick={() => editable(row) && props.onBegin(row.key, null)}
     >
-      <button
-        type="button"
-        tabIndex={-1}
-        className={`favourite ${favourite ? 'on' : ''}`}
-        aria-label={t(favourite ? 'parameters.unfavourite' : 'parameters.favourite')}
-        aria-pressed={favourite}
-        onClick={() => toggleFavourite(profile, row.key)}
-      >
-        <Icon name="star" size={16} />
-      </button>
+      <span role="gridcell" className="star">
+        <button
+          type="button"
+          tabIndex={-1}
+          className={`favourite ${favourite ? 'on' : ''}`}
+          aria-label={t(favourite ? 'parameters.unfavourite' : 'parameters.favourite')}
+          aria-pressed={favourite}
+          onClick={() => toggleFavourite(profile, row.key)}
+        >
+          <Icon name="star" size={16} />
+        </button>
+      </span>
       <span role="gridcell" className="key mono">
         {row.number ?? row.key}
       </span>

@@ -19,7 +19,12 @@ export function Measurements({
   const [a, b] = cursors
   return (
     <>
-      <div className="scroll-table measurements">
+      <div
+        className="scroll-table measurements"
+        role="region"
+        aria-label={t('scope.measurements')}
+        tabIndex={0}
+      >
         <table>
           <thead>
             <tr>
