@@ -97,7 +97,9 @@ class DemoBench:
         self._namespaces.append(namespace)
         arguments = ["--bench", str(self._file), "--on", url, *self._segment_options]
         if self._nvm is not None:
-            arguments += ["--nvm", str(self._nvm)]
+            folder = self._nvm / f"ethercat{number}"
+            folder.mkdir(parents=True, exist_ok=True)
+            arguments += ["--nvm", str(folder)]
         self.segments[url] = VirtualSegment.start(slave, arguments, namespace)
         launcher = namespace.command(())
         self.addresses[url] = f"interface {master} in the network of process {namespace.pid}"

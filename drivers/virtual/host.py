@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 import threading
 import time
@@ -94,7 +95,11 @@ class Wires:
     def _device(self, axis: AxisSpec, station: int) -> Device:
         device = self.devices.get(axis.name)
         if device is None:
-            real = make_device(axis.drive, axis.mechanics, self._nvm, station)
+            # Drives of different buses may have the same station and must not share a memory.
+            nvm = None if self._nvm is None else self._nvm / re.sub(r"\W+", "-", axis.on)
+            if nvm is not None:
+                nvm.mkdir(parents=True, exist_ok=True)
+            real = make_device(axis.drive, axis.mechanics, nvm, station)
             device = SharedDevice(real, self._lock)
             # Compiles the physics on a machine's first start, before anybody asks the drive.
             now_ns = time.monotonic_ns()
