@@ -1,6 +1,7 @@
 """Homing as scripts: each yields what it waits for and is resumed when that happened.
 
-Methods −3, −2, 1–14, 17–30, 33, 34, 35 and 37 (CiA 402-2 clause "homing", 004:3837-3893).
+Methods 1–14, 17–30, 33, 34, 35 and 37 (CiA 402-2 clause "homing", 004:3837-3893), and the family's
+own against the mechanical limit.
 Directions are told by ``d``: +1 for the method as printed towards positive positions, −1 for its
 mirror image.
 """
@@ -57,7 +58,8 @@ class Homing:
         """Begin a method; one that is unknown or cannot work fails at once."""
         self.attained = self.failed = False
         core = self._core
-        timeout_s = core.number("2070:03")
+        timeout_key, unit_s = core.family.traits.homing_timeout
+        timeout_s = core.number(timeout_key) * unit_s
         self.deadline_step = (
             float(self._axis.s[k.S_STEP]) + timeout_s / k.STEP_S if timeout_s else None
         )
@@ -170,18 +172,38 @@ class Homing:
             yield Until(k.EV_INDEX | k.EV_SIGNAL, limit)
         return float(self._axis.s[k.S_INDEX_ANGLE])
 
+    def _index_either_way(self, direction: int) -> Script:
+        """Methods 33 and 34. Some families turn round at the limit switch, pass the index and
+        approach it again in the method's own direction (000:2679).
+        """
+        try:
+            return (yield from self._index(direction))
+        except HomingFailed:
+            if not self._core.family.traits.index_search_reverses:
+                raise
+        yield from self._index(-direction)
+        yield from self._stop()
+        return (yield from self._index(direction))
+
     def _stop(self) -> _Step:
         self._axis.stop_ramp(self._acceleration())
         yield Until(k.EV_STOPPED)
 
     # --- methods ---------------------------------------------------------------------------
     def _run(self, method: int) -> Generator[Until, None, None]:
+        torque_methods = self._core.family.traits.torque_homing.methods
+        stays = method in (35, 37) or (method in torque_methods and not torque_methods[method][1])
         if method in (35, 37):
             home = self._axis.angle_rad
-        elif method in (-2, -3):
-            home = yield from self._by_torque(1 if method == -2 else -1)
+        elif method in torque_methods:
+            direction, back_to_index = torque_methods[method]
+            home = yield from self._by_torque(direction)
+            if back_to_index:
+                self._core.torque_cap_nm = math.inf
+                self._core.apply_motion()
+                home = yield from self._index(-direction)
         elif method in (33, 34):
-            home = yield from self._index(-1 if method == 33 else 1)
+            home = yield from self._index_either_way(-1 if method == 33 else 1)
         elif 1 <= method <= 14:
             direction = yield from self._edge(method)
             home = yield from self._index(direction)
@@ -190,13 +212,13 @@ class Homing:
             home = self._axis.angle_rad
         else:
             raise HomingFailed
-        if method not in (35, 37, -2, -3):
+        if not stays:
             yield from self._stop()
             ramp = self._acceleration()
             self._axis.move(home, self._speed("6099:02", 65536), ramp, ramp)
             yield Until(k.EV_ARRIVED)
         self._take(home)
-        if method in (35, 37, -2, -3):
+        if stays:
             self._axis.hold()
 
     def _take(self, home: float) -> None:
@@ -211,11 +233,14 @@ class Homing:
 
     def _by_torque(self, direction: int) -> Script:
         core = self._core
-        torque = core.torque_of(core.number("2070:01", 500))
+        keys = core.family.traits.torque_homing
+        torque = core.torque_of(core.number(keys.torque_key, 500))
         core.torque_cap_nm = torque
         core.apply_motion()
         self._axis.watch_stall(
-            0.95 * torque, core.number("2070:02", 500) * 1e-3, float(self._axis.p[k.P_STOP_SPEED])
+            0.95 * torque,
+            core.number(keys.time_key, 500) * 1e-3,
+            float(self._axis.p[k.P_STOP_SPEED]),
         )
         # In the speed loop: a position demand would run away from the stalled axis.
         speed, ramp = self._speed("6099:01", 655360), self._acceleration()

@@ -81,6 +81,23 @@ StatusStyle = Literal["cia402", "echo"]
 
 
 @dataclass(frozen=True, slots=True)
+class TorqueHoming:
+    """Homing against the mechanical limit.
+
+    ``methods`` gives the direction of each method and whether it goes back to the index;
+    ``torque_key`` is in ‰ of the rated torque, ``time_key`` in ms.
+    """
+
+    methods: dict[int, tuple[int, bool]]
+    torque_key: str
+    time_key: str
+
+
+#: MMS7 (004:3840-3842, 2070h).
+_MMS7_TORQUE_HOMING = TorqueHoming({-3: (-1, False), -2: (1, False)}, "2070:01", "2070:02")
+
+
+@dataclass(frozen=True, slots=True)
 class Traits:
     """Documented behaviours that are a matter of yes or no, or of one number.
 
@@ -105,6 +122,9 @@ class Traits:
     torque_speed_limit_key: str | None = None
     feed_forward: FeedForward | None = None
     assigns_terminals: bool = False
+    torque_homing: TorqueHoming = _MMS7_TORQUE_HOMING
+    homing_timeout: tuple[str, float] = ("2070:03", 1.0)  # parameter and its unit [s]
+    index_search_reverses: bool = False
 
 
 class Family(Protocol):

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from drivers.virtual.firmware.families.base import Autosave, FeedForward, Traits
+from drivers.virtual.firmware.families.base import Autosave, FeedForward, TorqueHoming, Traits
 
 #: Megmeet M6-L: parameters of the bus go to the EEPROM while P17.24 is 1 (000:3669-3673), saving
 #: and restoring by P17.26 (000:3675), history and defaults by P02.22 (000:3254), feed-forward by
 #: P08.14 to P08.17 with the selections P05.16 and P06.18 (000:3407-3410, 000:3310, 000:3360).
+#: Homing -1 to -4 by P23.20 and P23.21 (000:2701-2756), 33 and 34 turn round at a limit switch
+#: (000:2679, 000:2693), time limit P12.09 (000:3635).
 M6L = Traits(
     commands={
         "2011:1B": {1: "restore", 2: "save"},
         "2002:17": {1: "clear_history", 2: "restore"},
     },
     autosave=(Autosave("2011:19", 1, 0x2000, 0x6FFF),),
+    torque_homing=TorqueHoming(
+        {-1: (1, False), -2: (-1, False), -3: (-1, True), -4: (1, True)}, "2017:15", "2017:16"
+    ),
+    homing_timeout=("200C:0A", 1e-3),
+    index_search_reverses=True,
     feed_forward=FeedForward(
         speed_gain="2008:10",
         speed_filter="2008:0F",
