@@ -182,6 +182,15 @@ class ConfirmStep(Frozen):
     text: str
 
 
+class RewriteStep(Frozen):
+    """Write every value again that was changed since the last save.
+
+    For drives that store a value only while it is written (R6L, 002:11425).
+    """
+
+    do: Literal["rewrite"]
+
+
 class ReconnectStep(Frozen):
     """The drive restarts; wait until it answers again."""
 
@@ -190,7 +199,8 @@ class ReconnectStep(Frozen):
 
 
 Step = Annotated[
-    WriteStep | WaitStep | PollStep | ConfirmStep | ReconnectStep, Field(discriminator="do")
+    WriteStep | RewriteStep | WaitStep | PollStep | ConfirmStep | ReconnectStep,
+    Field(discriminator="do"),
 ]
 
 

@@ -25,6 +25,7 @@ DISTRUST_S = 0.03
 _DISTRUST_CYCLES = 5
 _RECEIVE_US = 300
 _LEAST_WAIT_S = 100e-6
+_LOCKSTEP_WAIT_S = 0.25
 _MARGIN_NS = 120_000
 _LATE_BINS = 16
 
@@ -76,8 +77,18 @@ class CyclicLoop:
     """See the module. One call of `cycle` is one cycle; the caller uses the time that is left."""
 
     def __init__(
-        self, segment: Segment, ring: Ring, images: list[Image], cycle_ns: int, *, dc: bool
+        self,
+        segment: Segment,
+        ring: Ring,
+        images: list[Image],
+        cycle_ns: int,
+        *,
+        dc: bool,
+        lockstep: float = 0.0,
     ) -> None:
+        """``lockstep`` is for segments whose time follows the frames: cycles are then never
+        skipped and replies awaited, at this many times the speed of real time at most.
+        """
         self.images = images
         self.cycle_ns = cycle_ns
         self.dc = dc
@@ -96,6 +107,8 @@ class CyclicLoop:
         self._integral_ns = 0.0
         self._late_ns = 0
         self._resynced = 0
+        self._lockstep = lockstep
+        self._real_next_ns = 0
 
     def start(self) -> None:
         """Begin the grid now; frames no longer block."""
@@ -131,10 +144,13 @@ class CyclicLoop:
         for image, slave in zip(self.images, self._slaves, strict=True):
             self._decide(image, slave, valid=valid)
         self.number += 1
-        self.next_ns += self.cycle_ns + (self._follow_clock() if self.dc and wkc > 0 else 0)
+        follows = self.dc and not self._lockstep
+        self.next_ns += self.cycle_ns + (self._follow_clock() if follows and wkc > 0 else 0)
 
     def spare_ns(self) -> int:
         """Time left for mailbox frames before the next cycle, with a margin kept."""
+        if self._lockstep:
+            return max(self._real_next_ns - time.monotonic_ns(), self.cycle_ns // 2)
         return self.next_ns - time.monotonic_ns() - max(_MARGIN_NS, self.cycle_ns // 5)
 
     def moving(self) -> bool:
@@ -161,6 +177,11 @@ class CyclicLoop:
 
     def _wait_for_grid(self) -> None:
         now = time.monotonic_ns()
+        if self._lockstep:
+            time.sleep(max(self._real_next_ns - now, 0) * 1e-9)
+            step = round(self.cycle_ns / self._lockstep)
+            self._real_next_ns = max(time.monotonic_ns(), self._real_next_ns) + step
+            return
         ahead = self.next_ns - now
         if ahead > 0:
             time.sleep(ahead * 1e-9)
@@ -183,6 +204,8 @@ class CyclicLoop:
         self._master.send_processdata()
         if self._fd is not None:
             left_s = (self.next_ns + self.cycle_ns - time.monotonic_ns()) * 0.95e-9
+            if self._lockstep:
+                left_s = _LOCKSTEP_WAIT_S
             ready, _, _ = select.select((self._fd,), (), (), max(left_s, _LEAST_WAIT_S))
             if not ready:
                 # Tells SOEM to give the frame up; it returns at once.

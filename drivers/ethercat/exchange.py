@@ -43,6 +43,8 @@ class Exchange:
         self._leaving: tuple[float, Done] | None = None
         self._preparation = Preparation(segment, ring, lanes, report)
         self._healing: set[int] = set()
+        self.lockstep = 0.0
+        """Above 0: the segment's time follows the frames, see `CyclicLoop`."""
         self.operational = False
         """All configured stations have reached OP and none was asked to leave it."""
 
@@ -76,7 +78,14 @@ class Exchange:
         if self.loop is not None:
             raise NotAllowed("the cyclic exchange runs already")
         listening = [s for s in self._stations if s.number not in self.setups]
-        loop = CyclicLoop(self._segment, self._ring, self._images, self._cycle_ns, dc=self._dc)
+        loop = CyclicLoop(
+            self._segment,
+            self._ring,
+            self._images,
+            self._cycle_ns,
+            dc=self._dc,
+            lockstep=self.lockstep,
+        )
         for station in listening:
             if station.al_state in (AlState.SAFEOP, AlState.OP):
                 outputs, inputs = self._segment.sizes(station.number)

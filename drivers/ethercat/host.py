@@ -150,11 +150,13 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--control", type=int, required=True, help="descriptor of the socket")
     parser.add_argument("--ring", type=int, required=True, help="descriptor of the ring")
     parser.add_argument("--no-realtime", action="store_true")
+    parser.add_argument("--lockstep", type=float, default=0.0, help="for virtual segments")
     options = parser.parse_args(argv)
     realtime.die_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     control = socket.socket(fileno=options.control)
     host = Host(options.interface, control, Ring(options.ring))
+    host.operations.roster.exchange.lockstep = options.lockstep
     signal.signal(signal.SIGTERM, host.orphan)
     granted = realtime.claim(wanted=not options.no_realtime)
     with contextlib.suppress(LinkLost):

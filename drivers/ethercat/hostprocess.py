@@ -33,7 +33,9 @@ class HostProcess:
         launcher: Sequence[str],
         received: Callable[[Message], None],
         restarted: Callable[[str], None],
+        options: Sequence[str] = (),
     ) -> None:
+        self._options = tuple(options)
         self.restarts = 0
         self.words = "not opened"
         self.granted: tuple[str, ...] = ()
@@ -132,7 +134,7 @@ class HostProcess:
             self.ring = Ring(ring_fd)
             self._process = await asyncio.create_subprocess_exec(
                 *self._launcher, sys.executable, "-m", "drivers.ethercat.host", self._interface,
-                "--control", str(theirs.fileno()), "--ring", str(ring_fd),
+                "--control", str(theirs.fileno()), "--ring", str(ring_fd), *self._options,
                 pass_fds=(theirs.fileno(), ring_fd), env=_environment(),
                 stdin=asyncio.subprocess.DEVNULL,
             )  # fmt: skip

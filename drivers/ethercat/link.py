@@ -40,8 +40,16 @@ class EthercatLink:
     kind: LinkKind = "ethercat"
 
     def __init__(
-        self, interface: str, *, url: str | None = None, launcher: Sequence[str] = ()
+        self,
+        interface: str,
+        *,
+        url: str | None = None,
+        launcher: Sequence[str] = (),
+        lockstep: float = 0.0,
     ) -> None:
+        """``lockstep`` only for virtual segments whose time follows the frames: no cycle is
+        skipped then, and time runs at most this many times as fast as real time.
+        """
         interface = interface.removeprefix(_SCHEME)
         self.interface = interface
         self.url = url or f"{_SCHEME}{interface}"
@@ -49,7 +57,9 @@ class EthercatLink:
         self._listeners: list[Callable[[LinkEvent], None]] = []
         self._status: Message = {}
         self._counts = {"transactions": 0, "timeouts": 0}
-        self._host = HostProcess(interface, launcher, self._received, self._restarted)
+        self._host = HostProcess(
+            interface, launcher, self._received, self._restarted, _options(lockstep)
+        )
         self.process_data = EthercatCyclic(self._host, self._profiles)
         self.cyclic: Cyclic | None = self.process_data
 
@@ -301,3 +311,7 @@ def _found(item: Message) -> Found:
         state=item["state"],
         notes=notes,
     )
+
+
+def _options(lockstep: float) -> tuple[str, ...]:
+    return ("--lockstep", f"{lockstep:g}") if lockstep else ()

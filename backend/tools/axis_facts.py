@@ -1,0 +1,105 @@
+"""What the tuning tools must know of a drive, in SI units, read from it by its profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from backend.axis import Axis
+from backend.drive import Drive
+from drivers.errors import NotAllowed
+from profiles.schema import Parameter
+
+#: Printed units of parameters to SI.
+_SI = {
+    "Nm": 1.0, "mNm": 1e-3, "0.1 Nm": 0.1, "0.01 Nm": 0.01, "A": 1.0, "mA": 1e-3, "0.1 A": 0.1,
+    "Nm/A": 1.0, "mNm/A": 1e-3, "kg·m²": 1.0, "kg·cm²": 1e-4, "g·cm²": 1e-7, "Hz": 1.0,
+    "kHz": 1e3, "1/s": 1.0, "rad/s": 1.0, "ms": 1e-3, "s": 1.0, "µs": 1e-6, "rpm": 1.0,
+    "%": 0.01,
+}  # fmt: skip
+
+
+def si_value(parameter: Parameter, value: float) -> float | None:
+    """A parameter's engineering value in SI units; None where its unit is not known here."""
+    factor = _SI.get(parameter.unit)
+    return None if factor is None else float(value) * factor
+
+
+def si_raw(parameter: Parameter, value: float) -> int:
+    """Raw value of a quantity given in SI units.
+
+    Raises:
+        NotAllowed: the parameter's unit has no known meaning in SI.
+    """
+    factor = _SI.get(parameter.unit)
+    if factor is None:
+        raise NotAllowed(
+            f"{parameter.key} {parameter.name}: its unit {parameter.unit!r} cannot be converted",
+            parameter=parameter.key,
+            remedy="enter the value by hand on the Parameters page",
+        )
+    return round(parameter.to_raw(value / factor))
+
+
+@dataclass(frozen=True, slots=True)
+class AxisFacts:
+    """None where neither the drive nor the profile tells.
+
+    ``rated_torque_nm`` is what 100 % of torque is; 1.0 stands in its place where it is unknown
+    (``torque_known`` False), so that "Nm" then means "of rated torque".
+    ``interpolates`` is whether cyclic set-points are reached linearly (60C2h).
+    """
+
+    rated_torque_nm: float
+    torque_known: bool
+    rated_speed_rpm: float | None
+    current_bandwidth_hz: float | None
+    speed_filter_hz: float | None
+    motor_inertia_kgm2: float | None
+    drive_inertia_kgm2: float | None
+    interpolates: bool
+
+
+async def si(drive: Drive, key: str | None) -> float | None:
+    """A parameter in SI units, read now; None where it does not exist here."""
+    if key is None:
+        return None
+    parameter = drive.parameter(key)
+    if drive.unreachable_why(parameter) or parameter.access == "wo":
+        return None
+    value = (await drive.read(key)).value
+    return None if not isinstance(value, (int, float)) else si_value(parameter, value)
+
+
+async def read_facts(
+    axis: Axis, rated_torque_nm: float | None = None, motor_inertia_kgm2: float | None = None
+) -> AxisFacts:
+    """Read them; given values override the drive's.
+
+    Raises:
+        DriveError: a parameter cannot be read.
+    """
+    drive = axis.drive
+    gains = drive.profile.gains
+    torque = rated_torque_nm or await si(drive, drive.key("rated_torque"))
+    if not torque:
+        constant = await si(drive, drive.key("torque_constant"))
+        current = await si(drive, drive.key("rated_current"))
+        torque = constant * current if constant and current else None
+    inertia = await si(drive, gains.inertia if gains else None)
+    meaning = gains.inertia_meaning if gains else None
+    rotor = motor_inertia_kgm2 or await si(drive, drive.key("motor_inertia"))
+    total = inertia if meaning == "total" else None
+    if meaning in ("ratio", "ratio_percent") and rotor and inertia is not None:
+        total = rotor * (1.0 + inertia)
+    elif meaning == "load" and rotor and inertia is not None:
+        total = rotor + inertia
+    return AxisFacts(
+        rated_torque_nm=torque or 1.0,
+        torque_known=bool(torque),
+        rated_speed_rpm=await si(drive, drive.key("rated_speed")),
+        current_bandwidth_hz=await si(drive, gains.current_bandwidth if gains else None),
+        speed_filter_hz=await si(drive, gains.speed_filter if gains else None),
+        motor_inertia_kgm2=rotor or None,
+        drive_inertia_kgm2=total or None,
+        interpolates="60C2:01" in drive.profile.by_key,
+    )

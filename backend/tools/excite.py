@@ -1,0 +1,246 @@
+"""Excitations for one axis, scaled to what it may do. Pure: nothing here knows a drive.
+
+Every plan is a list of sequences in SI units at the motor, with the excitation that an estimator
+must be given. Torque falls on the axis directly or as an offset beside a closed loop, whose
+reference then makes the slow base motion that defeats stiction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis.excitation import BaseMotion, Excitation, choose_lines, multisine, scaled
+
+FloatArray = npt.NDArray[np.float64]
+TURN = 2.0 * np.pi
+
+#: Below half of its own torque's share a line is lost in friction; above it, speed runs away.
+_LOOP_CORNER_HZ = 60.0
+_PERIOD_S = 0.7
+#: Base motion as a multiple of the excitation's own speed, so that the speed seldom reverses.
+_BASE_OVER_RMS = 5.0
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """What is known of the axis before the measurement: kg·m² and Nm."""
+
+    inertia_kgm2: float
+    coulomb_nm: float = 0.0
+    gravity_nm: float = 0.0
+
+
+@dataclass(frozen=True)
+class Room:
+    """What the axis may do: torque peak Nm, speed rad/s, travel to each side rad."""
+
+    torque_nm: float
+    speed_rad_s: float
+    travel_rad: float
+
+
+@dataclass(frozen=True)
+class Band:
+    """Which lines: lowest and highest frequency, at most how many."""
+
+    f_min_hz: float
+    f_max_hz: float
+    count: int = 200
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """One realisation. ``base`` [n] is the loop's reference (rad/s or rad), None without one."""
+
+    excitation: Excitation
+    base: FloatArray | None = None
+
+
+def band_for(sample_rate_hz: float, f_min_hz: float, f_max_hz: float | None) -> Band:
+    """Lines up to 0.4 of the sample rate, and never above 1200 Hz unless asked for."""
+    top = min(0.4 * sample_rate_hz, 1200.0) if f_max_hz is None else f_max_hz
+    return Band(f_min_hz, min(top, 0.4 * sample_rate_hz), 200 if sample_rate_hz < 2000 else 300)
+
+
+def _lines(band: Band, period: int, rate: float) -> npt.NDArray[np.int64]:
+    return choose_lines(band.f_min_hz, band.f_max_hz, rate / period, count=band.count)
+
+
+def _speed_of(samples: npt.NDArray[np.floating], rate: float, inertia: float) -> FloatArray:
+    """Speed that a periodic torque gives a rigid axis."""
+    spectrum = np.fft.rfft(samples)
+    f = np.fft.rfftfreq(samples.size, 1 / rate)
+    spectrum[0] = 0.0
+    spectrum[1:] /= 1j * TURN * f[1:] * inertia
+    return np.asarray(np.fft.irfft(spectrum, samples.size))
+
+
+def torque_mode(
+    rate: float,
+    band: Band,
+    room: Room,
+    rigid: Rigid,
+    step_nm: float,
+    *,
+    share: float,
+    realisations: int,
+    base: bool = True,
+) -> tuple[Sequence, ...]:
+    """Pairs of opposite sign on a freely turning axis without any loop.
+
+    ``share`` of the permitted torque goes to the excitation, unless that is faster than the axis
+    may be; the base motion gets what speed, travel and torque leave.
+
+    Raises:
+        ValueError: the room does not suffice; the message says what is too small.
+    """
+    period = round(_PERIOD_S * rate)
+    lines = _lines(band, period, rate)
+    slow = TURN * rate / period
+
+    def one(number: int, motion: BaseMotion | None) -> Excitation:
+        return multisine(
+            sample_rate_hz=rate, period_samples=period, lines=lines, realisation=number // 2,
+            invert=bool(number % 2), integrations=2, iterations=80, base=motion,
+            ramp_samples=period // 8,
+        )  # fmt: skip
+
+    unit_speed = _speed_of(one(0, None).one_period, rate, rigid.inertia_kgm2)
+    own_rms, own_peak = float(np.std(unit_speed)), float(np.max(np.abs(unit_speed)))
+    peak_nm = min(share * room.torque_nm, 0.25 * room.speed_rad_s / own_peak)
+    wanted = max(_BASE_OVER_RMS * own_rms * peak_nm, 3.0)
+    # The way in overshoots the steady base motion by about its amplitude.
+    travelled = 2.2 / slow
+    base_speed = min(wanted, 0.4 * room.speed_rad_s, room.travel_rad / travelled) if base else 0.0
+    if base and base_speed < 1.0:
+        raise ValueError(
+            f"a travel of {room.travel_rad / TURN:.3g} rev is too little for the base motion"
+        )
+    # What the base motion cannot cover, the excitation must not ask for.
+    if base and base_speed < 2.0 * own_rms * peak_nm:
+        peak_nm = base_speed / (2.0 * own_rms)
+    base_nm = rigid.inertia_kgm2 * slow * base_speed + 4 / np.pi * rigid.coulomb_nm
+    if not base:
+        base_nm = 0.0
+    if base_nm + peak_nm > room.torque_nm:
+        base_nm = min(base_nm, 0.6 * room.torque_nm)
+        peak_nm = min(peak_nm, room.torque_nm - base_nm)
+    if base and base_nm < 1.5 * rigid.coulomb_nm:
+        raise ValueError(
+            f"{room.torque_nm:.3g} Nm are too little to keep the axis moving against friction"
+        )
+    motion = BaseMotion(base_nm / peak_nm, rate / period) if base_nm > 0 else None
+    return tuple(
+        Sequence(scaled(one(i, motion), peak_nm, step_nm)) for i in range(2 * realisations)
+    )
+
+
+def beside_loop(
+    rate: float,
+    band: Band,
+    room: Room,
+    step_nm: float,
+    *,
+    share: float,
+    realisations: int,
+    position: bool,
+    base: bool = True,
+) -> tuple[Sequence, ...]:
+    """Torque offsets beside a closed speed or position loop, which makes the base motion.
+
+    Raises:
+        ValueError: the room does not suffice.
+    """
+    period = round(_PERIOD_S * rate)
+    lines = _lines(band, period, rate)
+    f = lines * rate / period
+    shape = f / np.hypot(f, _LOOP_CORNER_HZ)
+    reference = _slow_reference(rate, period, room, position) if base else None
+    sequences = []
+    for i in range(2 * realisations):
+        e = multisine(
+            sample_rate_hz=rate, period_samples=period, lines=lines, realisation=i // 2,
+            invert=bool(i % 2), amplitude=shape, iterations=80, ramp_samples=period // 8,
+        )  # fmt: skip
+        e = scaled(e, share * room.torque_nm, step_nm)
+        sequences.append(Sequence(e, _stretched(reference, e, period, position)))
+    return tuple(sequences)
+
+
+def _slow_reference(rate: float, period: int, room: Room, position: bool) -> FloatArray:
+    """One period of the base motion as a speed, or as a position that begins at zero."""
+    slow = TURN * rate / period
+    speed = min(20.0, 0.35 * room.speed_rad_s, room.travel_rad * slow / 2.2)
+    if speed < 0.5:
+        raise ValueError(
+            f"a travel of {room.travel_rad / TURN:.3g} rev is too little for the base motion"
+        )
+    turn = slow * np.arange(period) / rate
+    if position:
+        return np.asarray(speed / slow * (1.0 - np.cos(turn)))
+    return np.asarray(speed * np.sin(turn))
+
+
+def _stretched(
+    period_values: FloatArray | None, e: Excitation, period: int, position: bool
+) -> FloatArray:
+    """The base motion over the whole excitation, faded out at the end."""
+    n = e.samples.size
+    if period_values is None:
+        return np.zeros(n)
+    values = np.tile(period_values, n // period + 1)[:n]
+    fade = n - (e.first_sample + e.periods * period)
+    if fade > 1 and not position:
+        values[-fade:] *= 0.5 + 0.5 * np.cos(np.pi * np.arange(fade) / (fade - 1))
+    elif fade > 1:
+        # Positions: brake the remaining speed to zero over the tail.
+        speed = np.diff(values)[-fade] * (0.5 + 0.5 * np.cos(np.pi * np.arange(fade) / (fade - 1)))
+        values[-fade:] = values[-fade - 1] + np.cumsum(speed)
+    return np.asarray(values)
+
+
+def loop_reference(
+    rate: float,
+    band: Band,
+    room: Room,
+    step: float,
+    *,
+    amplitude: float,
+    realisations: int,
+    position: bool,
+    base: bool = True,
+) -> tuple[Sequence, ...]:
+    """A multisine on the reference of the closed loop itself, ``amplitude`` in rad/s or rad.
+
+    Amplitudes fall with frequency so that the torque they ask for does not grow without end.
+
+    Raises:
+        ValueError: the room does not suffice.
+    """
+    period = round(_PERIOD_S * rate)
+    lines = _lines(band, period, rate)
+    f = lines * rate / period
+    shape = 1.0 / np.hypot(1.0, f / (20.0 if position else 40.0))
+    reference = _slow_reference(rate, period, room, position) if base else None
+    sequences = []
+    for i in range(2 * realisations):
+        e = multisine(
+            sample_rate_hz=rate, period_samples=period, lines=lines, realisation=i // 2,
+            invert=bool(i % 2), amplitude=shape, integrations=0 if position else 1,
+            iterations=80, ramp_samples=period // 8,
+        )  # fmt: skip
+        sequences.append(
+            Sequence(scaled(e, amplitude, step), _stretched(reference, e, period, position))
+        )
+    return tuple(sequences)
+
+
+def probe(rate: float, peak_nm: float, duration_s: float, step_nm: float) -> FloatArray:
+    """A torque doublet that leaves a free rigid axis at rest where it began: s, -s, -s, s."""
+    n = max(8, round(duration_s * rate / 4))
+    hump = np.sin(np.pi * (np.arange(n) + 0.5) / n)
+    whole = np.concatenate([hump, -hump, -hump, hump, np.zeros(max(4, n // 2))]) * peak_nm
+    return np.asarray(np.round(whole / step_nm) * step_nm)

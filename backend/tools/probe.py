@@ -1,0 +1,136 @@
+"""A first careful look at an axis: does it move, which way, and how heavy is it about?
+
+A small torque doublet, doubled until the axis moves well, gives inertia and friction to within
+some ten per cent: enough to scale an excitation, not a result.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.axis import Axis, Envelope
+from backend.cyclic import CyclicSession
+from backend.tools import excite
+from backend.tools.axis_facts import AxisFacts
+from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play, quiet
+from drivers.cia402 import Mode
+from drivers.errors import NotAllowed
+
+_TURN = 2 * np.pi
+_DURATION_S = 0.28
+#: The axis moves well above this speed, and well above what its sensor and filter blur.
+_ENOUGH_RAD_S = 6.0
+_FIRST_SHARE = 0.02
+_CUTOFF_HZ = 40.0
+
+
+@dataclass(frozen=True)
+class Probed:
+    """Rough values: kg·m² and Nm."""
+
+    inertia_kgm2: float
+    coulomb_nm: float
+    gravity_nm: float
+    rated_nm: float
+
+
+async def probe_axis(
+    axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts, home_raw: int
+) -> Probed:
+    """Feel the axis in CST, from 2 % of rated torque upwards.
+
+    Raises:
+        NotAllowed: it does not move with the permitted torque, or it moves the wrong way, or it
+            left the envelope.
+    """
+    units, drive = await axis.units(), axis.drive
+    rated, rate = facts.rated_torque_nm, 1.0 / cycle_s(session)
+    step = units.torque(1.0) / 100.0 * rated
+    highest = 0.9 * envelope.torque_percent / 100.0 * rated
+    limits = await bus_limits(axis, envelope, home_raw)
+    enough = min(_ENOUGH_RAD_S, 0.4 * envelope.speed_rpm * _TURN / 60.0)
+    peak = min(_FIRST_SHARE * rated, highest)
+    async with enabled(axis, session, Mode.CST):
+        await quiet(axis)
+        while True:
+            values = excite.probe(rate, peak, _DURATION_S, step)
+            raw = np.round(values / step).astype(np.int64)
+            recording = await play(
+                axis, session, Play(Mode.CST, raw), limits, rated, lambda _fraction: None
+            )
+            moved = float(np.max(np.abs(recording.velocity_rad_s)))
+            if moved >= enough or peak >= highest:
+                break
+            # Doubling brings a free axis to the wanted speed without ever jumping past it.
+            peak = min(2.0 * peak, highest)
+    # An encoder shows a twisting shaft or play in a brake; a turning axis is another matter.
+    if moved < 0.05 * enough:
+        raise NotAllowed(
+            f"{drive.name} does not move with {peak / rated:.0%} of its rated torque",
+            drive=drive.name,
+            value=round(moved, 4),
+            limit=f"{enough:.3g} rad/s",
+            remedy="look for a closed brake, a blocked axis or a torque limit; raise the "
+            "envelope's torque only if the machine allows it",
+        )
+    return _judged(drive.name, recording, rated)
+
+
+def _judged(name: str, recording: Recording, rated_nm: float) -> Probed:
+    fit = rough_fit(
+        recording.torque_nm, recording.velocity_rad_s, recording.sample_rate_hz, recording.valid
+    )
+    if fit.inertia_kgm2 <= 0:
+        raise NotAllowed(
+            f"{name} moves against its torque: the sign of torque or speed is wrong",
+            drive=name,
+            remedy="check motor phases, encoder direction and the polarity settings",
+        )
+    return Probed(fit.inertia_kgm2, max(fit.coulomb_nm, 0.0), fit.gravity_nm, rated_nm)
+
+
+@dataclass(frozen=True)
+class RoughFit:
+    """Least squares of T = J·a + Tc·sign(v) + Tg."""
+
+    inertia_kgm2: float
+    coulomb_nm: float
+    gravity_nm: float
+
+
+def rough_fit(
+    torque: npt.NDArray[np.float64],
+    velocity: npt.NDArray[np.float64],
+    rate: float,
+    valid: npt.NDArray[np.bool_],
+) -> RoughFit:
+    """Momentum instead of acceleration: ∫T = J·Δv + Tc·∫sign(v) + Tg·t, over each moving stretch.
+
+    Integrals need no derivative of a quantised speed.
+    """
+    dt = 1.0 / rate
+    peak = float(np.max(np.abs(velocity)))
+    moving = (np.abs(velocity) > 0.1 * peak) & valid
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]]).astype(int)))
+    rows, momenta = [], []
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - begin < 6:
+            continue
+        # Several intervals within a stretch: a whole stretch begins and ends at the same speed.
+        points = np.unique(np.linspace(begin, end - 1, 7).astype(int))
+        for a, b in itertools.pairwise(points):
+            between = slice(a, b)
+            momentum = float(np.sum(torque[between])) * dt
+            sign = float(np.sum(np.sign(velocity[between]))) * dt
+            rows.append([velocity[b] - velocity[a], sign, (b - a) * dt])
+            momenta.append(momentum)
+    if len(rows) < 6:
+        swing = float(np.max(np.abs(np.cumsum(torque)))) * dt
+        direction = float(np.sign(np.dot(torque[:-1], np.diff(velocity))) or 1.0)
+        return RoughFit(direction * swing / max(2 * peak, 1e-9), 0.0, 0.0)
+    x = np.linalg.lstsq(np.array(rows), np.array(momenta), rcond=None)[0]
+    return RoughFit(float(x[0]), float(x[1]), float(x[2]))

@@ -1,0 +1,391 @@
+"""Play a precomputed excitation cycle by cycle and keep every sample of it, or fail.
+
+The recording is aligned with what was sent by the set-points that come back with each sample,
+so lost blocks cannot shift it. A cycle that was lost or late is marked, never interpolated.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.axis import Axis, Envelope, shielded
+from backend.cyclic import CyclicSession, channel
+from backend.drive import address_of
+from backend.jobs import Progress
+from drivers import link as bus
+from drivers.cia402 import Mode, State
+from drivers.errors import LinkLost, LinkTimeout, NotAllowed
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+_RENEW_S = 0.05
+_STATE_TIMEOUT_S = 5.0
+#: Samples arrive in bunches; this long after the last set-point all of them have come.
+_TAIL_S = 1.0
+_ROLES = ("position_actual", "velocity_actual", "torque_actual", "status_word")
+_TARGET_OF = {
+    Mode.CSP: "position_target", Mode.CSV: "velocity_target", Mode.CST: "torque_target",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What the bus saw of one played sequence; arrays [n], one sample per cycle.
+
+    ``position_rad``, ``velocity_rad_s``, ``torque_nm`` are at the motor; ``sent`` and ``offset``
+    in raw units as they went out. ``valid`` is False where a sample was lost or not trusted.
+    """
+
+    sample_rate_hz: float
+    position_rad: FloatArray
+    velocity_rad_s: FloatArray
+    torque_nm: FloatArray
+    sent: FloatArray
+    offset: FloatArray
+    valid: BoolArray
+
+    def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
+        """For storage."""
+        return {
+            "position_rad": self.position_rad, "velocity_rad_s": self.velocity_rad_s,
+            "torque_nm": self.torque_nm, "sent": self.sent, "offset": self.offset,
+            "valid": self.valid,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Play:
+    """One sequence in raw units: the mode's own target, and torque offsets beside it if any."""
+
+    mode: Mode
+    values: npt.NDArray[np.int64]
+    offset_role: str | None = None
+    offsets: npt.NDArray[np.int64] | None = None
+
+
+@dataclass
+class _Catch:
+    """Blocks as they come."""
+
+    names: tuple[str, ...]
+    blocks: list[bus.ScopeBlock] = field(default_factory=list)
+
+    def take(self, block: bus.ScopeBlock) -> None:
+        self.blocks.append(block)
+
+    @property
+    def rows(self) -> int:
+        """Samples so far, those that were lost included."""
+        return sum(len(block.samples) + block.dropped for block in self.blocks)
+
+    def latest(self) -> FloatArray:
+        """The newest rows of position, velocity and torque."""
+        block = self.blocks[-1]
+        return block.samples[:, [block.channels.index(name) for name in self.names[:3]]]
+
+    def runs(self) -> list[tuple[int, FloatArray, BoolArray]]:
+        """Runs without a gap: cycles missing before it, samples [n, k], validity [n]."""
+        found: list[tuple[int, FloatArray, BoolArray]] = []
+        for block in self.blocks:
+            samples = block.samples[:, [block.channels.index(name) for name in self.names]]
+            good = np.ones(len(samples), dtype=np.bool_) if block.valid is None else block.valid
+            # By the cycle counter and not by the clock: the grid follows the drives' clock.
+            missing = block.dropped if found else 0
+            if found and not missing:
+                before, rows, valid = found.pop()
+                samples, good = np.concatenate([rows, samples]), np.concatenate([valid, good])
+                missing = before
+            found.append((missing, samples, good))
+        return found
+
+
+def cycle_s(session: CyclicSession) -> float:
+    """Cycle time of a running exchange.
+
+    Raises:
+        NotAllowed: none runs.
+    """
+    if session.state is None:
+        raise NotAllowed(
+            f"{session.link.url}: the cyclic exchange does not run",
+            remedy="start it on the Connect page",
+        )
+    return session.state.cycle_s
+
+
+def require_signals(axis: Axis, session: CyclicSession, mode: Mode, offset: bool) -> None:
+    """What the measurement needs must come with every cycle.
+
+    Raises:
+        NotAllowed: naming the signal that does not.
+    """
+    drive = axis.drive
+    needed = [*_ROLES[:3], _TARGET_OF[mode], *(["torque_offset"] if offset else [])]
+    for role in needed:
+        key = drive.key(role)
+        if key is None or not session.carries(drive, key):
+            raise NotAllowed(
+                f"{drive.name}: {role.replace('_', ' ')} is not part of the cyclic data",
+                drive=drive.name,
+                parameter=key,
+                remedy="measure over a bus and a profile that carry it with every cycle",
+            )
+
+
+@asynccontextmanager
+async def enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterator[int]:
+    """Operation enabled through the loop, for the length of the block; yields the position.
+
+    On every way out the axis is braked and disabled.
+    """
+    axis.stopped = False
+    try:
+        await axis.go_to_cyclic(session, State.OPERATION_ENABLED, mode, _STATE_TIMEOUT_S)
+        await _forgotten(axis, session)
+        yield await axis.position_raw()
+    finally:
+        await shielded(lambda: _leave(axis, session), _STATE_TIMEOUT_S, axis.drive.name)
+
+
+async def _forgotten(axis: Axis, session: CyclicSession) -> None:
+    """Wait until the loop no longer tells why the motion before this one ended."""
+    power, station = session.power(), session.station(axis.drive)
+    deadline = time.monotonic() + _TAIL_S
+    while power is not None and power.axis_state(station)[2] and time.monotonic() < deadline:
+        await asyncio.sleep(_RENEW_S / 2)
+
+
+async def _leave(axis: Axis, session: CyclicSession) -> None:
+    if not session.running:
+        return
+    await session.cyclic.halt(session.station(axis.drive))
+    await axis.standstill(2.0)
+    if await axis.state() not in (State.FAULT, State.FAULT_REACTION):
+        await axis.go_to_cyclic(session, State.SWITCH_ON_DISABLED, None, _STATE_TIMEOUT_S)
+
+
+async def bus_limits(axis: Axis, envelope: Envelope, start_raw: int) -> bus.Envelope:
+    """An envelope around a starting point in raw units."""
+    units = await axis.units()
+    travel = units.position_raw(envelope.travel_rev)
+    return bus.Envelope(
+        position_min=start_raw - travel,
+        position_max=start_raw + travel,
+        speed_max=units.velocity_raw(envelope.speed_rpm),
+        torque_max=units.torque_raw(envelope.torque_percent),
+    )
+
+
+async def play(
+    axis: Axis,
+    session: CyclicSession,
+    sequence: Play,
+    limits: bus.Envelope,
+    rated_torque_nm: float,
+    progress: Callable[[float], None],
+    *,
+    until: Callable[[FloatArray], bool] | None = None,
+) -> Recording:
+    """Play one sequence on an enabled axis and return the recording.
+
+    ``until`` is called about 20 times a second with the latest rows [n, 3] of raw position,
+    velocity and torque and ends the motion early, by braking, when it returns True.
+
+    Raises:
+        NotAllowed: the envelope or a fault ended the motion; the reason is in words.
+        LinkLost: samples did not come.
+    """
+    drive = axis.drive
+    period_s = cycle_s(session)
+    keys = [drive.require(role) for role in _ROLES[:3]]
+    target_key = drive.require(_TARGET_OF[sequence.mode])
+    offset_key = drive.require(sequence.offset_role) if sequence.offset_role else None
+    names = [channel(drive, key) for key in [*keys, target_key]]
+    if offset_key is not None:
+        names.append(channel(drive, offset_key))
+    catch = _Catch(tuple(names))
+    trajectory = bus.Trajectory(
+        session.station(drive),
+        address_of(drive.parameter(target_key)),
+        sequence.values,
+        limits,
+        offset_target=address_of(drive.parameter(offset_key)) if offset_key else None,
+        offset_values=sequence.offsets,
+    )
+    unsubscribe = session.cyclic.blocks(catch.take)
+    try:
+        ended_early = await _drive_through(session, trajectory, period_s, catch, progress, until)
+    finally:
+        unsubscribe()
+    whole = np.column_stack(
+        [sequence.values] if sequence.offsets is None else [sequence.values, sequence.offsets]
+    ).astype(np.float64)
+    table, valid = aligned(whole, catch.runs(), drive.name, ended_early=ended_early)
+    return await _in_si(axis, whole, table, valid, period_s, rated_torque_nm)
+
+
+async def _drive_through(
+    session: CyclicSession,
+    trajectory: bus.Trajectory,
+    period_s: float,
+    catch: _Catch,
+    progress: Callable[[float], None],
+    until: Callable[[FloatArray], bool] | None,
+) -> bool:
+    """Renew until every sample of the sequence has come back; True when ended by ``until``."""
+    count = len(trajectory.values)
+    station = trajectory.station
+    await session.cyclic.play([trajectory])
+    begun = catch.rows
+    deadline = time.monotonic() + 1.5 * count * period_s + _TAIL_S
+    while True:
+        arrived = catch.rows - begun
+        # Some bunches beyond the end: the first samples may be older than the first set-point.
+        if arrived * period_s > count * period_s + 0.15:
+            return False
+        if time.monotonic() > deadline:
+            raise LinkLost(
+                f"only {arrived} of {count} samples came back from the bus",
+                remedy="look at the link quality; the computer or the bus is overloaded",
+            )
+        await asyncio.sleep(_RENEW_S)
+        raise_if_ended(session, station)
+        await session.cyclic.renew(station)
+        progress(min(1.0, arrived / count))
+        if until is not None and catch.blocks and until(catch.latest()):
+            await session.cyclic.halt(station)
+            return True
+
+
+def raise_if_ended(session: CyclicSession, station: int) -> None:
+    """Raise NotAllowed with the reason when the loop has ended the motion by force."""
+    power = session.power()
+    if power is not None and (reason := power.axis_state(station)[2]):
+        raise NotAllowed(
+            f"station {station}: {reason}",
+            remedy="see the Alarms page; check load, limits and gains, then widen the envelope "
+            "only if the machine allows it",
+        )
+    if not session.running:
+        raise LinkLost("the cyclic exchange ended during the measurement")
+
+
+async def _in_si(
+    axis: Axis,
+    whole: FloatArray,
+    table: FloatArray,
+    valid: BoolArray,
+    period_s: float,
+    rated_torque_nm: float,
+) -> Recording:
+    units = await axis.units()
+    count = len(table)
+    return Recording(
+        sample_rate_hz=1.0 / period_s,
+        position_rad=table[:, 0] * (units.position(1.0) * 2 * np.pi),
+        velocity_rad_s=table[:, 1] * (units.velocity(1.0) * 2 * np.pi / 60.0),
+        torque_nm=table[:, 2] * (units.torque(1.0) / 100.0 * rated_torque_nm),
+        sent=whole[:count, 0],
+        offset=whole[:count, 1] if whole.shape[1] > 1 else np.zeros(count),
+        valid=valid,
+    )
+
+
+def aligned(
+    sent: FloatArray,
+    runs: list[tuple[int, FloatArray, BoolArray]],
+    drive: str,
+    *,
+    ended_early: bool = False,
+) -> tuple[FloatArray, BoolArray]:
+    """Rows [n, k] of the recording, row i belonging to row i of ``sent`` [n, m].
+
+    The last m columns of each run repeat the set-points that went out. Where cycles are missing
+    between two runs, either the loop skipped them (the sequence then went on later) or the
+    samples were lost (it went on meanwhile); the set-points tell which. Rows beside a gap, rows
+    that were lost and rows whose set-points differ are not valid. With ``ended_early`` the rows
+    end where the sequence was broken off.
+
+    Raises:
+        LinkLost: the sequence cannot be found.
+    """
+    wide = sent.shape[1]
+    table = np.zeros((len(sent), runs[0][1].shape[1] if runs else wide))
+    valid = np.zeros(len(sent), dtype=np.bool_)
+    place: int | None = None
+    for missing, samples, good in runs:
+        echo = samples[:, -wide:]
+        if place is None:
+            place = _begin(sent, echo)
+            if place is None:
+                continue
+        elif _fits(sent, echo, place + missing) > _fits(sent, echo, place):
+            place += missing
+        rows = np.arange(place, place + len(samples))
+        inside = (rows >= 0) & (rows < len(sent))
+        table[rows[inside]] = samples[inside]
+        right = good & (np.all(echo == sent[np.clip(rows, 0, len(sent) - 1)], axis=1))
+        if missing:
+            right[:1] = False
+        valid[rows[inside]] = right[inside]
+        place += len(samples)
+    last = np.flatnonzero(valid)
+    if last.size < 0.5 * (0 if ended_early else len(sent)) or not last.size:
+        raise LinkLost(
+            f"{drive}: the set-points do not come back from the bus as they were sent",
+            drive=drive,
+            remedy="look at the link quality; the computer or the bus is overloaded",
+        )
+    count = int(last[-1]) + 1 if ended_early else len(sent)
+    return table[:count], valid[:count]
+
+
+def _fits(sent: FloatArray, echo: FloatArray, place: int) -> float:
+    """Share of the first rows of ``echo`` that agree when they begin at row ``place``."""
+    count = min(50, len(echo), len(sent) - place)
+    if count <= 0:
+        return 0.0
+    return float(np.mean(np.all(echo[:count] == sent[place : place + count], axis=1)))
+
+
+def _begin(sent: FloatArray, echo: FloatArray) -> int | None:
+    """Row of ``sent`` that the first row of ``echo`` is (negative: it is older); None if unsure."""
+    moving = np.any(np.diff(sent, axis=0) != 0, axis=1)
+    first = int(np.argmax(moving)) if np.any(moving) else 0
+    pattern = sent[first : first + 300]
+    best, hits = 0, 0
+    for start in range(len(echo) - min(20, len(pattern))):
+        window = echo[start : start + len(pattern)]
+        if window[1, 0] != pattern[1, 0] or window[1, -1] != pattern[1, -1]:
+            continue
+        same = int(np.count_nonzero(np.all(window == pattern[: len(window)], axis=1)))
+        if same > hits:
+            best, hits = start, same
+    return first - best if hits >= 15 else None
+
+
+def share(progress: Progress, low: float, high: float, step: str) -> Callable[[float], None]:
+    """A part of a job's progress bar."""
+    return lambda fraction: progress(low + (high - low) * fraction, step)
+
+
+async def quiet(axis: Axis, timeout_s: float = 3.0) -> None:
+    """Wait until the axis stands.
+
+    Raises:
+        LinkTimeout: it does not.
+    """
+    if not await axis.standstill(timeout_s):
+        raise LinkTimeout(
+            f"{axis.drive.name} does not come to rest within {timeout_s:g} s",
+            drive=axis.drive.name,
+            remedy="stop what moves it, or lower the gains if it oscillates",
+        )

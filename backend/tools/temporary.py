@@ -1,0 +1,97 @@
+"""Settings for the length of a measurement: written, made effective, and put back on every exit."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+
+from backend.axis import CLEANUP_TIMEOUT_S, Axis, RestoreFailed, shielded
+from backend.jobs import Progress
+from backend.tools.procedures import run_procedure
+from drivers.cia402 import State
+from drivers.errors import DriveError, NotAllowed
+
+
+async def make_effective(axis: Axis) -> None:
+    """Carry out "write settings" where the family needs it for changes to act.
+
+    Raises:
+        NotAllowed: the axis is enabled.
+    """
+    procedure = axis.drive.profile.procedure("write_settings")
+    if axis.drive.profile.quirk("write_settings") is not None and procedure is not None:
+        await run_procedure(axis, procedure, True, Progress(lambda: None))
+
+
+async def write_settings(axis: Axis, values: Mapping[str, int]) -> dict[str, int]:
+    """Write raw values that differ from what the drive has, and make them act.
+
+    Returns what was there before, for every key. Nothing is changed unless every value can be
+    written; a failure on the way puts back what was written.
+
+    Raises:
+        NotAllowed, OutOfRange: nothing was sent.
+        DriveError: the drive refused one; the earlier ones are back.
+    """
+    drive = axis.drive
+    for key, raw in values.items():
+        drive.check(drive.parameter(key), raw)
+    if values and await axis.state() is State.OPERATION_ENABLED:
+        raise NotAllowed(
+            f"{drive.name}: settings are changed only while the motor is not enabled",
+            drive=drive.name,
+            remedy="disable the axis first",
+        )
+    before = {key: await drive.raw(key) for key in values}
+    written: list[str] = []
+    try:
+        for key, raw in values.items():
+            if before[key] != raw:
+                written.append(key)
+                await drive.write(key, raw)
+        if written:
+            await make_effective(axis)
+    except BaseException:
+        earlier = {key: before[key] for key in written}
+        await shielded(lambda: put_back(axis, earlier), CLEANUP_TIMEOUT_S, drive.name)
+        raise
+    return before
+
+
+async def put_back(axis: Axis, before: Mapping[str, int]) -> None:
+    """Write these raw values where they differ, and make them act.
+
+    Raises:
+        RestoreFailed: naming what could not be put back.
+    """
+    drive = axis.drive
+    failed: list[str] = []
+    changed = False
+    for key, raw in before.items():
+        try:
+            if await drive.raw(key) != raw:
+                await drive.write(key, raw)
+                changed = True
+        except DriveError as error:
+            failed.append(f"{key} (was {raw}): {error.message}")
+    if changed or drive.pending:
+        try:
+            await make_effective(axis)
+        except DriveError as error:
+            failed.append(f"write settings: {error.message}")
+    if failed:
+        raise RestoreFailed(
+            f"{drive.name}: not restored: {'; '.join(failed)}",
+            drive=drive.name,
+            remedy="write these values by hand before the next motion",
+        )
+
+
+@asynccontextmanager
+async def temporary(axis: Axis, values: Mapping[str, int]) -> AsyncIterator[dict[str, int]]:
+    """These raw values act inside the block; yields what is put back afterwards."""
+    before = await write_settings(axis, values)
+    try:
+        yield before
+    finally:
+        await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, axis.drive.name)

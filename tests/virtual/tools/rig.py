@@ -1,0 +1,145 @@
+"""One axis over EtherCAT frames to a lockstep segment, with the tools' own layers above it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import tempfile
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from backend.axis import Axis, Envelope
+from backend.cyclic import CyclicSession
+from backend.drive import Drive, Port
+from backend.jobs import Progress
+from drivers.ethercat.link import EthercatLink
+from drivers.virtual.mechanics import MechanicsSpec, analytic_response
+from drivers.virtual.wires.ethercat.launch import VirtualSegment
+from drivers.virtual.wires.netns import Namespace
+from profiles.loader import load_profile
+
+URL = "ethercat://virtual0"
+WIDE = Envelope(travel_rev=4.0, speed_rpm=1500.0, torque_percent=100.0, time_s=60.0)
+
+
+def mechanics(
+    *loads: tuple[float, float, float],
+    motor: float = 5e-5,
+    viscous: float = 2e-4,
+    coulomb: float = 0.03,
+    gravity: float = 0.0,
+    noise: float = 2.0,
+    travel: tuple[float, float] | None = None,
+    backlash: float = 0.0,
+) -> MechanicsSpec:
+    """A 400 W motor and its chain of (inertia, stiffness, damping)."""
+    return MechanicsSpec.model_validate(
+        {
+            "motor": {"inertia_kgm2": motor, "rated_torque_nm": 1.27, "rated_speed_rpm": 3000},
+            "friction": {"viscous_nms": viscous, "coulomb_nm": coulomb, "gravity_nm": gravity},
+            "encoder": {"noise_counts": noise},
+            **({"travel": {"min_rev": travel[0], "max_rev": travel[1]}} if travel else {}),
+            "load": [
+                {
+                    "inertia_kgm2": j, "stiffness_nm_per_rad": k, "damping_nms_per_rad": d,
+                    "backlash_rad": backlash,
+                }
+                for j, k, d in loads
+            ],
+        }
+    )  # fmt: skip
+
+
+@dataclass
+class Bench:
+    axis: Axis
+    session: CyclicSession
+    segment: VirtualSegment
+    link: EthercatLink
+    spec: MechanicsSpec
+
+    async def values(self) -> dict[str, object]:
+        """Every stored setting of the drive, to see that a tool leaves all as it was."""
+        from backend import parameter_set
+
+        drive = self.axis.drive
+        keys = [p.key for p in parameter_set.storable(drive.profile, motor_individual=True)]
+        readings = await drive.read_many([k for k in keys if not k.startswith("60FE")])
+        return {key: reading.raw for key, reading in readings.items()}
+
+
+@asynccontextmanager
+async def bench(
+    namespace: Namespace, spec: MechanicsSpec, cycle_s: float = 1e-3, *, lockstep: bool = True,
+    settings: Mapping[str, int] | None = None, drive: str = "mms7",
+) -> AsyncIterator[Bench]:  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "bench.json"
+        axis_of = {
+            "name": "X", "drive": drive, "on": URL, "station": 1,
+            "mechanics": spec.model_dump(exclude_defaults=True),
+        }  # fmt: skip
+        file.write_text(json.dumps({"axis": [axis_of]}), "utf-8")
+        arguments = ["--bench", str(file), "--on", URL, "--sdo-ms", "0.2", "--eeprom-us", "5"]
+        if lockstep:
+            arguments.append("--lockstep")
+        with VirtualSegment.start("ec0s", arguments, namespace) as segment:
+            link = EthercatLink(
+                "ec0m", url=URL, launcher=namespace.command([]), lockstep=2.0 if lockstep else 0.0
+            )
+            await link.open()
+            try:
+                profile = load_profile(drive)
+                await link.scan(lambda _share, _text: None)
+                link.know(1, profile)
+                axis = Axis(Drive("x", "X", profile, [Port(link, 1, profile.link("ethercat"))]))
+                for key, raw in (settings or {}).items():
+                    await axis.drive.write(key, raw)
+                if settings:
+                    from backend.tools.temporary import make_effective
+
+                    await make_effective(axis)
+                session = CyclicSession(link, [axis.drive])
+                await session.start(cycle_s)
+                axis.session = session
+                try:
+                    yield Bench(axis, session, segment, link, spec)
+                finally:
+                    await session.stop()
+            finally:
+                await link.close()
+
+
+def silent() -> Progress:
+    return Progress(lambda: None)
+
+
+@dataclass(frozen=True)
+class Errors:
+    magnitude_db: float
+    phase_deg: float
+    covered: float
+    lines: int
+
+
+def errors(frf, spec: MechanicsSpec, low_hz: float, high_hz: float) -> Errors:
+    """Median errors against the analytic response over coherent lines of a band."""
+    f = np.asarray(frf.frequency_hz)
+    use = (f >= low_hz) & (f <= high_hz) & (frf.coherence >= 0.9)
+    ratio = frf.response[use] / analytic_response(spec, f[use])
+    db, deg = np.abs(20 * np.log10(np.abs(ratio))), np.abs(np.degrees(np.angle(ratio)))
+    inside = (db <= 1.96 * frf.std_db[use]) & (deg <= 1.96 * frf.std_deg[use])
+    return Errors(
+        float(np.median(db)), float(np.median(deg)), float(np.mean(inside)), int(use.sum())
+    )
+
+
+async def until(condition, within_s: float = 5.0) -> None:
+    deadline = asyncio.get_running_loop().time() + within_s
+    while not condition():
+        assert asyncio.get_running_loop().time() < deadline, f"not within {within_s} s"
+        await asyncio.sleep(0.01)
