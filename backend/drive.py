@@ -19,6 +19,9 @@ from profiles.schema import LinkSpec, Parameter, Profile, Raw
 
 #: Addresses per executor call. Small, so that a STOP never waits behind a long batch.
 BATCH = 16
+#: The same where the link itself lets a write go between two requests of a batch, and where
+#: neighbouring registers share a request: those of a long batch are split less often.
+REGISTER_BATCH = 64
 
 #: Roles that command motion; they are never "changed but not saved".
 _COMMAND_ROLES = frozenset({
@@ -46,6 +49,11 @@ class Port:
     link: Link
     station: int
     spec: LinkSpec | None
+
+    @property
+    def batch(self) -> int:
+        """Values to ask for in one call."""
+        return REGISTER_BATCH if self.spec and self.spec.max_registers else BATCH
 
     def carries(self, parameter: Parameter) -> bool:
         """Whether this port can transport the parameter."""
@@ -270,8 +278,10 @@ class Drive:
         done = len(result)
         for position, group in groups.items():
             port = self.ports[position]
-            for start in range(0, len(group), BATCH):
-                chunk = group[start : start + BATCH]
+            if port.batch > BATCH:
+                group.sort(key=lambda p: p.modbus_register or 0)
+            for start in range(0, len(group), port.batch):
+                chunk = group[start : start + port.batch]
                 readings = await self._read_chunk(port, chunk)
                 result.update({reading.key: reading for reading in readings})
                 done += len(chunk)
