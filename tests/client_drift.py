@@ -9,7 +9,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -62,7 +61,7 @@ def main() -> int:
         fresh = Path(folder) / "schema.d.ts"
         command = package["scripts"]["generate"].replace("src/api/schema.d.ts", str(fresh)).split()
         subprocess.run(
-            [shutil.which("npx") or "npx", "--no-install", *command],
+            [sys.executable, str(ROOT / "hatch_build.py"), "exec", "--offline", "--", *command],
             cwd=ROOT / "webui",
             check=True,
             stdout=subprocess.DEVNULL,

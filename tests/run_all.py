@@ -16,15 +16,16 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 BIN = Path(sys.executable).parent
-NPM = shutil.which("npm") or str(BIN / "npm")
+#: Without a system npm, the one of a Python package (see hatch_build.py).
+NPM = ["npm"] if shutil.which("npm") else [sys.executable, str(ROOT / "hatch_build.py")]
 
 CHECKS: list[tuple[str, list[str], Path]] = [
     ("format", [str(BIN / "ruff"), "format", "--check", "."], ROOT),
     ("lint", [str(BIN / "ruff"), "check", "."], ROOT),
     ("types", [str(BIN / "mypy")], ROOT),
     ("import contracts", [str(BIN / "lint-imports")], ROOT),
-    ("page: types and lint", [NPM, "run", "--silent", "check"], ROOT / "webui"),
-    ("page: unit tests", [NPM, "run", "--silent", "test"], ROOT / "webui"),
+    ("page: types and lint", [*NPM, "run", "--silent", "check"], ROOT / "webui"),
+    ("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),
     ("client drift", [sys.executable, "tests/client_drift.py"], ROOT),
     ("docs", [str(BIN / "mkdocs"), "build", "--strict", "--quiet"], ROOT),
     ("tests", [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "loadfile",
