@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from backend.drive import Drive
+from drivers.errors import NotAllowed
 from profiles.schema import Parameter, UnitSpec
 
 #: Raw units per rpm for families that count speed in turns; inc/s depends on the gearing.
@@ -93,12 +94,15 @@ async def read_units(drive: Drive) -> AxisUnits:
     """Units of an axis with its present gearing.
 
     User increments per motor revolution are ``feed/feed_revs * shaft_revs/motor_revs`` where the
-    family has a feed constant, else the profile's resolution divided by the gear ratio.
+    family has a feed constant, else the profile's resolution divided by the gear ratio. A feed
+    constant of 0 leaves the resolution unknown (M6-L with P05.05 = 0, 000:1276).
 
     Raises:
         DriveError: the gear parameters cannot be read.
+        NotAllowed: a unit switch of the drive is not where the profile's units hold.
     """
     spec = drive.profile.units
+    await _check_unit_switches(drive)
     keys = [
         key
         for key in (spec.gear_numerator, spec.gear_denominator, spec.feed, spec.feed_revolutions)
@@ -107,7 +111,7 @@ async def read_units(drive: Drive) -> AxisUnits:
     raw: dict[str, float] = {}
     for key in keys:
         value = (await drive.read(key)).raw
-        if isinstance(value, (int, float)) and value > 0:
+        if isinstance(value, (int, float)) and (value > 0 or key == spec.feed):
             raw[key] = float(value)
 
     def of(key: str | None) -> float:
@@ -115,7 +119,32 @@ async def read_units(drive: Drive) -> AxisUnits:
 
     ratio = of(spec.gear_numerator) / of(spec.gear_denominator)
     if spec.feed is not None and spec.feed in raw:
-        per_rev: float | None = of(spec.feed) / of(spec.feed_revolutions)
+        per_rev: float | None = of(spec.feed) / of(spec.feed_revolutions) or None
     else:
         per_rev = spec.counts_per_rev
     return AxisUnits(spec, None if per_rev is None else per_rev / ratio)
+
+
+async def _check_unit_switches(drive: Drive) -> None:
+    """Refuse where a parameter gives the motion objects other units than those of the profile.
+
+    Raises:
+        NotAllowed: naming the parameter and the value at which the units hold.
+    """
+    for quirk in drive.profile.quirks:
+        if quirk.kind != "unit_switch" or quirk.key is None or quirk.raw is None:
+            continue
+        parameter = drive.parameter(quirk.key)
+        if drive.unreachable_why(parameter):
+            continue
+        found = (await drive.read(quirk.key)).raw
+        if found != quirk.raw:
+            raise NotAllowed(
+                f"{drive.name}: {parameter.number or parameter.key} {parameter.name} is {found}; "
+                f"the units of this tool hold for {quirk.raw}",
+                drive=drive.name,
+                parameter=parameter.key,
+                value=found,
+                limit=str(quirk.raw),
+                remedy=f"set it back to {quirk.raw}. {quirk.help}",
+            )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Literal
 
 from drivers.errors import DriveError, Rejected
 from drivers.link import (
@@ -20,7 +21,7 @@ class MemoryLink:
     """Objects in memory. ``failures`` are raised in turn by the next writes after they act."""
 
     def __init__(self, objects: dict[tuple[int, int], bytes]) -> None:
-        self.kind = "mlink"
+        self.kind: Literal["ethercat", "canopen", "modbus", "mlink"] = "mlink"
         self.url = "mlink://memory"
         self.cyclic: Cyclic | None = None
         self.objects = objects

@@ -1,0 +1,58 @@
+"""Units of an axis as its drive has them, with the M6-L's switches and gearing."""
+
+from __future__ import annotations
+
+import pytest
+
+from backend.drive import Drive, Port
+from backend.units import read_units
+from drivers.errors import NotAllowed
+from drivers.link import Found
+from profiles import load_profile
+from tests.support.memory_link import MemoryLink
+
+PROFILE = load_profile("m6l")
+
+
+def m6l(pulses: int, numerator: int = 1, denominator: int = 1, **switches: int) -> Drive:
+    link = MemoryLink(
+        {
+            (0x2005, 6): pulses.to_bytes(4, "little"),  # P05.05
+            (0x6091, 1): numerator.to_bytes(4, "little"),
+            (0x6091, 2): denominator.to_bytes(4, "little"),
+            (0x2014, 0x0F): switches.get("torque", 0).to_bytes(2, "little"),  # P20.14
+            (0x2014, 0x10): switches.get("speed", 1).to_bytes(2, "little"),  # P20.15
+        }
+    )
+    link.kind = "ethercat"
+    drive = Drive("x", "X axis", PROFILE, [Port(link, 1, PROFILE.links[0])])
+    drive.found = Found(1)
+    return drive
+
+
+async def test_command_pulses_and_gear_factor_together() -> None:
+    """Screw of 10 mm per revolution, 23 bits: 8388608 over 10 makes the unit 1 mm (000:1794)."""
+    units = await read_units(m6l(8388608, 8388608, 10))
+    assert units.counts_per_rev == pytest.approx(10)
+    assert (await read_units(m6l(10000))).counts_per_rev == 10000  # 000:3296
+
+
+async def test_resolution_is_unknown_while_the_gear_ratios_rule() -> None:
+    """P05.05 = 0 (000:1276): nothing is converted, and nothing shown as revolutions."""
+    units = await read_units(m6l(0))
+    assert units.counts_per_rev is None
+    assert units.names["position"] == "inc"
+
+
+@pytest.mark.parametrize(
+    ("switches", "number"), [({"speed": 0}, "P20.15"), ({"torque": 1}, "P20.14")]
+)
+async def test_other_units_are_refused(switches: dict[str, int], number: str) -> None:
+    """rpm taken for increments per second would run away (000:3695-3696)."""
+    with pytest.raises(NotAllowed, match=number) as refusal:
+        await read_units(m6l(10000, **switches))
+    assert "set it back" in (refusal.value.remedy or "")
+
+
+def test_unit_switches_make_the_units_be_read_again() -> None:
+    assert {"2014:0F", "2014:10", "2005:06", "6091:01"} <= PROFILE.unit_keys
