@@ -493,9 +493,10 @@ class Profile(Frozen):
 
     @cached_property
     def unit_keys(self) -> frozenset[str]:
-        """Parameters that change what a position increment is."""
+        """Parameters that change what a position increment or another motion unit is."""
         units = self.units
-        keys = (units.gear_numerator, units.gear_denominator, units.feed, units.feed_revolutions)
+        keys = [units.gear_numerator, units.gear_denominator, units.feed, units.feed_revolutions]
+        keys += [quirk.key for quirk in self.quirks if quirk.kind == "unit_switch"]
         return frozenset(key for key in keys if key is not None)
 
     @cached_property
