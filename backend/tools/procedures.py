@@ -9,7 +9,16 @@ from backend.axis import Axis
 from backend.jobs import JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, Rejected
-from profiles.schema import ConfirmStep, PollStep, Procedure, ReconnectStep, WaitStep, WriteStep
+from profiles.schema import (
+    ConfirmStep,
+    PollStep,
+    Procedure,
+    ReconnectStep,
+    RewriteStep,
+    Step,
+    WaitStep,
+    WriteStep,
+)
 
 _POLL_S = 0.1
 
@@ -22,6 +31,8 @@ def describe(procedure: Procedure) -> list[str]:
             case WriteStep():
                 shown = f"0x{step.raw:X}" if isinstance(step.raw, int) else step.raw
                 words.append(f"write {shown} to {step.key}")
+            case RewriteStep():
+                words.append("write again what was changed since the last save")
             case WaitStep():
                 words.append(f"leave the drive alone for {step.seconds:g} s")
             case PollStep():
@@ -72,9 +83,7 @@ async def run_procedure(
     return {"procedure": procedure.name, "steps": words}
 
 
-async def _step(
-    axis: Axis, step: WriteStep | WaitStep | PollStep | ConfirmStep | ReconnectStep
-) -> None:
+async def _step(axis: Axis, step: Step) -> None:
     drive = axis.drive
     match step:
         case WriteStep():
@@ -83,6 +92,12 @@ async def _step(
                 await drive.write(step.key, value)
             else:
                 await drive.command(step.key, int(value))
+        case RewriteStep():
+            for key in sorted(drive.unsaved):
+                # Read again: what is stored must be what the drive holds, not what was seen last.
+                raw = (await drive.read(key)).raw
+                if raw is not None:
+                    await drive.write(key, raw)
         case WaitStep():
             await asyncio.sleep(step.seconds)
         case PollStep():
