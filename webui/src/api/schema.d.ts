@@ -374,6 +374,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/ports": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Add Port
+         * @description Connect a drive over a second bus; each parameter then goes the way that carries it.
+         */
+        post: operations["add_port"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/procedures": {
         parameters: {
             query?: never;
@@ -1674,6 +1694,16 @@ export interface components {
             watchdog_help: string;
         };
         /**
+         * PortRequest
+         * @description A further port of a drive that is already connected.
+         */
+        PortRequest: {
+            /** Station */
+            station: number;
+            /** Url */
+            url: string;
+        };
+        /**
          * Problem
          * @description RFC 9457 problem details, with what a person needs to act.
          */
@@ -2230,6 +2260,7 @@ export type ParameterWrites = components['schemas']['ParameterWrites'];
 export type Ping = components['schemas']['Ping'];
 export type Pong = components['schemas']['Pong'];
 export type PortInfo = components['schemas']['PortInfo'];
+export type PortRequest = components['schemas']['PortRequest'];
 export type Problem = components['schemas']['Problem'];
 export type ProcedureInfo = components['schemas']['ProcedureInfo'];
 export type ProcedureRequest = components['schemas']['ProcedureRequest'];
@@ -4089,6 +4120,88 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ParameterValue"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    add_port: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PortRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DriveSummary"];
                 };
             };
             /** @description No such thing */

@@ -38,7 +38,9 @@ export function linkLook(quality: Quality | null): {
 } {
   if (!quality) return { word: 'none', tone: 'old' }
   if (!quality.connected) return { word: 'lost', tone: 'fault' }
-  const share = troubles(quality) / Math.max(1, quality.transactions)
+  // Frames of a cyclic exchange count too, and outnumber everything else where there is one.
+  const cycles = Number(quality.details.cyclic_cycles ?? 0) || 0
+  const share = troubles(quality) / Math.max(1, quality.transactions + cycles)
   if (share > 0.02) return { word: 'poor', tone: 'fault' }
   if (share > 0.001) return { word: 'fair', tone: 'warn' }
   return { word: 'good', tone: 'live' }

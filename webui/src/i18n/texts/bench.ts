@@ -43,6 +43,10 @@ export const bench = {
     'Nothing the drive told fits this profile. Writing with a wrong profile can damage the machine.',
     '驱动器信息与此配置文件不符。使用错误的配置文件写入可能损坏机器。',
   ],
+  'connect.secondPort': [
+    'It is {name}: add as its second connection',
+    '这是 {name}：添加为第二连接',
+  ],
   'connect.name': ['Name', '名称'],
   'connect.notes': ['Notes', '备注'],
   'connect.connect': ['Connect', '连接'],
@@ -138,6 +142,10 @@ export const bench = {
   'scope.timing': ['Timing', '时序'],
   'scope.synchronous': ['synchronous', '同步'],
   'scope.polled': ['polled', '轮询'],
+  'scope.invalid': [
+    'no valid value in sight: see the link quality',
+    '所示时段无有效值，请查看链路质量',
+  ],
   'scope.age': ['{age} s old', '滞后 {age} 秒'],
   'scope.between': ['Between the cursors: {time} s', '光标间隔：{time} 秒'],
   'scope.dropped': [

@@ -97,6 +97,15 @@ function Found({ found }: { found: FoundDrive }) {
   const used = drives.find((drive) =>
     drive.ports.some((port) => port.url === found.url && port.station === found.station),
   )
+  const addPort = (drive: string) =>
+    connect.run(() =>
+      ask(
+        api.POST('/api/v1/drives/{drive_id}/ports', {
+          params: { path: { drive_id: drive } },
+          body: { url: found.url, station: found.station },
+        }),
+      ),
+    )
   return (
     <div className="found">
       <p>
@@ -156,6 +165,14 @@ function Found({ found }: { found: FoundDrive }) {
           </Button>
         </div>
       )}
+      {!used &&
+        drives
+          .filter((drive) => drive.profile === profile)
+          .map((drive) => (
+            <Button key={drive.id} loading={connect.busy} onClick={() => void addPort(drive.id)}>
+              {t('connect.secondPort', { name: drive.name })}
+            </Button>
+          ))}
       {!used && profile !== '' && (
         <p className={match?.confidence === 'certain' ? 'dim' : 'warn-text'}>
           {match ? match.why : t('connect.noMatch')}

@@ -75,6 +75,9 @@ export function Measurements({
                       ? ''
                       : t(synchronous[i] ? 'scope.synchronous' : 'scope.polled')}
                     {frame?.rates[i] != null && ` ${figure(frame.rates[i], 3)}/s`}
+                    {frame !== null && m === null && frame.rates[i] !== null && (
+                      <strong className="warn-text"> {t('scope.invalid')}</strong>
+                    )}
                     {(frame?.ages[i] ?? 0) > 0.2 &&
                       ` · ${t('scope.age', { age: figure(frame?.ages[i], 2) })}`}
                   </td>

@@ -1,0 +1,36 @@
+import { describe, expect, it } from 'vitest'
+import type { Quality } from '../api/schema'
+import { linkLook } from './states'
+
+const quality = (part: Partial<Quality>): Quality => ({
+  connected: true,
+  state: 'open',
+  transactions: 10_000,
+  timeouts: 0,
+  crc_errors: 0,
+  framing_errors: 0,
+  retries: 0,
+  lost_frames: 0,
+  wkc_errors: 0,
+  round_trip_ms: 1,
+  details: {},
+  ...part,
+})
+
+describe('link quality in a word', () => {
+  it('follows the share of exchanges that went wrong', () => {
+    expect(linkLook(null).word).toBe('none')
+    expect(linkLook(quality({ connected: false })).word).toBe('lost')
+    expect(linkLook(quality({ timeouts: 10 })).word).toBe('good')
+    expect(linkLook(quality({ timeouts: 11 })).word).toBe('fair')
+    expect(linkLook(quality({ crc_errors: 201 })).word).toBe('poor')
+  })
+  it('counts the frames of a cyclic exchange', () => {
+    const cyclic = quality({
+      transactions: 30,
+      lost_frames: 8,
+      details: { cyclic_cycles: 100_000 },
+    })
+    expect(linkLook(cyclic).word).toBe('good')
+  })
+})
