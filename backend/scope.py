@@ -49,6 +49,8 @@ class Subscription:
     since: float = 0.0
     synchronous: bool = False
     leave: Callable[[], None] | None = None
+    sink: Callable[[ScopeBlock], None] | None = None
+    """Takes every block at once instead of the queue, for who must not lose any. Never blocks."""
 
     def take(self, block: ScopeBlock) -> None:
         """A block of the cyclic exchange."""
@@ -60,23 +62,25 @@ class Subscription:
             valid: np.ndarray[tuple[int], np.dtype[np.bool_]] | None = None) -> None:  # fmt: skip
         """Queue a block, or count it as dropped."""
         self.dropped += lost
-        if len(self.queue) >= QUEUE_BLOCKS:
+        if self.sink is None and len(self.queue) >= QUEUE_BLOCKS:
             self.dropped += len(samples)
             return
         self.sequence += 1
-        self.queue.append(
-            ScopeBlock(
-                sequence=self.sequence,
-                t0_s=t0_s,
-                dt_s=dt_s,
-                channels=self.keys,
-                samples=samples,
-                dropped=self.dropped,
-                times_s=times_s,
-                valid=valid,
-            )
+        block = ScopeBlock(
+            sequence=self.sequence,
+            t0_s=t0_s,
+            dt_s=dt_s,
+            channels=self.keys,
+            samples=samples,
+            dropped=self.dropped,
+            times_s=times_s,
+            valid=valid,
         )
         self.dropped = 0
+        if self.sink is not None:
+            self.sink(block)
+            return
+        self.queue.append(block)
         self.ready.set()
 
     async def next(self) -> ScopeBlock:

@@ -1,0 +1,1 @@
+"""Recordings: lossless to disk, kept through crashes and full disks, exported, and captured."""

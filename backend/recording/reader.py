@@ -1,0 +1,256 @@
+"""Reads recordings, whole ones and those that a crash or a full disk cut short."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, BinaryIO, Literal
+
+from backend.recording import chunks
+from backend.recording.chunks import Samples
+from drivers.errors import NotAllowed
+
+
+class BadRecording(NotAllowed):
+    """A file that is no recording, or whose beginning is damaged."""
+
+    kind = "bad-recording"
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One recorded signal. ``name`` is unique in the recording; ``column`` in its stream."""
+
+    stream: int
+    column: int
+    drive: str
+    drive_name: str
+    key: str
+    name: str
+    unit: str
+    synchronous: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """The same moment on the clock of the samples and in seconds since the epoch."""
+
+    sample_s: float
+    epoch_s: float
+
+    def epoch(self, t_s: float) -> float:
+        """Seconds since the epoch of a sample time."""
+        return self.epoch_s + (t_s - self.sample_s)
+
+
+@dataclass(frozen=True, slots=True)
+class BlockRef:
+    """Where a block of samples lies in the file."""
+
+    offset: int
+    stream: int
+    rows: int
+    t0_s: float
+    last_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What a recording is. ``state``: ``interrupted`` has no end chunk (crash, full disk)."""
+
+    header: dict[str, Any]
+    clock: Clock
+    channels: tuple[Channel, ...]
+    state: Literal["complete", "interrupted", "failed"]
+    reason: str
+    problem: str
+    samples: int
+    lost: int
+    first_s: float | None
+    last_s: float | None
+    bytes: int
+
+    @property
+    def duration_s(self) -> float:
+        """From the first to the last sample."""
+        if self.first_s is None or self.last_s is None:
+            return 0.0
+        return self.last_s - self.first_s
+
+
+@dataclass(slots=True)
+class _Scan:
+    samples: int = 0
+    lost: int = 0
+    first_s: float | None = None
+    last_s: float | None = None
+    refs: list[BlockRef] = field(default_factory=list)
+
+
+class RecordingReader:
+    """An open recording. Use it in ``with``.
+
+    Raises:
+        BadRecording: the file is none, or its header is not whole. NotAllowed: no such file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._file: BinaryIO = path.open("rb")
+        except OSError as error:
+            raise NotAllowed(
+                f"there is no recording {path.name}",
+                value=path.name,
+                remedy="choose one from the list of recordings",
+            ) from error
+        try:
+            self.header = self._read_header()
+            self.channels = _channels(self.header)
+            clock = self.header["clock"]
+            self.clock = Clock(float(clock["sample_s"]), float(clock["epoch_s"]))
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            self._file.close()
+            raise BadRecording(
+                f"{path.name} is not a recording, or its beginning is damaged",
+                value=path.name,
+                remedy="delete it, or open it with the version that wrote it",
+            ) from error
+
+    def __enter__(self) -> RecordingReader:
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self._file.close()
+
+    def _read_header(self) -> dict[str, Any]:
+        if self._file.read(len(chunks.MAGIC)) != chunks.MAGIC:
+            raise ValueError("no magic")
+        first = self._chunk()
+        if first is None or first[0] != chunks.HEADER:
+            raise ValueError("no header")
+        self._begin = self._file.tell()
+        content: dict[str, Any] = json.loads(first[1])
+        return content
+
+    def _chunk(self) -> tuple[int, bytes] | None:
+        """The next chunk, or None where the good part of the file ends."""
+        head = chunks.frame_head(self._file.read(chunks.FRAME.size))
+        if head is None:
+            return None
+        kind, length, crc = head
+        payload = self._file.read(length)
+        if len(payload) < length or not chunks.intact(kind, payload, crc):
+            return None
+        return kind, payload
+
+    def chunks(self) -> Iterator[tuple[int, bytes]]:
+        """Kind and payload of all whole chunks after the header, in the order of writing."""
+        self._file.seek(self._begin)
+        while (chunk := self._chunk()) is not None:
+            position = self._file.tell()
+            yield chunk
+            self._file.seek(position)
+
+    def blocks(self) -> Iterator[Samples]:
+        """All blocks of samples, in the order of writing."""
+        for kind, payload in self.chunks():
+            if kind == chunks.SAMPLES:
+                yield chunks.read_samples(payload)
+
+    def block(self, ref: BlockRef) -> Samples:
+        """One block."""
+        self._file.seek(ref.offset)
+        chunk = self._chunk()
+        if chunk is None:
+            raise BadRecording(f"{self.path.name} changed while it was read", value=ref.offset)
+        return chunks.read_samples(chunk[1])
+
+    def events(self) -> list[dict[str, Any]]:
+        """All events: parameter changes, faults, log lines, the trigger."""
+        return [json.loads(p) for kind, p in self.chunks() if kind == chunks.EVENT]
+
+    def index(self) -> list[BlockRef]:
+        """Where each block lies and which time it covers."""
+        return self._scan().refs
+
+    def _scan(self) -> _Scan:
+        found = _Scan()
+        self._file.seek(self._begin)
+        while True:
+            offset = self._file.tell()
+            chunk = self._chunk()
+            if chunk is None:
+                return found
+            kind, payload = chunk
+            if kind != chunks.SAMPLES:
+                continue
+            head = chunks.block_head(payload)
+            if not head.rows:
+                continue
+            last = float(chunks.read_samples(payload).times_s[-1])
+            found.refs.append(BlockRef(offset, head.stream, head.rows, head.t0_s, last))
+            found.samples += head.rows
+            found.lost += head.lost
+            found.first_s = head.t0_s if found.first_s is None else min(found.first_s, head.t0_s)
+            found.last_s = last if found.last_s is None else max(found.last_s, last)
+
+    def _end(self) -> dict[str, Any] | None:
+        """The end chunk, found through the trailer."""
+        size = self._file.seek(0, 2)
+        if size < chunks.TRAILER.size:
+            return None
+        self._file.seek(size - chunks.TRAILER.size)
+        magic, offset = chunks.TRAILER.unpack(self._file.read(chunks.TRAILER.size))
+        if magic != chunks.TRAILER_MAGIC or offset >= size:
+            return None
+        self._file.seek(offset)
+        chunk = self._chunk()
+        if chunk is None or chunk[0] != chunks.END:
+            return None
+        content: dict[str, Any] = json.loads(chunk[1])
+        return content
+
+    def summary(self) -> Summary:
+        """What it holds; of an interrupted file the samples are counted."""
+        end = self._end()
+        scan = None if end is not None else self._scan()
+        facts = end or {"reason": "interrupted", "problem": "it was cut off: a crash or full disk"}
+        reason = str(facts.get("reason", ""))
+        state: Literal["complete", "interrupted", "failed"] = "complete"
+        if end is None:
+            state = "interrupted"
+        elif reason == "failed":
+            state = "failed"
+        return Summary(
+            header=self.header,
+            clock=self.clock,
+            channels=self.channels,
+            state=state,
+            reason=reason,
+            problem=str(facts.get("problem", "")),
+            samples=scan.samples if scan else int(facts.get("samples", 0)),
+            lost=scan.lost if scan else int(facts.get("lost", 0)),
+            first_s=scan.first_s if scan else facts.get("first_s"),
+            last_s=scan.last_s if scan else facts.get("last_s"),
+            bytes=self.path.stat().st_size,
+        )
+
+
+def _channels(header: dict[str, Any]) -> tuple[Channel, ...]:
+    return tuple(
+        Channel(
+            stream=int(number),
+            column=column,
+            drive=str(channel["drive"]),
+            drive_name=str(channel["drive_name"]),
+            key=str(channel["key"]),
+            name=str(channel["name"]),
+            unit=str(channel["unit"]),
+            synchronous=bool(stream["synchronous"]),
+        )
+        for number, stream in enumerate(header["streams"])
+        for column, channel in enumerate(stream["channels"])
+    )

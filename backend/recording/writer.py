@@ -1,0 +1,247 @@
+"""Writes one recording on a thread of its own; its queue never drops, it fails instead."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import BinaryIO
+
+from backend.files import StorageFailed
+from backend.recording import chunks
+from drivers.link import ScopeBlock
+
+#: Blocks that may wait for the disk. At 16 channels × 4 kHz it holds two minutes.
+MAX_QUEUED_BYTES = 64 * 1024 * 1024
+#: What was recorded is on the disk at least this often, so that also a power cut loses no more.
+SYNC_S = 0.5
+#: A recording ends while this much is still free, so that the rest of the system lives on.
+RESERVE_BYTES = 200 * 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """Figures of a recording. ``first_s``/``last_s``: sample times on the recording's clock."""
+
+    samples: int = 0
+    blocks: int = 0
+    bytes: int = 0
+    lost: int = 0
+    first_s: float | None = None
+    last_s: float | None = None
+    queued_bytes: int = 0
+
+
+def free_bytes(folder: Path) -> int:
+    """Free space of the disk that holds ``folder``."""
+    return shutil.disk_usage(folder).free
+
+
+class RecordingWriter:
+    """One open file. All public methods return at once; the disk is touched by the thread.
+
+    ``failed`` is called once, on the writer's thread, when the recording ends by itself: disk
+    full, disk gone, or too slow for the samples. What was written up to there is readable.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        header: Mapping[str, object],
+        failed: Callable[[StorageFailed], None],
+        *,
+        max_queued_bytes: int = MAX_QUEUED_BYTES,
+        reserve_bytes: int = RESERVE_BYTES,
+        free: Callable[[Path], int] = free_bytes,
+    ) -> None:
+        self.path = path
+        self._failed = failed
+        self._limit = max_queued_bytes
+        self._reserve = reserve_bytes
+        self._free = free
+        self._queue: deque[tuple[int, ScopeBlock] | bytes] = deque()
+        self._queued = 0
+        self._wake = threading.Condition()
+        self._closing: dict[str, object] | None = None
+        self._error: StorageFailed | None = None
+        self._written = Written()
+        self._good = 0
+        self._file = self._create(chunks.MAGIC + chunks.json_chunk(chunks.HEADER, header))
+        self._thread = threading.Thread(target=self._run, name=f"record-{path.stem}", daemon=True)
+        self._thread.start()
+
+    # --- called by the event loop -----------------------------------------------------
+
+    def put(self, stream: int, block: ScopeBlock) -> None:
+        """Queue a block. After a failure it does nothing; ``failed`` told it."""
+        self._add((stream, block), block.samples.nbytes + 64)
+
+    def event(self, content: Mapping[str, object]) -> None:
+        """Queue an event."""
+        data = chunks.json_chunk(chunks.EVENT, content)
+        self._add(data, len(data))
+
+    def written(self) -> Written:
+        """Figures up to now."""
+        return replace(self._written, queued_bytes=self._queued)
+
+    def close(self, end: Mapping[str, object]) -> Written:
+        """Write what is queued and the end chunk; blocks until the disk has it.
+
+        Raises:
+            StorageFailed: the recording failed before or now.
+        """
+        with self._wake:
+            self._closing = self._closing or dict(end)
+            self._wake.notify()
+        self._thread.join()
+        if self._error is not None:
+            raise self._error
+        return self._written
+
+    def _add(self, item: tuple[int, ScopeBlock] | bytes, size: int) -> None:
+        with self._wake:
+            if self._error is not None or self._closing is not None:
+                return
+            if self._queued + size > self._limit:
+                self._error = StorageFailed(
+                    f"{self.path.name}: the disk does not keep up; {self._queued >> 20} MiB wait",
+                    value=self._queued,
+                    limit=f"{self._limit >> 20} MiB",
+                    remedy="record fewer channels or onto a faster disk; what was written is good",
+                )
+            else:
+                self._queue.append(item)
+                self._queued += size
+            self._wake.notify()
+
+    # --- the thread -------------------------------------------------------------------
+
+    def _create(self, head: bytes) -> BinaryIO:
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._check_space()
+            file = self.path.open("xb", buffering=0)
+        except OSError as error:
+            raise self._storage(error) from error
+        try:
+            _write(file, head)
+            os.fsync(file.fileno())
+        except OSError as error:
+            file.close()
+            self.path.unlink(missing_ok=True)
+            raise self._storage(error) from error
+        self._good = len(head)
+        self._written = Written(bytes=self._good)
+        return file
+
+    def _run(self) -> None:
+        synced = time.monotonic()
+        try:
+            while True:
+                with self._wake:
+                    if not self._queue and self._closing is None and self._error is None:
+                        self._wake.wait(SYNC_S)
+                    items, self._queue = list(self._queue), deque()
+                    closing, error = self._closing, self._error
+                    self._queued = 0
+                self._append(items)
+                if error is not None:
+                    raise error
+                if closing is not None:
+                    self._end(closing)
+                    return
+                if time.monotonic() - synced >= SYNC_S:
+                    os.fsync(self._file.fileno())
+                    self._check_space()
+                    synced = time.monotonic()
+        except OSError as error:
+            self._give_up(self._storage(error))
+        except StorageFailed as error:
+            self._give_up(error)
+        finally:
+            self._file.close()
+
+    def _append(self, items: list[tuple[int, ScopeBlock] | bytes]) -> None:
+        now = self._written
+        samples, blocks, lost = now.samples, now.blocks, now.lost
+        first, last, data = now.first_s, now.last_s, []
+        for item in items:
+            if isinstance(item, bytes):
+                data.append(item)
+                continue
+            stream, block = item
+            data.append(chunks.samples_chunk(stream, block))
+            rows = len(block.samples)
+            samples, blocks, lost = samples + rows, blocks + 1, lost + block.dropped
+            if rows:
+                end = block.t0_s + block.dt_s * (rows - 1)
+                end = float(block.times_s[-1]) if block.times_s is not None else end
+                first = block.t0_s if first is None else min(first, block.t0_s)
+                last = end if last is None else max(last, end)
+        if data:
+            whole = b"".join(data)
+            _write(self._file, whole)
+            self._good += len(whole)
+        self._written = Written(samples, blocks, self._good, lost, first, last)
+
+    def _end(self, content: dict[str, object]) -> None:
+        summary = end_summary(self._written) | content
+        at = self._good
+        end = chunks.json_chunk(chunks.END, summary)
+        _write(self._file, end + chunks.TRAILER.pack(chunks.TRAILER_MAGIC, at))
+        os.fsync(self._file.fileno())
+
+    def _give_up(self, error: StorageFailed) -> None:
+        """Leave a file that ends with a whole chunk, and an end chunk if there is room for it."""
+        with self._wake:
+            self._error = error
+            self._queue.clear()
+        try:
+            os.ftruncate(self._file.fileno(), self._good)
+            os.lseek(self._file.fileno(), self._good, os.SEEK_SET)
+            self._end({"reason": "failed", "problem": error.message})
+        except OSError:
+            # A full disk takes no end chunk either; the reader does without.
+            os.ftruncate(self._file.fileno(), self._good)
+        self._failed(error)
+
+    def _check_space(self) -> None:
+        free = self._free(self.path.parent)
+        if free < self._reserve:
+            raise StorageFailed(
+                f"{self.path.name}: the disk is nearly full, {free >> 20} MiB are left",
+                value=free,
+                limit=f"{self._reserve >> 20} MiB stay free",
+                remedy="delete old recordings or free some space; what was written is good",
+            )
+
+    def _storage(self, error: OSError) -> StorageFailed:
+        return StorageFailed(
+            f"{self.path.name} could not be written: {error.strerror or error}",
+            value=str(self.path),
+            remedy="free some space or choose another folder; what was written is good",
+        )
+
+
+def end_summary(written: Written) -> dict[str, object]:
+    """The figures of the end chunk."""
+    return {
+        "samples": written.samples,
+        "blocks": written.blocks,
+        "lost": written.lost,
+        "first_s": written.first_s,
+        "last_s": written.last_s,
+    }
+
+
+def _write(file: BinaryIO, data: bytes) -> None:
+    """All of it; an unbuffered write may take only a part."""
+    view = memoryview(data)
+    while view:
+        view = view[file.write(view) :]
