@@ -14,6 +14,9 @@ def fault_keys(drive: Drive) -> list[str]:
     reachable = {key for key in keys if not drive.unreachable_why(drive.parameter(key))}
     if (code := drive.key("error_code")) is not None:
         reachable.add(code)
+    kind = drive.profile.quirk("warning_bit_7")
+    if kind is not None and kind.key is not None:
+        reachable.add(kind.key)
     return sorted(reachable)
 
 
@@ -29,6 +32,7 @@ def active_faults(drive: Drive, readings: Mapping[str, Reading]) -> list[Fault]:
         )
         if by_bit or (code and fault.code_raw is not None and fault.code_raw in (code, masked)):
             found.append(fault)
+    found = _of_the_present_kind(drive, readings, found)
     if code and not found:
         found.append(
             Fault(
@@ -39,6 +43,18 @@ def active_faults(drive: Drive, readings: Mapping[str, Reading]) -> list[Fault]:
             )
         )
     return found
+
+
+def _of_the_present_kind(
+    drive: Drive, readings: Mapping[str, Reading], found: list[Fault]
+) -> list[Fault]:
+    """Where fault and alarm share a number, the one that bit 7 of the status word means."""
+    quirk = drive.profile.quirk("warning_bit_7")
+    status = integer(readings.get(quirk.key or "")) if quirk is not None else None
+    if status is None:
+        return found
+    kind = "warning" if status >> 7 & 1 else "fault"
+    return [fault for fault in found if fault.kind == kind] or found
 
 
 def integer(reading: Reading | None) -> int | None:

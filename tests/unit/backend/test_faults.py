@@ -1,0 +1,32 @@
+"""Faults and alarms of the M6-L, which share their numbers in 603Fh (000:3829)."""
+
+from __future__ import annotations
+
+import pytest
+
+from backend.drive import Drive, Port, Reading
+from backend.faults import active_faults
+from profiles import load_profile
+from tests.support.memory_link import MemoryLink
+
+PROFILE = load_profile("m6l")
+
+
+@pytest.mark.parametrize(
+    ("error_code", "status", "expected"),
+    [
+        (0xFF0C, 0x0218, ["Er.012"]),  # bit 7 off: a fault
+        (0xFF0C, 0x02B7, ["AL.012"]),  # bit 7 on: an alarm
+        (0xFF26, 0x02B7, ["AL.038"]),
+        (0xFF20, 0x0218, ["Er.032"]),
+        (0xFF05, 0x0218, ["0xFF05"]),  # in the list of P10.18 only
+        (0, 0x0237, []),
+    ],
+)
+def test_bit_7_tells_alarm_from_fault(error_code: int, status: int, expected: list[str]) -> None:
+    drive = Drive("x", "X axis", PROFILE, [Port(MemoryLink({}), 1, PROFILE.links[0])])
+    readings = {
+        key: Reading(key, raw=raw, value=raw, time=0.0)
+        for key, raw in (("603F:00", error_code), ("6041:00", status))
+    }
+    assert [fault.code for fault in active_faults(drive, readings)] == expected
