@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -286,8 +286,16 @@ class Bench:
         drive.found = found
         return self._add(drive)
 
-    async def add_port(self, drive_id: str, url: str, station: int) -> Member:
+    async def add_port(
+        self,
+        drive_id: str,
+        url: str,
+        station: int,
+        check: Callable[[Drive, Port], Awaitable[None]] | None = None,
+    ) -> Member:
         """Connect a drive over a second bus, so that each parameter goes the way that carries it.
+
+        ``check`` looks at the port before it is used, and raises what speaks against it.
 
         Raises:
             NotAllowed: its family has no such link. Busy: the station is in use.
@@ -308,7 +316,11 @@ class Bench:
             )
         if isinstance(link, NeedsProfile):
             link.configure_station(station, drive.profile)
-        drive.ports = (*drive.ports, Port(link, station, spec))
+        port = Port(link, station, spec)
+        if check is not None:
+            await check(drive, port)
+            self._require_free(link, url, station)
+        drive.ports = (*drive.ports, port)
         self._save()
         self.journal.add(f"{drive.name} is reached over {url} too", drive=drive.id)
         self._drives_changed()

@@ -1,20 +1,40 @@
-"""A profile from a drive's own dictionary."""
+"""A profile from a maker's file or from a drive's own dictionary."""
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import json
+import pickle
+import sys
 from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, Rejected
 from drivers.ethercat.coe import EntryDescription, ObjectInfo
-from drivers.link import Found, Link, Progress
+from drivers.link import Address, Found, Link, Progress
 from profiles.importer import (
     ImportedProfile,
     ImportReport,
     build_profile,
     describe_dictionary,
+    import_file,
 )
 from profiles.importer.dictionary import DictionaryEntry
+from profiles.importer.process import DescriptionTask, FileTask, Task
+from profiles.loader import user_folder
+
+#: An import that takes longer is ended: a file of the greatest size takes a few seconds.
+IMPORT_LIMIT_S = 120.0
+#: Object 1021h "Store EDS" and 1022h, its format; 0 is plain text (CiA 301 clause 7.5.2.19).
+_STORED_EDS = Address(0x1021, 0, "OCTETS")
+_STORED_FORMAT = Address(0x1022, 0, "UINT16")
+
+
+class BadDescription(NotAllowed):
+    """A description file or dictionary of which no profile can be made, and why."""
+
+    kind = "bad-description"
 
 
 @runtime_checkable
@@ -27,22 +47,70 @@ class ListsObjects(Protocol):
         """Objects and entries, each object before its entries."""
 
 
-async def profile_of_drive(
-    link: Link, found: Found, name: str, progress: Progress
-) -> ImportedProfile:
-    """A generic profile called ``name`` of the drive that a scan found.
+async def import_in_process(task: Task, limit_s: float = IMPORT_LIMIT_S) -> dict[str, Any]:
+    """Carry out an import in a process of its own, which ends with the caller's task.
 
     Raises:
-        NotAllowed: drives on this kind of bus cannot list their objects.
-        ImportFailed: this drive lists none.
+        BadDescription: nothing usable in it, the name is taken, or it takes too long.
     """
+    process = await asyncio.create_subprocess_exec(
+        sys.executable,
+        "-m",
+        "profiles.importer.process",
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+    )
+    try:
+        async with asyncio.timeout(limit_s):
+            out, said = await process.communicate(pickle.dumps(task))
+    except TimeoutError:
+        raise BadDescription(
+            f"the import was ended after {limit_s:g} s",
+            remedy="use another file of this drive; a plain EDS is the simplest",
+        ) from None
+    finally:
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await asyncio.shield(process.wait())
+    try:
+        answer: dict[str, Any] = json.loads(out)
+    except ValueError:
+        last = said.decode("utf-8", "replace").strip().splitlines()[-1:] or ["it said nothing"]
+        raise BadDescription(
+            f"the import failed (exit code {process.returncode}): {last[0]}",
+            remedy="this is a defect of servodeck; report it with the file",
+        ) from None
+    if "error" in answer:
+        raise BadDescription(
+            str(answer["error"]), remedy="see “My drive is not listed” in the documentation"
+        )
+    result: dict[str, Any] = answer["ok"]
+    return result
+
+
+async def drive_task(
+    link: Link, found: Found, name: str, progress: Progress
+) -> FileTask | DescriptionTask:
+    """What a drive tells of its own objects, ready to be made a profile called ``name``.
+
+    An EtherCAT drive lists them (SDO information), a CANopen drive may carry its own EDS (1021h).
+
+    Raises:
+        NotAllowed: this drive, or a drive on this kind of bus, tells nothing.
+        ImportFailed: it offers a list, and nothing is in it.
+    """
+    if link.kind == "canopen":
+        eds = await _stored_eds(link, found)
+        return FileTask(eds, f"1021h of station {found.station}", user_folder(), name)
     if not isinstance(link, ListsObjects):
         raise NotAllowed(
             f"a drive on {link.kind} cannot list its own objects",
-            remedy="import the maker's EDS file, or use the generic profile",
+            remedy="import the maker's EDS or ESI file, or use the generic profile",
         )
     report = ImportReport()
-    described = describe_dictionary(
+    description = describe_dictionary(
         dictionary_entries(await link.enumerate(found.station, progress)),
         name=found.name or name,
         report=report,
@@ -51,7 +119,50 @@ async def profile_of_drive(
         revision=found.revision,
         link=link.kind,
     )
-    return build_profile(described, report, drive=name)
+    return DescriptionTask(description, report, user_folder(), name)
+
+
+async def profile_of_drive(
+    link: Link, found: Found, name: str, progress: Progress
+) -> ImportedProfile:
+    """A generic profile called ``name`` of the drive that a scan found, not yet written.
+
+    Raises:
+        NotAllowed: see `drive_task`.
+        ImportFailed: nothing in what this drive tells can be used.
+    """
+    task = await drive_task(link, found, name, progress)
+    if isinstance(task, FileTask):
+        return import_file(task.data, task.file, drive=name)
+    return build_profile(task.description, task.report, drive=name)
+
+
+async def _stored_eds(link: Link, found: Found) -> bytes:
+    """The EDS that a CANopen drive carries in itself.
+
+    Raises:
+        NotAllowed: it carries none, or one that is packed in the maker's own way.
+    """
+    remedy = "import the maker's EDS file, or use the generic profile"
+    try:
+        data = await link.read(found.station, _STORED_EDS)
+    except Rejected as error:
+        raise NotAllowed(
+            f"the drive at station {found.station} cannot list its own objects: CANopen has no "
+            f"such service, and it carries no EDS (1021h: {error.message})",
+            remedy=remedy,
+        ) from error
+    try:
+        packed = int.from_bytes(await link.read(found.station, _STORED_FORMAT), "little")
+    except Rejected:
+        packed = 0  # plain text is what 1021h holds where nothing else is said
+    if packed:
+        raise NotAllowed(
+            f"the drive at station {found.station} carries its EDS in the maker's own format "
+            f"(1022h = {packed})",
+            remedy=remedy,
+        )
+    return data
 
 
 def dictionary_entries(

@@ -15,7 +15,7 @@ from drivers import cia402
 from drivers.codec import decode, encode
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange
 from drivers.link import Address, Found, Link, LinkQuality
-from profiles.schema import LinkSpec, Parameter, Profile, Raw
+from profiles.schema import LinkKind, LinkSpec, Parameter, Profile, Raw
 
 #: Addresses per executor call. Small, so that a STOP never waits behind a long batch.
 BATCH = 16
@@ -57,9 +57,14 @@ class Port:
 
     def carries(self, parameter: Parameter) -> bool:
         """Whether this port can transport the parameter."""
-        if self.link.kind == "modbus":
-            return parameter.modbus_register is not None
-        return parameter.index is not None
+        return carries(self.link.kind, parameter)
+
+
+def carries(kind: LinkKind, parameter: Parameter) -> bool:
+    """Whether a port of this kind can transport the parameter."""
+    if kind == "modbus":
+        return parameter.modbus_register is not None
+    return parameter.index is not None
 
 
 def address_of(parameter: Parameter) -> Address:

@@ -14,7 +14,7 @@ import pickle
 import tempfile
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import platformdirs
 import yaml
@@ -43,19 +43,34 @@ def drive_names() -> tuple[str, ...]:
     return tuple(sorted({p.parent.name for f in folders for p in f.glob("*/profile.yaml")}))
 
 
-@cache
 def load_profile(drive: str) -> Profile:
-    """Load one family.
+    """Load one family. A profile of the user's own is loaded anew when its files have changed.
 
     Raises:
         ProfileError: unknown drive, broken YAML, or a record that the schema refuses.
     """
-    folder = _HERE / drive
-    if not (folder / "profile.yaml").exists():
-        folder = user_folder() / drive
-    files = sorted(folder.glob("*.yaml"))
     if drive not in drive_names():
         raise ProfileError(f"no profile named {drive!r}; there are: {', '.join(drive_names())}")
+    own = is_own(drive)
+    files = sorted(((user_folder() if own else _HERE) / drive).glob("*.yaml"))
+    return _load(drive, tuple(_Version(p, p.stat().st_mtime_ns if own else 0) for p in files))
+
+
+def is_own(drive: str) -> bool:
+    """Whether a family lies in the user's folder; one that comes with servodeck goes first."""
+    return not (_HERE / drive / "profile.yaml").exists()
+
+
+class _Version(NamedTuple):
+    """A file as it was at some time: an edited profile is another one for the cache."""
+
+    path: Path
+    mtime_ns: int
+
+
+@cache
+def _load(drive: str, versions: tuple[_Version, ...]) -> Profile:
+    files = [version.path for version in versions]
     cached = _cache_path(drive, files)
     if (profile := _read_cache(cached)) is not None:
         return profile
@@ -65,8 +80,23 @@ def load_profile(drive: str) -> Profile:
 
 
 def load_all() -> dict[str, Profile]:
-    """All families by name."""
-    return {name: load_profile(name) for name in drive_names()}
+    """All families by name, without the user's own that are broken (see `broken_profiles`)."""
+    broken = broken_profiles()
+    return {name: load_profile(name) for name in drive_names() if name not in broken}
+
+
+def broken_profiles() -> dict[str, str]:
+    """The user's own profiles that cannot be used, and why.
+
+    One slip in an edited file must not keep every other drive from being found.
+    """
+    found: dict[str, str] = {}
+    for name in filter(is_own, drive_names()):
+        try:
+            load_profile(name)
+        except (ProfileError, OSError, UnicodeDecodeError) as error:
+            found[name] = str(error)
+    return found
 
 
 def parse_profile(texts: dict[str, str]) -> Profile:

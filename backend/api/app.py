@@ -11,7 +11,7 @@ from fastapi.responses import FileResponse
 from fastapi.routing import APIRoute
 
 import backend
-from backend.api import errors, routes_bench, routes_drive, routes_sets
+from backend.api import errors, routes_bench, routes_description, routes_drive, routes_sets
 from backend.api.errors import NotFound, answer, problem_of
 from backend.api.live import LiveHub
 from backend.api.models import Problem
@@ -69,7 +69,7 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
     live = LiveHub(bench)
     app.state.live = live
     api = APIRouter(prefix=PREFIX)
-    for part in (routes_bench, routes_drive, routes_sets):
+    for part in (routes_bench, routes_drive, routes_sets, routes_description):
         api.include_router(part.router)
     app.include_router(api)
 

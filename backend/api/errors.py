@@ -42,6 +42,7 @@ _TITLES = {
     "out-of-range": "Value out of range",
     "not-allowed": "Not possible now",
     "busy": "In use",
+    "bad-description": "Not a usable description",
     "bad-parameter-set": "Not a usable parameter set",
     "storage-failed": "Could not be stored",
     "restore-failed": "Not everything was restored",

@@ -169,6 +169,9 @@ class PortRequest(Message):
 
     url: str
     station: int = Field(ge=0, le=65535)
+    accept_difference: bool = Field(
+        default=False, description="settings read there differ, and it is the same drive even so"
+    )
 
 
 class DriveUpdate(Message):
@@ -540,7 +543,7 @@ class LogEntry(Message):
 
 
 class ProfileInfo(Message):
-    """A profile that servodeck brings."""
+    """A profile that servodeck brings, or one of the user's own."""
 
     profile: str
     title: str
@@ -548,6 +551,8 @@ class ProfileInfo(Message):
     partial: bool
     links: list[str]
     parameters: int
+    own: bool = Field(default=False, description="in the user's folder, imported or written there")
+    problem: str = Field(default="", description="why this own profile cannot be used")
 
 
 class HomingMethodInfo(Message):

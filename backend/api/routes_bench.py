@@ -30,8 +30,10 @@ from backend.api.models import (
 )
 from backend.bench import Bench
 from backend.jobs import Job, JobResult, Progress
+from backend.second_port import require_same_drive
 from drivers.link import Found
 from profiles import load_all
+from profiles.loader import broken_profiles, is_own
 
 router = APIRouter()
 
@@ -57,8 +59,20 @@ async def interfaces(bench: TheBench) -> Interfaces:
 
 @router.get("/profiles")
 async def profiles() -> list[ProfileInfo]:
-    """Profiles that servodeck brings."""
+    """Profiles that servodeck brings, and the user's own; broken ones say why."""
     return [
+        ProfileInfo(
+            profile=name,
+            title=name,
+            maker="",
+            partial=True,
+            links=[],
+            parameters=0,
+            own=True,
+            problem=why,
+        )
+        for name, why in broken_profiles().items()
+    ] + [
         ProfileInfo(
             profile=p.drive,
             title=p.title,
@@ -66,6 +80,7 @@ async def profiles() -> list[ProfileInfo]:
             partial=p.partial,
             links=[spec.kind for spec in p.links],
             parameters=len(p.parameters),
+            own=is_own(p.drive),
         )
         for p in load_all().values()
     ]
@@ -165,8 +180,12 @@ async def update_drive(
 async def add_port(
     bench: TheBench, member: Controlled, request: PortRequest, connection: Connection = None
 ) -> DriveSummary:
-    """Connect a drive over a second bus; each parameter then goes the way that carries it."""
-    await bench.add_port(member.drive.id, request.url, request.station)
+    """Connect a drive over a second bus; each parameter then goes the way that carries it.
+
+    Refused where settings read there differ from the drive's, unless that is accepted.
+    """
+    check = None if request.accept_difference else require_same_drive
+    await bench.add_port(member.drive.id, request.url, request.station, check)
     return convert.drive_summary(bench, member, connection)
 
 

@@ -30,13 +30,18 @@ def import_file(
         ImportFailed: not such a file, or nothing usable in it.
     """
     report = ImportReport()
-    start = data[:400].lstrip(b"\xef\xbb\xbf\xff\xfe\0 \t\r\n")
-    if start.startswith((b"<", b"\0<")):
+    if is_xml(data):
         number = _choose(data, name, report, product_code, revision)
         description = read_esi(data, name, report, number)
     else:
         description = read_eds(data, name, report)
     return build_profile(description, report, drive=drive)
+
+
+def is_xml(data: bytes) -> bool:
+    """Whether a file is to be read as ESI rather than as EDS."""
+    start = data[:400].lstrip(b"\xef\xbb\xbf\xff\xfe\0 \t\r\n")
+    return start.startswith((b"<", b"\0<"))
 
 
 def _choose(
@@ -72,8 +77,16 @@ def write_profile(imported: Profile, folder: Path) -> Path:
         raise ImportFailed(
             f"{target} exists: import under another name, or move the old profile away first"
         )
+    text = profile_yaml(imported)
     target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(profile_yaml(imported), "utf-8")
+    # Whole or not at all: the loader would trip over half a profile at every start.
+    part = target.with_suffix(".part")
+    try:
+        part.write_text(text, "utf-8")
+        part.replace(target)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
     return target
 
 

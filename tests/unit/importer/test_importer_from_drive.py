@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from importer_samples import GOOD_EDS
 
 from backend.description import dictionary_entries, profile_of_drive
-from drivers.canopen.link import CanopenLink
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, Rejected
 from drivers.ethercat.coe import EntryDescription, ObjectInfo
-from drivers.link import Found
+from drivers.link import Address, Found
 from profiles.importer import ImportFailed
 
 TOLD: list[EntryDescription | ObjectInfo] = [
@@ -57,9 +57,46 @@ async def test_a_drive_that_lists_nothing_is_told() -> None:
         await profile_of_drive(link, FOUND, "x", lambda *_: None)
 
 
+class FakeCanopen:
+    """A node with some objects; the others are aborted as CiA 301 says."""
+
+    kind = "canopen"
+
+    def __init__(self, objects: dict[int, bytes]) -> None:
+        self.objects = objects
+
+    async def read(self, station: int, address: Address) -> bytes:
+        assert station == 4
+        assert address.index is not None
+        if address.index not in self.objects:
+            raise Rejected("the object does not exist", code=0x06020000)
+        return self.objects[address.index]
+
+
+async def test_a_canopen_drive_may_carry_its_own_eds() -> None:
+    link: Any = FakeCanopen({0x1021: GOOD_EDS.encode(), 0x1022: b"\0"})
+    imported = await profile_of_drive(link, FOUND, "carried", lambda *_: None)
+    assert imported.profile.drive == "carried"
+    assert imported.profile.identity.product_code == 0x190
+    assert imported.profile.by_key["2010:00"].unit == "1/s"
+
+
+async def test_plain_text_is_taken_where_no_format_is_told() -> None:
+    link: Any = FakeCanopen({0x1021: GOOD_EDS.encode()})
+    assert (await profile_of_drive(link, FOUND, "carried", lambda *_: None)).profile.parameters
+
+
+async def test_a_packed_eds_is_not_guessed_at() -> None:
+    link: Any = FakeCanopen({0x1021: b"\x1f\x8b", 0x1022: b"\x80"})
+    with pytest.raises(NotAllowed, match="own format"):
+        await profile_of_drive(link, FOUND, "x", lambda *_: None)
+
+
 async def test_canopen_has_no_such_service() -> None:
-    with pytest.raises(NotAllowed, match="cannot list its own objects"):
-        await profile_of_drive(CanopenLink("canopen://virtual/x"), FOUND, "x", lambda *_: None)
+    link: Any = FakeCanopen({})
+    with pytest.raises(NotAllowed, match="cannot list its own objects") as refused:
+        await profile_of_drive(link, FOUND, "x", lambda *_: None)
+    assert "EDS" in (refused.value.remedy or "")
 
 
 def test_entries_without_an_object_are_kept() -> None:

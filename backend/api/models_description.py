@@ -1,0 +1,75 @@
+"""Messages about drives that are not listed, line settings and further ports."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from backend.api.models import FoundDrive, Message
+
+#: What a profile may be called.
+PROFILE_NAME = r"^[a-z][a-z0-9_]{0,59}$"
+
+
+class DescribedDevice(Message):
+    """One device of a maker's file: a file often holds a whole series."""
+
+    name: str
+    product_code: int | None
+    revision: int | None
+
+
+class ImportFinding(Message):
+    """Something odd about a description: where, what, and what was made of it."""
+
+    place: str
+    text: str
+    outcome: Literal["repaired", "left out", "noted"]
+
+
+class ImportedDescription(Message):
+    """Result of an import job: the new profile, usable at once."""
+
+    profile: str
+    title: str
+    vendor_id: int | None
+    product_code: int | None
+    revision: int | None
+    links: list[str]
+    parameters: int
+    path: str = Field(description="the file to edit on the server's machine")
+    summary: str
+    findings: list[ImportFinding]
+    not_listed: int = Field(description="findings beyond those listed")
+
+
+class ReadDictionaryRequest(Message):
+    """Make a profile from what a drive tells of its own objects."""
+
+    url: str
+    station: int = Field(ge=0, le=65535)
+    profile: str = Field(pattern=PROFILE_NAME)
+
+
+class LineSearchRequest(Message):
+    """Search the baud rate and parity of a serial bus; few stations, for each costs time."""
+
+    url: str
+    stations: list[int] = Field(default=[1], min_length=1, max_length=16)
+
+
+class LineSearchResult(Message):
+    """Result of a line search: the URL with the settings found, None where nothing answered."""
+
+    url: str | None
+    found: list[FoundDrive]
+
+
+class MissingPort(Message):
+    """A port that a drive's family has and that is not connected."""
+
+    kind: Literal["ethercat", "canopen", "modbus", "mlink"]
+    parameters: int = Field(description="parameters that only this port would reach")
+    groups: list[str]
+    wiring: str

@@ -1,0 +1,176 @@
+"""Routes for drives that are not listed, for line settings and for further ports."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Request, Response
+
+from backend.api import convert
+from backend.api.context import TheBench, TheMember
+from backend.api.errors import NotFound
+from backend.api.models import JobInfo
+from backend.api.models_description import (
+    PROFILE_NAME,
+    DescribedDevice,
+    ImportedDescription,
+    LineSearchRequest,
+    LineSearchResult,
+    MissingPort,
+    ReadDictionaryRequest,
+)
+from backend.description import BadDescription, drive_task, import_in_process
+from backend.jobs import JobResult, Progress
+from backend.line_search import search_line
+from backend.second_port import missing_ports
+from drivers.errors import NotAllowed
+from profiles import drive_names, load_profile
+from profiles.importer import ImportFailed, export_eds
+from profiles.importer.esi import MAX_BYTES
+from profiles.importer.process import DevicesTask, FileTask
+from profiles.loader import ProfileError, user_folder
+
+router = APIRouter()
+
+_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/octet-stream": {"schema": {"type": "string"}}},
+    }
+}
+FileName = Annotated[str, Query(min_length=1, max_length=200, description="name of the file")]
+
+
+async def _upload(request: Request, file: str) -> bytes:
+    """The body, up to the size that the readers take.
+
+    Raises:
+        BadDescription: larger, or empty.
+    """
+    data = bytearray()
+    async for chunk in request.stream():
+        data += chunk
+        if len(data) > MAX_BYTES:
+            raise BadDescription(
+                f"{file} is larger than {MAX_BYTES >> 20} MiB",
+                limit=f"{MAX_BYTES} bytes",
+                remedy="choose the description of this one drive, not of the whole catalogue",
+            )
+    if not data:
+        raise BadDescription(f"{file} is empty", remedy="choose an ESI, EDS or DCF file")
+    return bytes(data)
+
+
+def _require_new(name: str) -> None:
+    if name in drive_names():
+        raise BadDescription(
+            f"there is a profile {name!r} already", value=name, remedy="choose another name"
+        )
+
+
+@router.post("/descriptions/devices", openapi_extra=_BODY)
+async def described_devices(request: Request, file: FileName) -> list[DescribedDevice]:
+    """The devices of an ESI file, to choose from; empty for an EDS or DCF file, which has one."""
+    told = await import_in_process(DevicesTask(await _upload(request, file), file))
+    return [DescribedDevice.model_validate(device) for device in told["devices"]]
+
+
+@router.post("/descriptions", status_code=202, openapi_extra=_BODY)
+async def import_description(
+    bench: TheBench,
+    request: Request,
+    file: FileName,
+    profile: Annotated[str | None, Query(pattern=PROFILE_NAME)] = None,
+    product_code: Annotated[int | None, Query(ge=0, le=0xFFFFFFFF)] = None,
+    revision: Annotated[int | None, Query(ge=0, le=0xFFFFFFFF)] = None,
+) -> JobInfo:
+    """Make a profile from an ESI, EDS or DCF file; the job's result is ImportedDescription."""
+    data = await _upload(request, file)
+    if profile is not None:
+        _require_new(profile)
+    task = FileTask(data, file, user_folder(), profile, product_code, revision)
+
+    async def work(progress: Progress) -> JobResult:
+        progress(0.0, f"reading {file}")
+        made = ImportedDescription.model_validate(await import_in_process(task))
+        bench.journal.add(f"imported {file} as {made.profile}: {made.summary}")
+        return made.model_dump(mode="json")
+
+    return convert.job(bench.jobs.start("import", f"Import {file}", work))
+
+
+@router.post("/descriptions/from-drive", status_code=202)
+async def read_dictionary(bench: TheBench, request: ReadDictionaryRequest) -> JobInfo:
+    """Make a profile from a drive's own dictionary; the job's result is ImportedDescription."""
+    _require_new(request.profile)
+    place = f"station {request.station} of {request.url}"
+
+    async def work(progress: Progress) -> JobResult:
+        progress(0.0, f"looking for {place}")
+        seen = await bench.scan(request.url, [request.station], lambda _fraction, _step: None)
+        found = next((f for f in seen if f.station == request.station), None)
+        if found is None:
+            raise NotAllowed(
+                f"nothing answers at {place}",
+                remedy="check power, cable, station number and line settings",
+            )
+        link = await bench.link(request.url)
+        try:
+            task = await drive_task(link, found, request.profile, progress)
+        except ImportFailed as error:
+            raise BadDescription(
+                f"{place}: {error}", remedy="import the maker's file, or use the generic profile"
+            ) from error
+        progress(0.95, "making the profile")
+        made = ImportedDescription.model_validate(await import_in_process(task))
+        bench.journal.add(f"read {place} as {made.profile}: {made.summary}")
+        return made.model_dump(mode="json")
+
+    return convert.job(bench.jobs.start("import", f"Read the dictionary of {place}", work))
+
+
+@router.get("/profiles/{profile}/eds", response_class=Response)
+async def export_profile(
+    profile: Annotated[str, Path(pattern=PROFILE_NAME, description="name of the profile")],
+) -> Response:
+    """A profile's objects as a CANopen EDS file."""
+    try:
+        known = load_profile(profile)
+    except ProfileError as error:
+        raise NotFound(str(error), value=profile, remedy="see the list of profiles") from error
+    text = export_eds(known, datetime.now())
+    return Response(
+        text.encode("utf-8"),
+        media_type="text/plain; charset=utf-8",
+        headers={"Content-Disposition": f'attachment; filename="{known.drive}.eds"'},
+    )
+
+
+@router.post("/search-line", status_code=202)
+async def search_line_settings(bench: TheBench, request: LineSearchRequest) -> JobInfo:
+    """Try baud rates and parities of a serial bus; the job's result is LineSearchResult."""
+
+    async def work(progress: Progress) -> JobResult:
+        found = await search_line(bench, request.url, request.stations, progress)
+        if found is None:
+            return LineSearchResult(url=None, found=[]).model_dump(mode="json")
+        kind = found.url.split(":", 1)[0]
+        drives = [convert.found_drive(bench, found.url, kind, each) for each in found.drives]
+        return LineSearchResult(url=found.url, found=drives).model_dump(mode="json")
+
+    return convert.job(bench.jobs.start("search-line", f"Line settings of {request.url}", work))
+
+
+@router.get("/drives/{drive_id}/missing-ports")
+async def drive_missing_ports(member: TheMember) -> list[MissingPort]:
+    """Ports over which a drive could be reached as well, and what only they reach."""
+    return [
+        MissingPort(
+            kind=port.kind,
+            parameters=port.parameters,
+            groups=list(port.groups),
+            wiring=port.wiring,
+        )
+        for port in missing_ports(member.drive)
+    ]

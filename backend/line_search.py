@@ -1,0 +1,44 @@
+"""Look for the baud rate and parity of a serial bus, unless the bus is in use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from backend.bench import Bench
+from drivers.errors import Busy, NotAllowed
+from drivers.modbus.search import LineFound, search_line_settings
+from drivers.urls import parse_url
+
+
+async def search_line(
+    bench: Bench, url: str, stations: Sequence[int], progress: Callable[[float, str], None]
+) -> LineFound | None:
+    """See `drivers.modbus.search.search_line_settings`; the bus is closed first.
+
+    Raises:
+        OutOfRange: no bus URL. NotAllowed: not a serial line.
+        Busy: drives of the bench use this adapter. LinkLost: the adapter is missing.
+    """
+    wanted = parse_url(url)
+    if wanted.scheme not in ("modbus", "mlink") or wanted.is_virtual or url in bench.wires:
+        raise NotAllowed(
+            f"{url} has no baud rate and parity to search for",
+            value=url,
+            remedy="choose a serial adapter, for example modbus:///dev/ttyUSB0",
+        )
+    same = [known for known in bench.links if parse_url(known).place == wanted.place]
+    users = [
+        member.drive.name
+        for member in bench.members.values()
+        if any(bench.url_of(port) in same for port in member.drive.ports)
+    ]
+    if users:
+        raise Busy(
+            f"{wanted.place} is used by {', '.join(users)}",
+            remedy="take these drives off the bench first",
+        )
+    for known in same:
+        await bench.close_link(known)
+    found = await search_line_settings(wanted, progress, stations=stations)
+    bench.journal.add(f"{wanted.place}: line settings {found.url if found else 'not found'}")
+    return found

@@ -1,0 +1,92 @@
+"""A drive's further ports: what only they reach, and whether the same drive is behind them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from backend.drive import Drive, Port, carries
+from backend.parameter_set import storable
+from drivers.errors import LinkTimeout, NotAllowed
+from profiles.schema import LinkKind
+
+#: Settings that are compared before a second port is believed.
+_COMPARED = 24
+
+
+@dataclass(frozen=True, slots=True)
+class MissingPort:
+    """A port that the family has and that is not connected.
+
+    ``parameters`` is how many of them no connected port reaches and this one would; ``groups``
+    names where they are, the fullest first.
+    """
+
+    kind: LinkKind
+    parameters: int
+    groups: tuple[str, ...]
+    wiring: str
+
+
+def missing_ports(drive: Drive) -> list[MissingPort]:
+    """Ports over which a drive is not reached yet."""
+    connected = {port.link.kind for port in drive.ports}
+    found = []
+    for spec in drive.profile.links:
+        if spec.kind in connected:
+            continue
+        only_there = [
+            p
+            for p in drive.profile.parameters
+            if carries(spec.kind, p) and not any(port.carries(p) for port in drive.ports)
+        ]
+        groups = Counter(p.group for p in only_there)
+        names = tuple(name for name, _ in groups.most_common())
+        found.append(MissingPort(spec.kind, len(only_there), names, spec.wiring))
+    return found
+
+
+async def require_same_drive(drive: Drive, other: Port) -> None:
+    """Settings read over the new port are those that the connected ports hold.
+
+    Serial buses tell no identity, and a swapped cable must not write another motor's data. Two
+    drives with equal settings cannot be told apart this way.
+
+    Raises:
+        LinkTimeout: nothing answers there.
+        NotAllowed: values differ; the message shows the first of them.
+    """
+    shared = [
+        p
+        for p in storable(drive.profile, motor_individual=True)
+        if other.carries(p) and any(port.carries(p) for port in drive.ports)
+    ][:_COMPARED]
+    there = Drive(drive.id, drive.name, drive.profile, [other])
+    theirs = await there.read_many([p.key for p in shared])
+    if shared and all(reading.raw is None for reading in theirs.values()):
+        raise LinkTimeout(
+            f"{drive.name}: nothing can be read at station {other.station} of {other.link.url}: "
+            f"{next(iter(theirs.values())).error}",
+            drive=drive.name,
+            remedy="check cable, station number, baud rate and parity",
+        )
+    ours = await drive.read_many([p.key for p in shared])
+    different = [
+        (p, ours[p.key].raw, theirs[p.key].raw)
+        for p in shared
+        if ours[p.key].raw is not None
+        and theirs[p.key].raw is not None
+        and ours[p.key].raw != theirs[p.key].raw
+    ]
+    if different:
+        parameter, here, other_value = different[0]
+        raise NotAllowed(
+            f"the drive at station {other.station} of {other.link.url} does not hold the settings "
+            f"of {drive.name}: {parameter.key} {parameter.name} is {other_value} there and {here} "
+            f"here ({len(different)} of {len(shared)} differ)",
+            drive=drive.name,
+            parameter=parameter.key,
+            value=other_value,
+            remedy="check which drive each cable goes to; if it is the same drive, accept the "
+            "difference",
+        )

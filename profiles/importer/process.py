@@ -1,0 +1,124 @@
+"""Imports in a process of their own: ``python -m profiles.importer.process``.
+
+A maker's file may take seconds, and nobody knows what is in it. Here it holds up no motion, and
+whoever started it can end it. One task comes pickled on the standard input, from our own parent
+only; one JSON object goes to the standard output: ``{"ok": …}`` or ``{"error": "…"}``.
+"""
+
+from __future__ import annotations
+
+import json
+import pickle
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from profiles.importer.build import ImportedProfile, build_profile
+from profiles.importer.description import Description
+from profiles.importer.esi import esi_devices
+from profiles.importer.files import import_file, is_xml, write_profile
+from profiles.importer.report import ImportFailed, ImportReport
+from profiles.loader import ProfileError, drive_names, load_profile
+
+
+@dataclass(frozen=True, slots=True)
+class FileTask:
+    """Make a profile from a file and write it to ``folder``. ``name`` None: after the device."""
+
+    data: bytes
+    file: str
+    folder: Path
+    name: str | None = None
+    product_code: int | None = None
+    revision: int | None = None
+
+    def run(self) -> dict[str, object]:
+        """See `_written`."""
+        imported = import_file(
+            self.data,
+            self.file,
+            drive=self.name,
+            product_code=self.product_code,
+            revision=self.revision,
+        )
+        return _written(imported, self.folder)
+
+
+@dataclass(frozen=True, slots=True)
+class DescriptionTask:
+    """Make a profile called ``name`` from what a drive told and write it to ``folder``."""
+
+    description: Description
+    report: ImportReport
+    folder: Path
+    name: str
+
+    def run(self) -> dict[str, object]:
+        """See `_written`."""
+        return _written(build_profile(self.description, self.report, drive=self.name), self.folder)
+
+
+@dataclass(frozen=True, slots=True)
+class DevicesTask:
+    """Say which devices a file describes; an EDS or DCF file has one, which is not read here."""
+
+    data: bytes
+    file: str
+
+    def run(self) -> dict[str, object]:
+        """``devices``: name, product_code and revision of each; empty for an EDS file."""
+        if not is_xml(self.data):
+            return {"devices": []}
+        devices = esi_devices(self.data, self.file, ImportReport())
+        return {
+            "devices": [
+                {"name": d.name, "product_code": d.product_code, "revision": d.revision}
+                for d in devices
+            ]
+        }
+
+
+Task = FileTask | DescriptionTask | DevicesTask
+
+
+def _written(imported: ImportedProfile, folder: Path) -> dict[str, object]:
+    """Write the profile and read it back the way everybody else will."""
+    profile, report = imported.profile, imported.report
+    if profile.drive in drive_names():
+        raise ImportFailed(f"there is a profile {profile.drive!r} already: choose another name")
+    path = write_profile(profile, folder)
+    try:
+        load_profile(profile.drive)
+    except ProfileError as error:
+        path.unlink(missing_ok=True)
+        raise ImportFailed(f"what was made of it cannot be read back: {error}") from error
+    return {
+        "profile": profile.drive,
+        "title": profile.title,
+        "vendor_id": profile.identity.vendor_id,
+        "product_code": profile.identity.product_code,
+        "revision": profile.identity.revision,
+        "links": [spec.kind for spec in profile.links],
+        "parameters": len(profile.parameters),
+        "path": str(path),
+        "summary": report.summary(),
+        "findings": [
+            {"place": f.place, "text": f.text, "outcome": f.outcome} for f in report.findings
+        ],
+        "not_listed": report.not_listed,
+    }
+
+
+def main() -> None:
+    """Carry out the one task of this process."""
+    task: Task = pickle.load(sys.stdin.buffer)  # noqa: S301 - from our own parent
+    answer: dict[str, object]
+    try:
+        answer = {"ok": task.run()}
+    except (ImportFailed, OSError) as error:
+        answer = {"error": str(error)}
+    json.dump(answer, sys.stdout)
+
+
+if __name__ == "__main__":
+    main()
