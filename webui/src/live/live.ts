@@ -48,10 +48,12 @@ export function scopeCsv(
   })
 }
 
-/** Fetch what the websocket only tells about when it changes. */
+/**
+ * Fetch what the websocket only tells about when it changes. The list of drives is not among
+ * it: every connection begins with one, and an answer fetched here could be older.
+ */
 async function refresh(): Promise<void> {
   try {
-    store.setDrives(await ask(api.GET('/api/v1/drives')))
     for (const job of await ask(api.GET('/api/v1/jobs'))) store.setJob(job)
     for (const id of store.contents.rows.keys()) void loadRows(id)
   } catch {
