@@ -450,3 +450,22 @@ def test_homing_methods_of_the_real_profile_are_all_known(family) -> None:
         b.set("6040:00", 15)
         b.set("6040:00", 31)
         assert not b.status & 1 << 13, method.method
+
+
+def test_gear_without_a_printed_default_starts_at_one_turn_and_acts_after_power_on(family) -> None:
+    """6092h:01 = 3600 increments, 3 motor revolutions to 1 (001:1045-1060)."""
+    b = family(load_profile("ep3e"))
+    assert b.get("6092:01") == b.get("608F:01") == 2**23
+    b.set("6092:01", 3600)
+    b.set("6091:01", 3)
+    b.set("1010:01", 0x45534554)
+    b.servo.power_cycle()
+    assert b.servo.core.units.position_per_rad * TURN == pytest.approx(3600 / 3)
+
+
+def test_gains_without_a_printed_default_read_what_the_loops_use(family) -> None:
+    """No default is printed for the EP3E: 40 Hz and 20 ms, not 0 in a range from 1 (001:1086)."""
+    b = family(load_profile("ep3e"))
+    assert b.get("2005:00") == 40
+    assert b.get("2006:00") == 200  # 20.0 ms
+    assert b.servo.axis.p[k.P_KP_POSITION_1] == pytest.approx(TURN * b.get("2009:00"))

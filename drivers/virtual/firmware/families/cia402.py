@@ -77,6 +77,9 @@ class Cia402:
             parameter = self._profile.by_role.get(role)
             if parameter is not None:
                 values[parameter.key] = parameter.to_raw(value * _si_factor(parameter.unit))
+        resolution = self._profile.by_key.get("608F:01")
+        if resolution is not None and resolution.default_raw is None:
+            values[resolution.key] = spec.encoder.counts_per_rev  # what the drive reads from it
         return values
 
     def fallback_values(self, motor: MotorData) -> dict[str, Raw]:
@@ -114,7 +117,23 @@ class Cia402:
             fallback["6060:00"] = min(self._profile.supported_modes)
         if self.traits.positive_limit_first:
             fallback |= {"607D:01": 2**31 - 1, "607D:02": -(2**31)}
-        return fallback
+        return fallback | self._start_gains()
+
+    def _start_gains(self) -> dict[str, Raw]:
+        """The gains that `loops` takes where none are printed, so that they can be read."""
+        gains = self._profile.gains
+        if gains is None or gains.convention == "unit":
+            return {}
+        values: dict[str, Raw] = {}
+        wanted = ((gains.speed, 40.0), (gains.integral, 20.0), (gains.position, 40.0))
+        for key, value in wanted:
+            parameter = self._profile.by_key.get(key or "")
+            if parameter is None:
+                continue
+            in_hertz = "Hz" in parameter.unit or gains.convention == "bandwidth"
+            as_hertz = key == gains.position and in_hertz
+            values[parameter.key] = parameter.to_raw(value / TWO_PI if as_hertz else value)
+        return values
 
     # --- units -----------------------------------------------------------------------------
     def units(self, od: ObjectDictionary, motor: MotorData) -> Units:
@@ -135,17 +154,24 @@ class Cia402:
             if key is None or parameter is None:
                 continue
             printed = parameter.default_raw
-            default = float(printed) if isinstance(printed, (int, float)) and printed else None
-            now = float(od.number(key, default or 1.0))
-            if default is not None and now > 0:
+            # As `fallback_values` starts where the manual prints no default.
+            start = self._default_turn() if key == self._profile.units.feed else 1.0
+            default = float(printed) if isinstance(printed, (int, float)) and printed else start
+            now = float(od.number(key, default))
+            if now > 0:
                 result *= (now / default) ** power
         return result
+
+    def _default_turn(self) -> float:
+        """Increments per revolution with the gear as it starts."""
+        spec = self._profile.units
+        return float(spec.counts_per_rev or spec.encoder_counts_per_rev or 10000)
 
     def _units(
         self, factor: float, motor: MotorData, position_sign: float = 1.0, speed_sign: float = 1.0
     ) -> Units:
         spec = self._profile.units
-        turn = float(spec.counts_per_rev or spec.encoder_counts_per_rev or 10000) * factor
+        turn = self._default_turn() * factor
         per_rad = turn / TWO_PI
         speed = _per_rad_s(spec.velocity, per_rad)
         times = spec.acceleration.strip().startswith("ms")
