@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest'
-import type { JobInfo, ParameterValue } from '../api/schema'
-import { contents, setJob, setReadings } from './store'
+import type { AxisState, JobInfo, ParameterValue } from '../api/schema'
+import { contents, setJob, setReadings, setState } from './store'
 
 const job = (state: JobInfo['state']): JobInfo => ({
   id: 'j1',
@@ -37,5 +37,11 @@ describe('the store', () => {
     setReadings('x', [reading(2, '2026-01-01T00:00:02Z')])
     setReadings('x', [reading(1, '2026-01-01T00:00:01Z')])
     expect(contents.readings.get('x')?.get('6083:00')?.raw).toBe(2)
+  })
+  it('keeps the newer of two states, whichever came first', () => {
+    const state = (time: string, word: string) => ({ drive: 'x', time, state: word }) as AxisState
+    setState(state('2026-01-01T00:00:02Z', 'Fault'))
+    setState(state('2026-01-01T00:00:01Z', 'Operation enabled'))
+    expect(contents.states.get('x')?.state).toBe('Fault')
   })
 })

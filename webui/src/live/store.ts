@@ -90,6 +90,8 @@ export function setDrives(drives: DriveSummary[]): void {
 }
 
 export function setState(state: AxisState): void {
+  const known = contents.states.get(state.drive)
+  if (known && state.time < known.time) return // overtaken on its way
   contents.states.set(state.drive, state)
   publish(`state ${state.drive}`)
 }
