@@ -19,9 +19,10 @@ TURN = 2.0 * np.pi
 
 #: Below half of its own torque's share a line is lost in friction; above it, speed runs away.
 _LOOP_CORNER_HZ = 60.0
-_PERIOD_S = 0.7
+_PERIOD_S = 0.65
 #: Base motion as a multiple of the excitation's own speed, so that the speed seldom reverses.
-_BASE_OVER_RMS = 5.0
+_BASE_OVER_RMS = 8.0
+_BASE_LEAST_RAD_S = 12.0
 
 
 @dataclass(frozen=True)
@@ -105,13 +106,13 @@ def torque_mode(
         return multisine(
             sample_rate_hz=rate, period_samples=period, lines=lines, realisation=number // 2,
             invert=bool(number % 2), integrations=2, iterations=80, base=motion,
-            ramp_samples=period // 8,
+            ramp_samples=period // 4,
         )  # fmt: skip
 
     unit_speed = _speed_of(one(0, None).one_period, rate, rigid.inertia_kgm2)
     own_rms, own_peak = float(np.std(unit_speed)), float(np.max(np.abs(unit_speed)))
     peak_nm = min(share * room.torque_nm, 0.25 * room.speed_rad_s / own_peak)
-    wanted = max(_BASE_OVER_RMS * own_rms * peak_nm, 3.0)
+    wanted = max(_BASE_OVER_RMS * own_rms * peak_nm, _BASE_LEAST_RAD_S)
     # The way in overshoots the steady base motion by about its amplitude.
     travelled = 2.2 / slow
     base_speed = min(wanted, 0.4 * room.speed_rad_s, room.travel_rad / travelled) if base else 0.0
@@ -133,9 +134,11 @@ def torque_mode(
             f"{room.torque_nm:.3g} Nm are too little to keep the axis moving against friction"
         )
     motion = BaseMotion(base_nm / peak_nm, rate / period) if base_nm > 0 else None
-    return tuple(
-        Sequence(scaled(one(i, motion), peak_nm, step_nm)) for i in range(2 * realisations)
-    )
+    shapes = [one(i, motion) for i in range(2 * realisations)]
+    # The ramps carry the axis into its steady motion and may ask for more than a period does.
+    highest = max(float(np.max(np.abs(e.samples))) for e in shapes)
+    peak_nm = min(peak_nm, 0.98 * room.torque_nm / highest)
+    return tuple(Sequence(scaled(e, peak_nm, step_nm)) for e in shapes)
 
 
 def beside_loop(

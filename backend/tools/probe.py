@@ -6,6 +6,7 @@ some ten per cent: enough to scale an excitation, not a result.
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 from dataclasses import dataclass
 
@@ -16,7 +17,7 @@ from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
-from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play, quiet
+from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
 
@@ -25,7 +26,13 @@ _DURATION_S = 0.28
 #: The axis moves well above this speed, and well above what its sensor and filter blur.
 _ENOUGH_RAD_S = 6.0
 _FIRST_SHARE = 0.02
-_CUTOFF_HZ = 40.0
+
+#: A holding torque above this share of rated torque is a load that pulls.
+PULLED = 0.01
+_SETTLE_S = 0.3
+_READINGS = 12
+_RESTLESS_PERCENT = 5.0
+_RESTLESS_RPM = 3.0
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,36 @@ class Probed:
     coulomb_nm: float
     gravity_nm: float
     rated_nm: float
+
+
+async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -> float:
+    """Mean torque in Nm that the speed loop needs to hold the axis; nothing is commanded.
+
+    A load that this shows would fall as soon as the loop is open.
+
+    Raises:
+        NotAllowed: the axis does not stand still under its speed loop.
+    """
+    units, drive = await axis.units(), axis.drive
+    key, speed = drive.require("torque_actual"), drive.require("velocity_actual")
+    async with enabled(axis, session, Mode.CSV):
+        await asyncio.sleep(_SETTLE_S)
+        readings = [await drive.read_many([key, speed]) for _ in range(_READINGS)]
+    raws = [(_integer(r[key].raw), _integer(r[speed].raw)) for r in readings]
+    torque = np.array([units.torque(t) for t, _ in raws])
+    turning = np.array([units.velocity(v) for _, v in raws])
+    if float(np.std(torque)) > _RESTLESS_PERCENT and float(np.std(turning)) > _RESTLESS_RPM:
+        raise NotAllowed(
+            f"{drive.name} does not stand still under its speed loop: the torque swings by "
+            f"{float(np.ptp(torque)):.3g} % and the speed by {float(np.ptp(turning)):.3g} rpm",
+            drive=drive.name,
+            remedy="lower the gains of the speed loop and try again",
+        )
+    return float(np.mean(torque)) / 100.0 * facts.rated_torque_nm
+
+
+def _integer(raw: object) -> int:
+    return raw if isinstance(raw, int) else 0
 
 
 async def probe_axis(
@@ -55,7 +92,6 @@ async def probe_axis(
     enough = min(_ENOUGH_RAD_S, 0.4 * envelope.speed_rpm * _TURN / 60.0)
     peak = min(_FIRST_SHARE * rated, highest)
     async with enabled(axis, session, Mode.CST):
-        await quiet(axis)
         while True:
             values = excite.probe(rate, peak, _DURATION_S, step)
             raw = np.round(values / step).astype(np.int64)

@@ -26,7 +26,7 @@ from drivers.errors import LinkLost, LinkTimeout, NotAllowed
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-_RENEW_S = 0.05
+_RENEW_S = 0.03
 _STATE_TIMEOUT_S = 5.0
 #: Samples arrive in bunches; this long after the last set-point all of them have come.
 _TAIL_S = 1.0
@@ -159,7 +159,9 @@ async def _forgotten(axis: Axis, session: CyclicSession) -> None:
     """Wait until the loop no longer tells why the motion before this one ended."""
     power, station = session.power(), session.station(axis.drive)
     deadline = time.monotonic() + _TAIL_S
-    while power is not None and power.axis_state(station)[2] and time.monotonic() < deadline:
+    while time.monotonic() < deadline:
+        if power is None or not power.axis_state(station)[2]:
+            return
         await asyncio.sleep(_RENEW_S / 2)
 
 

@@ -29,7 +29,7 @@ from backend.jobs import Progress
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts, read_facts
 from backend.tools.go_back import go_back
-from backend.tools.probe import Probed, probe_axis
+from backend.tools.probe import PULLED, Probed, holding_torque, probe_axis
 from backend.tools.recording import (
     Play,
     Recording,
@@ -138,9 +138,14 @@ async def sweep(
         probed: Probed | None = None
         if loop in ("auto", "none"):
             require_signals(axis, session, Mode.CST, False)
-            progress(0.0, "feeling the axis with a small torque")
-            probed = await probe_axis(axis, session, settings.envelope, facts, home)
-            loop = _choose(axis, settings.loop, probed)
+            progress(0.0, "looking for a load that pulls the axis")
+            held = await holding_torque(axis, session, facts)
+            if abs(held) > PULLED * facts.rated_torque_nm:
+                loop = _held_by_loop(axis, settings.loop, held)
+            else:
+                progress(0.02, "feeling the axis with a small torque")
+                probed = await probe_axis(axis, session, settings.envelope, facts, home)
+                loop = _choose(axis, settings.loop, probed)
         setup = await _setup(axis, session, settings, facts, loop, probed)
         require_signals(axis, session, _MODE_OF[setup.loop], not closed and setup.loop != "none")
         progress(0.08, "designing the excitation")
@@ -192,12 +197,16 @@ def _choose(axis: Axis, wanted: Loop, probed: Probed) -> Literal["none", "speed"
     drifts = abs(probed.gravity_nm) > max(0.5 * probed.coulomb_nm, 0.01 * probed.rated_nm)
     if not drifts:
         return "none"
+    return _held_by_loop(axis, wanted, probed.gravity_nm)
+
+
+def _held_by_loop(axis: Axis, wanted: Loop, pull_nm: float) -> Literal["speed"]:
     if wanted == "none":
         raise NotAllowed(
-            f"{axis.drive.name}: a load of {probed.gravity_nm:.3g} Nm pulls the axis, so it "
-            "cannot be measured without a closed loop",
+            f"{axis.drive.name}: a load of {pull_nm:.3g} Nm pulls the axis, so it cannot be "
+            "measured without a closed loop",
             drive=axis.drive.name,
-            value=probed.gravity_nm,
+            value=round(pull_nm, 4),
             remedy="measure with the speed or position loop closed",
         )
     return "speed"
@@ -287,7 +296,8 @@ async def _play_all(
         told = share(progress, low, low + 0.85 / len(sequences),
                      f"measuring, realisation {number + 1} of {len(sequences)}")  # fmt: skip
         async with enabled(axis, session, _MODE_OF[setup.loop]) as start:
-            await quiet(axis)
+            if setup.loop != "none":
+                await quiet(axis)
             sent = await _to_raw(axis, sequence, setup, settings, start)
             recording = await play(axis, session, sent, limits, setup.facts.rated_torque_nm, told)
         records.append((await _as_sent(axis, sequence, settings, sent, start), recording))

@@ -89,7 +89,7 @@ async def bench(
             arguments.append("--lockstep")
         with VirtualSegment.start("ec0s", arguments, namespace) as segment:
             link = EthercatLink(
-                "ec0m", url=URL, launcher=namespace.command([]), lockstep=2.0 if lockstep else 0.0
+                "ec0m", url=URL, launcher=namespace.command([]), lockstep=1.5 if lockstep else 0.0
             )
             await link.open()
             try:

@@ -1,0 +1,251 @@
+"""``servodeck sweep`` and ``servodeck inertia``: a measurement without the page."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import httpx
+import typer
+
+from backend.axis import Axis, Envelope
+from backend.commands.session import drive_at, run, show_progress
+from backend.cyclic import CyclicSession
+from backend.files import write_atomically
+from backend.jobs import Progress
+from backend.tools import inertia as inertia_tool
+from backend.tools import sweep as sweep_tool
+from drivers.errors import DriveError, LinkLost, NotAllowed
+
+Url = Annotated[str | None, typer.Argument(metavar="[BUS_URL]")]
+Station = Annotated[int, typer.Option(help="station address on the bus")]
+Profile = Annotated[str | None, typer.Option(help="drive family; recognised where possible")]
+Server = Annotated[str | None, typer.Option(help="measure through this running server")]
+AxisName = Annotated[str | None, typer.Option("--axis", help="the server's name of the drive")]
+Out = Annotated[Path, typer.Option(help="JSON file to write")]
+Cycle = Annotated[float, typer.Option(help="cycle time in ms")]
+Travel = Annotated[float, typer.Option(help="longest way from the start, in revolutions")]
+Speed = Annotated[float, typer.Option(help="highest speed, in rpm")]
+Torque = Annotated[float, typer.Option(help="highest torque, in % of rated")]
+Rated = Annotated[float | None, typer.Option(help="rated torque in Nm, if not the drive's")]
+
+
+class KindName(StrEnum):
+    """What is measured."""
+
+    mechanics = "mechanics"
+    speed_loop = "speed_loop"
+    position_loop = "position_loop"
+
+
+class LoopName(StrEnum):
+    """Which loop is closed meanwhile."""
+
+    auto = "auto"
+    none = "none"
+    speed = "speed"
+    position = "position"
+
+
+class SchemeName(StrEnum):
+    """How the axis may travel."""
+
+    free = "free"
+    limited = "limited"
+    taught = "taught"
+
+
+def sweep(
+    out: Out,
+    url: Url = None,
+    station: Station = 1,
+    profile: Profile = None,
+    server: Server = None,
+    axis: AxisName = None,
+    kind: KindName = KindName.mechanics,
+    loop: LoopName = LoopName.auto,
+    cycle_ms: Cycle = 1.0,
+    travel_rev: Travel = 3.0,
+    speed_rpm: Speed = 1200.0,
+    torque_percent: Torque = 80.0,
+    f_min_hz: Annotated[float, typer.Option(help="lowest line")] = 5.0,
+    f_max_hz: Annotated[float | None, typer.Option(help="highest line")] = None,
+    share: Annotated[float, typer.Option(help="excitation's share of the torque")] = 0.35,
+    realisations: Annotated[int, typer.Option(help="pairs of realisations")] = 2,
+    rated_torque_nm: Rated = None,
+) -> None:
+    """Measure a frequency response and write it as JSON. The axis moves."""
+    limits = {
+        "travel_limit": travel_rev, "speed_limit": speed_rpm, "torque_limit": torque_percent,
+        "time_limit_s": 60.0,
+    }  # fmt: skip
+    more: dict[str, object] = {
+        "kind": kind.value, "loop": loop.value, "f_min_hz": f_min_hz, "f_max_hz": f_max_hz,
+        "share": share, "realisations": realisations, "rated_torque_nm": rated_torque_nm,
+    }  # fmt: skip
+
+    async def here() -> dict[str, object]:
+        settings = sweep_tool.SweepSettings(
+            Envelope(travel_rev, speed_rpm, torque_percent, 60.0), kind.value, loop.value,
+            f_min_hz, f_max_hz, share, realisations, rated_torque_nm=rated_torque_nm,
+        )  # fmt: skip
+        async with _session(url, station, profile, cycle_ms) as (found, session):
+            return sweep_tool.as_json(await sweep_tool.sweep(found, session, settings, _progress()))
+
+    _measure(out, here, "sweep", server, axis, cycle_ms, limits | more)
+
+
+def inertia(
+    out: Out,
+    url: Url = None,
+    station: Station = 1,
+    profile: Profile = None,
+    server: Server = None,
+    axis: AxisName = None,
+    scheme: SchemeName = SchemeName.free,
+    end_low_rev: Annotated[float | None, typer.Option(help="taught end")] = None,
+    end_high_rev: Annotated[float | None, typer.Option(help="taught end")] = None,
+    cycle_ms: Cycle = 1.0,
+    travel_rev: Travel = 3.0,
+    speed_rpm: Speed = 1200.0,
+    torque_percent: Torque = 80.0,
+    repetitions: Annotated[int, typer.Option(help="moves forth and back")] = 4,
+    rated_torque_nm: Rated = None,
+    motor_inertia_kgm2: Annotated[float | None, typer.Option(help="of the motor alone")] = None,
+) -> None:
+    """Measure inertia and friction and write them as JSON. The axis moves."""
+    ends = None
+    if end_low_rev is not None and end_high_rev is not None:
+        ends = (end_low_rev, end_high_rev)
+    request: dict[str, object] = {
+        "travel_limit": travel_rev, "speed_limit": speed_rpm, "torque_limit": torque_percent,
+        "time_limit_s": 60.0, "scheme": scheme.value, "ends_rev": ends,
+        "repetitions": repetitions, "rated_torque_nm": rated_torque_nm,
+        "motor_inertia_kgm2": motor_inertia_kgm2,
+    }  # fmt: skip
+
+    async def here() -> dict[str, object]:
+        settings = inertia_tool.InertiaSettings(
+            Envelope(travel_rev, speed_rpm, torque_percent, 60.0), scheme.value, ends,
+            repetitions=repetitions, rated_torque_nm=rated_torque_nm,
+            motor_inertia_kgm2=motor_inertia_kgm2,
+        )  # fmt: skip
+        async with _session(url, station, profile, cycle_ms) as (found, session):
+            return inertia_tool.as_json(
+                await inertia_tool.inertia(found, session, settings, _progress())
+            )
+
+    _measure(out, here, "inertia", server, axis, cycle_ms, request)
+
+
+def _progress() -> Progress:
+    progress = Progress(lambda: show_progress(progress.fraction, progress.step))
+    return progress
+
+
+@asynccontextmanager
+async def _session(
+    url: str | None, station: int, profile: str | None, cycle_ms: float
+) -> AsyncIterator[tuple[Axis, CyclicSession]]:
+    """The drive with its bus exchanging process data, all of it ended afterwards."""
+    if url is None:
+        raise NotAllowed("give a bus URL, or --server and --axis", remedy="see --help")
+    async with drive_at(url, station, profile) as drive:
+        axis = Axis(drive)
+        session = CyclicSession(drive.ports[0].link, [drive])
+        await session.start(cycle_ms / 1e3)
+        axis.session = session
+        try:
+            yield axis, session
+        finally:
+            axis.session = None
+            await session.stop()
+
+
+def _measure(
+    out: Path, here: object, tool: str, server: str | None, axis: str | None, cycle_ms: float,
+    request: dict[str, object],
+) -> None:  # fmt: skip
+    async def work() -> None:
+        if server is not None:
+            answer = await _through_server(server, axis, tool, cycle_ms, request)
+        else:
+            assert callable(here)
+            answer = await here()
+        write_atomically(out, json.dumps(answer, indent=1).encode())
+        for line in _told(tool, answer):
+            print(line)
+        print(f"written: {out}")
+
+    run(work)
+
+
+def _told(tool: str, answer: dict[str, object]) -> list[str]:
+    if tool == "inertia":
+        return [
+            f"inertia {_shown(answer['inertia_kgm2'])} kg·m²  friction "
+            f"{_shown(answer['coulomb_nm'])} Nm + {_shown(answer['viscous_nms'])} Nm·s  load "
+            f"{_shown(answer['gravity_nm'])} Nm",
+            f"verdict: {answer['verdict']}",
+        ]
+    rows = answer["resonances"]
+    lines = [
+        f"{row['kind']:14} {row['frequency_hz']:8.1f} Hz  damping {row['damping']:.3f}"
+        for row in (rows if isinstance(rows, list) else [])
+    ]
+    warnings = answer["warnings"]
+    return lines + [f"note: {w}" for w in (warnings if isinstance(warnings, list) else [])]
+
+
+def _shown(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else "not known"
+
+
+async def _through_server(
+    server: str, name: str | None, tool: str, cycle_ms: float, request: dict[str, object]
+) -> dict[str, object]:
+    """Run the job on a server and wait for it; its own bus exchange is started where needed."""
+    base = server.rstrip("/") + "/api/v1"
+    try:
+        async with httpx.AsyncClient(base_url=base, timeout=30.0) as http:
+            drives = (await _ok(await http.get("/drives"))).json()
+            drive = next((d for d in drives if name in (d["name"], d["id"])), None)
+            if drive is None:
+                names = ", ".join(str(d["name"]) for d in drives) or "none"
+                raise NotAllowed(f"{server} has no drive {name!r}", value=name, limit=names,
+                                 remedy="give its name with --axis")  # fmt: skip
+            path = f"/drives/{drive['id']}/jobs/{tool}"
+            body = request | {"cycle_ms": cycle_ms}
+            job = (await _ok(await http.post(path, json=body))).json()
+            while job["state"] == "running":
+                await asyncio.sleep(0.2)
+                job = (await _ok(await http.get(f"/jobs/{job['id']}"))).json()
+                show_progress(float(job["progress"]), str(job["step"]))
+    except httpx.HTTPError as error:
+        raise LinkLost(f"{server} cannot be reached: {error}", remedy="is it running?") from error
+    if job["state"] != "done":
+        problem = job.get("problem") or {}
+        raise NotAllowed(str(problem.get("detail") or f"the job was {job['state']}"),
+                         remedy=problem.get("remedy"))  # fmt: skip
+    result: dict[str, object] = job["result"]
+    return result
+
+
+async def _ok(answer: httpx.Response) -> httpx.Response:
+    if answer.is_success:
+        return answer
+    try:
+        problem = answer.json()
+    except ValueError:
+        problem = {}
+    raise DriveError(
+        str(
+            problem.get("detail") or problem.get("title") or f"the server says {answer.status_code}"
+        ),
+        remedy=problem.get("remedy"),
+    )
