@@ -78,3 +78,20 @@ def test_unplugged_adapter_recovers(station: Station, z: str) -> None:
     until(lambda: not station.state(z)["fresh"], 5)
     station.drives.command(do="heal", wire=CAN)
     until(lambda: station.state(z)["fresh"], 20, "the drive answers again")
+
+
+def test_the_missing_port_is_named_with_what_only_it_reaches(station: Station, z: str) -> None:
+    missing = station.ok(station.http.get(f"/drives/{z}/missing-ports"))
+    assert [port["kind"] for port in missing] == ["modbus"]
+    rows = station.ok(station.http.get(f"/drives/{z}/parameters"))
+    assert missing[0]["parameters"] == sum(not row["reachable"] for row in rows) > 0
+    assert "RS232" in missing[0]["wiring"]
+    station.ok(station.http.post(f"/drives/{z}/ports", json={"url": MODBUS, "station": 1}))
+    assert station.ok(station.http.get(f"/drives/{z}/missing-ports")) == []
+
+
+def test_a_second_port_where_nobody_answers_is_refused(station: Station, z: str) -> None:
+    answer = station.http.post(f"/drives/{z}/ports", json={"url": MODBUS, "station": 9})
+    assert answer.status_code == 504
+    assert "nothing can be read at station 9" in answer.json()["detail"]
+    assert len(station.ok(station.http.get(f"/drives/{z}"))["ports"]) == 1
