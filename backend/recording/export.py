@@ -1,0 +1,173 @@
+"""Exports of a recording: CSV, rerun's .rrd, MCAP. Run as a process of its own.
+
+    python -m backend.recording.export FILE.sdrec OUT (csv|rrd|mcap)
+
+Prints the fraction done, a line at a time. Every recorded value is written as the number that it
+is; the times are exact to a nanosecond.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import sys
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from backend.recording.reader import Channel, RecordingReader
+from backend.recording.table import merged
+
+Progress = Callable[[float], None]
+
+
+def export(source: Path, target: Path, kind: str, progress: Progress) -> None:
+    """Write ``target``; it appears only when it is whole.
+
+    Raises:
+        NotAllowed, BadRecording: the source cannot be read. OSError: the target not written.
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
+    part = target.with_name(f".{target.name}.part")
+    write = {"csv": to_csv, "rrd": to_rrd, "mcap": to_mcap}[kind]
+    try:
+        with RecordingReader(source) as reader:
+            write(reader, part, progress)
+        part.replace(target)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def labels(channels: tuple[Channel, ...]) -> list[str]:
+    """Column titles: name and unit."""
+    return [f"{c.name} [{c.unit}]" if c.unit else c.name for c in channels]
+
+
+def to_csv(reader: RecordingReader, path: Path, progress: Progress) -> None:
+    """One row for each time at which anything was sampled; empty where a channel was not."""
+    summary = reader.summary()
+    duration = max(summary.duration_s, 1e-9)
+    marked = [n for n, s in enumerate(reader.header["streams"]) if s["synchronous"]]
+    titles = {n: reader.header["streams"][n]["channels"][0]["drive_name"] for n in marked}
+    with path.open("w", newline="", encoding="utf-8") as file:
+        out = csv.writer(file)
+        zero = datetime.fromtimestamp(summary.clock.epoch(summary.first_s or 0.0), UTC)
+        out.writerow(
+            [f"time_s (0 = {zero.isoformat()})", *labels(reader.channels)]
+            + [f"{titles[n]} valid" for n in marked]
+        )
+        for rows in merged(reader):
+            times = (rows.time_ns / 1e9).tolist()
+            values, present = rows.values.tolist(), rows.present.tolist()
+            valid = rows.valid[:, marked].tolist()
+            for t, row, here, good in zip(times, values, present, valid, strict=True):
+                cells = [repr(v) if is_here else "" for v, is_here in zip(row, here, strict=True)]
+                out.writerow([repr(t), *cells, *("" if g < 0 else g for g in good)])
+            progress(float(rows.time_ns[-1]) / 1e9 / duration)
+
+
+def epoch_ns(reader: RecordingReader, times_s: np.ndarray[tuple[int], np.dtype[np.float64]]) -> \
+        np.ndarray[tuple[int], np.dtype[np.int64]]:  # fmt: skip
+    """Nanoseconds since the epoch; a float of today's epoch holds no better than 240 ns."""
+    start = round(reader.clock.epoch_s * 1e9)
+    since = np.rint((times_s - reader.clock.sample_s) * 1e9).astype(np.int64)
+    return np.asarray(since + start, dtype=np.int64)
+
+
+def to_mcap(reader: RecordingReader, path: Path, progress: Progress) -> None:
+    """One topic for each stream, one JSON message for each row of it."""
+    from mcap.writer import Writer
+
+    total = max(1, reader.summary().samples)
+    done = 0
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="", library="servodeck")
+        topics = {}
+        for number, stream in enumerate(reader.header["streams"]):
+            mine = [c for c in reader.channels if c.stream == number]
+            schema = {
+                "type": "object",
+                "properties": {c.name: {"type": ["number", "null"], "unit": c.unit} for c in mine}
+                | {"valid": {"type": "boolean"}},
+            }
+            schema_id = writer.register_schema(
+                f"stream{number}", "jsonschema", json.dumps(schema).encode()
+            )
+            kind = "cyclic" if stream["synchronous"] else "polled"
+            topics[number] = (
+                writer.register_channel(f"/{mine[0].drive}/{kind}", "json", schema_id),
+                [c.name for c in mine],
+            )
+        events = writer.register_schema("event", "jsonschema", b'{"type": "object"}')
+        events_id = writer.register_channel("/events", "json", events)
+        writer.add_metadata("servodeck", {"header": json.dumps(reader.header)})
+        for block in reader.blocks():
+            channel_id, names = topics[block.stream]
+            valid = None if block.valid is None else block.valid.tolist()
+            times = epoch_ns(reader, block.times_s).tolist()
+            for n, (ns, row) in enumerate(zip(times, block.values.tolist(), strict=True)):
+                message: dict[str, object] = {
+                    name: v if math.isfinite(v) else None
+                    for name, v in zip(names, row, strict=True)
+                }
+                if valid is not None:
+                    message["valid"] = valid[n]
+                writer.add_message(channel_id, ns, json.dumps(message).encode(), ns, block.sequence)
+            done += len(times)
+            progress(done / total)
+        for number, event in enumerate(reader.events()):
+            ns = int(epoch_ns(reader, np.array([float(event.get("t_s", 0.0))]))[0])
+            writer.add_message(events_id, ns, json.dumps(event).encode(), ns, number)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def to_rrd(reader: RecordingReader, path: Path, progress: Progress) -> None:
+    """One entity for each drive and unit, the events as a text log, and the arrangement."""
+    import rerun as rr
+
+    from backend.recording import rerun_layout
+
+    total = max(1, reader.summary().samples)
+    arranged = rerun_layout.plots(reader.channels)
+    recording = rr.RecordingStream(rerun_layout.APPLICATION, recording_id=reader.path.stem)
+    recording.save(path, default_blueprint=rerun_layout.blueprint(arranged, follow=False))
+    rerun_layout.send_names(recording, arranged)
+    done = 0
+    for block in reader.blocks():
+        times = epoch_ns(reader, block.times_s)
+        for plot in arranged:
+            if plot.stream == block.stream:
+                columns = block.values[:, list(plot.columns)]
+                rerun_layout.send_samples(recording, plot, times, columns)
+        done += len(times)
+        progress(done / total)
+    for event in reader.events():
+        ns = int(epoch_ns(reader, np.array([float(event.get("t_s", 0.0))]))[0])
+        rerun_layout.send_event(
+            recording, ns, str(event.get("text", event)), str(event.get("level", "info"))
+        )
+    recording.disconnect()
+
+
+def main() -> int:
+    """The process."""
+    source, target, kind = sys.argv[1:4]
+    last = -1.0
+
+    def progress(fraction: float) -> None:
+        nonlocal last
+        if fraction - last >= 0.01:
+            last = fraction
+            sys.stdout.write(f"{fraction:.3f}\n")
+            sys.stdout.flush()
+
+    export(Path(source), Path(target), kind, progress)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

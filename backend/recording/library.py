@@ -1,0 +1,251 @@
+"""The folder of recordings: list, search, describe, delete, and keep within bounds."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from backend.files import checked_name, write_atomically
+from backend.recording.chunks import SUFFIX
+from backend.recording.reader import BadRecording, RecordingReader, Summary
+from drivers.errors import NotAllowed
+
+_NOTES = ".json"
+EXPORTS = {"csv": ".csv", "rrd": ".rrd", "mcap": ".mcap"}
+
+
+@dataclass(frozen=True, slots=True)
+class Remarks:
+    """What people write about a recording afterwards. ``kept`` protects it from retention."""
+
+    notes: str = ""
+    tags: tuple[str, ...] = ()
+    kept: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Retention:
+    """Bounds of the folder; None means none. Recordings marked ``kept`` are never deleted."""
+
+    max_total_bytes: int | None = 20_000_000_000
+    keep_days: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """One recording of the list. ``summary`` is None where the file is no usable recording."""
+
+    name: str
+    summary: Summary | None
+    remarks: Remarks
+    modified: float
+    bytes: int
+    exports: tuple[str, ...]
+    problem: str = ""
+
+    def words(self) -> str:
+        """Everything that a search looks through, in lower case."""
+        parts = [self.name, self.remarks.notes, *self.remarks.tags]
+        if self.summary is not None:
+            header = self.summary.header
+            parts += [str(header.get("notes", "")), str(header.get("person", ""))]
+            parts += [str(tag) for tag in header.get("tags", [])]
+            for axis in header.get("axes", []):
+                parts += [str(axis.get(k, "")) for k in ("name", "profile", "title", "serial")]
+            parts += [f"{c.name} {c.key}" for c in self.summary.channels]
+        return " ".join(parts).lower()
+
+
+class RecordingLibrary:
+    """Recordings of one folder. Names are plain file names ending in ``.sdrec``."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.retention = self._read_retention()
+        self._seen: dict[str, tuple[tuple[int, int], Summary | None, str]] = {}
+
+    # --- names ------------------------------------------------------------------------
+
+    def path(self, name: str) -> Path:
+        """Where a recording of this name lies.
+
+        Raises:
+            NotAllowed: it is not a plain file name.
+        """
+        return self.folder / checked_name(name, SUFFIX)
+
+    def existing(self, name: str) -> Path:
+        """The file of a recording.
+
+        Raises:
+            NotAllowed: there is none of this name.
+        """
+        path = self.path(name)
+        if not path.is_file():
+            raise NotAllowed(
+                f"there is no recording {path.name}",
+                value=path.name,
+                remedy="choose one from the list of recordings",
+            )
+        return path
+
+    def free_name(self, wanted: str) -> str:
+        """``wanted``, or with a number behind it where that exists."""
+        stem = checked_name(wanted, SUFFIX).removesuffix(SUFFIX)
+        name, number = stem, 2
+        while (self.folder / (name + SUFFIX)).exists():
+            name, number = f"{stem} {number}", number + 1
+        return name + SUFFIX
+
+    def export_path(self, name: str, kind: str) -> Path:
+        """Where the export of a recording lies or will lie.
+
+        Raises:
+            NotAllowed: no such kind.
+        """
+        if kind not in EXPORTS:
+            raise NotAllowed(
+                f"{kind!r} is no export format", value=kind, limit=", ".join(EXPORTS),
+                remedy="choose one of these",
+            )  # fmt: skip
+        stem = checked_name(name, SUFFIX).removesuffix(SUFFIX)
+        return self.folder / "exports" / (stem + EXPORTS[kind])
+
+    # --- list -------------------------------------------------------------------------
+
+    def entries(self, search: str = "", busy: Iterable[str] = ()) -> list[Stored]:
+        """Recordings that contain every word of ``search``, newest first, without ``busy`` ones.
+
+        Reads the files that changed since the last time; blocking.
+        """
+        words = search.lower().split()
+        skip = set(busy)
+        found = [
+            self.describe(path.name)
+            for path in self.folder.glob(f"*{SUFFIX}")
+            if not path.name.startswith(".") and path.name not in skip
+        ]
+        fitting = [s for s in found if all(word in s.words() for word in words)]
+        return sorted(fitting, key=lambda s: -s.modified)
+
+    def describe(self, name: str) -> Stored:
+        """One recording.
+
+        Raises:
+            NotAllowed: there is none of this name.
+        """
+        path = self.existing(name)
+        status = path.stat()
+        stamp = (status.st_mtime_ns, status.st_size)
+        seen = self._seen.get(path.name)
+        if seen is None or seen[0] != stamp:
+            try:
+                with RecordingReader(path) as reader:
+                    seen = (stamp, reader.summary(), "")
+            except BadRecording as error:
+                seen = (stamp, None, error.message)
+            self._seen[path.name] = seen
+        exports = tuple(kind for kind in EXPORTS if self.export_path(path.name, kind).is_file())
+        return Stored(
+            name=path.name,
+            summary=seen[1],
+            remarks=self._remarks(path),
+            modified=status.st_mtime,
+            bytes=status.st_size,
+            exports=exports,
+            problem=seen[2],
+        )
+
+    # --- changes ----------------------------------------------------------------------
+
+    def annotate(
+        self, name: str, *, notes: str | None, tags: tuple[str, ...] | None, kept: bool | None
+    ) -> Stored:
+        """Change what is written about a recording; None leaves a thing as it is."""
+        path = self.existing(name)
+        remarks = self._remarks(path)
+        remarks = replace(
+            remarks,
+            notes=remarks.notes if notes is None else notes,
+            tags=remarks.tags if tags is None else tags,
+            kept=remarks.kept if kept is None else kept,
+        )
+        text = json.dumps(asdict(remarks), ensure_ascii=False)
+        write_atomically(path.with_name(path.name + _NOTES), text.encode())
+        return self.describe(name)
+
+    def delete(self, name: str) -> None:
+        """Delete a recording with its exports and remarks.
+
+        Raises:
+            NotAllowed: there is none of this name.
+        """
+        path = self.existing(name)
+        path.unlink()
+        path.with_name(path.name + _NOTES).unlink(missing_ok=True)
+        for kind in EXPORTS:
+            self.export_path(name, kind).unlink(missing_ok=True)
+        self._seen.pop(path.name, None)
+
+    def set_retention(self, retention: Retention) -> None:
+        """Keep these bounds from now on."""
+        text = json.dumps(asdict(retention))
+        write_atomically(self.folder / "retention.json", text.encode())
+        self.retention = retention
+
+    def prune(self, busy: Iterable[str] = (), now: float | None = None) -> list[str]:
+        """Delete what retention asks for, oldest first; returns the names. Blocking."""
+        now = time.time() if now is None else now
+        skip = set(busy)
+        rows = []
+        for path in self.folder.glob(f"*{SUFFIX}"):
+            if path.name.startswith(".") or path.name in skip:
+                continue
+            size = path.stat().st_size + sum(
+                e.stat().st_size
+                for kind in EXPORTS
+                if (e := self.export_path(path.name, kind)).is_file()
+            )
+            rows.append((path.stat().st_mtime, path.name, size, self._remarks(path).kept))
+        total = sum(row[2] for row in rows)
+        gone = []
+        for modified, name, size, kept in sorted(rows):
+            days, most = self.retention.keep_days, self.retention.max_total_bytes
+            old = days is not None and now - modified > days * 86400
+            if kept or not (old or (most is not None and total > most)):
+                continue
+            self.delete(name)
+            total -= size
+            gone.append(name)
+        return gone
+
+    def _remarks(self, path: Path) -> Remarks:
+        content = _read_json(path.with_name(path.name + _NOTES))
+        tags = content.get("tags", [])
+        return Remarks(
+            notes=str(content.get("notes", "")),
+            tags=tuple(str(tag) for tag in tags) if isinstance(tags, list) else (),
+            kept=content.get("kept") is True,
+        )
+
+    def _read_retention(self) -> Retention:
+        content = _read_json(self.folder / "retention.json")
+        most = content.get("max_total_bytes", Retention().max_total_bytes)
+        days = content.get("keep_days")
+        return Retention(
+            max_total_bytes=int(most) if isinstance(most, (int, float)) else None,
+            keep_days=float(days) if isinstance(days, (int, float)) else None,
+        )
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    """Contents of a small file of ours; one that is damaged counts as empty."""
+    try:
+        content = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}

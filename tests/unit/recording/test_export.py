@@ -1,0 +1,131 @@
+"""Exports, read back with the formats' own libraries, sample by sample."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from backend.files import StorageFailed
+from backend.recording.export import export
+from backend.recording.writer import RecordingWriter
+from drivers.link import ScopeBlock
+from tests.unit.recording.support import block, header
+
+T0_NS = 1_700_000_000_000_000_000
+POLLED_S = [100.0005, 100.0102, 100.0199]
+
+
+def fail(error: StorageFailed) -> None:
+    raise AssertionError(error.message)
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """Two axes sampled together, 30 samples each, and a third polled at times of its own."""
+    head = header(2, 3)
+    head["streams"][2]["synchronous"] = False
+    path = tmp_path / "test run.sdrec"
+    writer = RecordingWriter(path, head, fail)
+    for n in range(3):
+        writer.put(0, block(n))
+        writer.put(1, block(n))
+    polled = np.array([[1.5, np.nan], [-2.25, 0.1], [1e300, -0.0]])
+    writer.put(2, ScopeBlock(1, POLLED_S[0], 0.01, ("a", "b"), polled, times_s=np.array(POLLED_S)))
+    writer.event({"kind": "parameter", "t_s": 100.01, "text": "X0: gain 20 -> 30"})
+    writer.close({"reason": "stopped"})
+    return path
+
+
+def run(source: Path, kind: str) -> Path:
+    target = source.with_name("exports") / f"out.{kind}"
+    seen: list[float] = []
+    export(source, target, kind, seen.append)
+    assert seen[-1] == pytest.approx(1.0, abs=0.02)
+    assert [p.name for p in target.parent.iterdir()] == [target.name], "no leftovers"
+    return target
+
+
+def expected() -> np.ndarray:
+    return np.concatenate([block(n).samples for n in range(3)])
+
+
+def test_csv(recording: Path) -> None:
+    with run(recording, "csv").open(newline="", encoding="utf-8") as file:
+        titles, *rows = list(csv.reader(file))
+    assert titles[0] == "time_s (0 = 2023-11-14T22:13:20+00:00)"
+    assert titles[1:3] == ["X0 signal 0 [inc]", "X0 signal 1 [rpm]"]
+    assert titles[7:] == ["X0 valid", "X1 valid"]
+    together = [row for row in rows if row[1]]
+    assert [float(row[0]) for row in together] == pytest.approx(np.arange(30) * 0.001, abs=1e-9)
+    for columns in ((1, 2), (3, 4)):
+        values = np.array([[float(row[c]) for c in columns] for row in together])
+        assert np.array_equal(values, expected()), "both axes on the same row, exactly"
+    alone = [row for row in rows if row[5]]
+    assert [float(row[0]) for row in alone] == pytest.approx([0.0005, 0.0102, 0.0199], abs=1e-9)
+    assert [row[5] for row in alone] == ["1.5", "-2.25", "1e+300"]
+    assert [row[6] for row in alone] == ["nan", "0.1", "-0.0"]
+    assert len(rows) == 33
+    assert [float(row[0]) for row in rows] == sorted(float(row[0]) for row in rows)
+
+
+def test_mcap(recording: Path) -> None:
+    from mcap.reader import make_reader
+
+    with run(recording, "mcap").open("rb") as file:
+        reader = make_reader(file)
+        messages: dict[str, list[tuple[int, dict[str, object]]]] = {}
+        for _, channel, message in reader.iter_messages():
+            assert channel.message_encoding == "json"
+            row = (message.log_time, json.loads(message.data))
+            messages.setdefault(channel.topic, []).append(row)
+        metadata = {m.name: m.metadata for m in reader.iter_metadata()}
+    assert set(messages) == {"/x0/cyclic", "/x1/cyclic", "/x2/polled", "/events"}
+    for axis in ("0", "1"):
+        rows = messages[f"/x{axis}/cyclic"]
+        assert [t for t, _ in rows] == [T0_NS + n * 1_000_000 for n in range(30)]
+        names = (f"X{axis} signal 0", f"X{axis} signal 1")
+        assert np.array_equal([[row[n] for n in names] for _, row in rows], expected())
+    polled = messages["/x2/polled"]
+    assert [t - T0_NS for t, _ in polled] == [500_000, 10_200_000, 19_900_000]
+    assert [row["X2 signal 0"] for _, row in polled] == [1.5, -2.25, 1e300]
+    assert [row["X2 signal 1"] for _, row in polled] == [None, 0.1, -0.0]
+    assert messages["/events"][0][1]["text"] == "X0: gain 20 -> 30"
+    assert json.loads(metadata["servodeck"]["header"])["format"] == 1
+
+
+def test_rrd(recording: Path) -> None:
+    from rerun.chunk import RrdReader
+
+    reader = RrdReader(run(recording, "rrd"))
+    assert [store.recording_id for store in reader.recordings()] == ["test run"]
+    assert len(reader.blueprints()) == 1
+    seen: dict[str, list[tuple[int, object]]] = {}
+    for chunk in reader.stream().to_chunks():
+        if "time" not in chunk.timeline_names:
+            continue
+        batch = chunk.to_record_batch()
+        component = next(k for k in batch.schema.names if k.split(":")[-1] in ("scalars", "text"))
+        times = batch.column("time").cast("int64").to_pylist()
+        rows = list(zip(times, batch.column(component).to_pylist(), strict=True))
+        seen.setdefault(chunk.entity_path.strip("/"), []).extend(rows)
+    values = expected()
+    for axis in ("x0", "x1"):
+        for column, unit in ((0, "inc"), (1, "rpm")):
+            rows = sorted(seen[f"{axis}/{unit}"], key=lambda row: row[0])
+            assert [t for t, _ in rows] == [T0_NS + n * 1_000_000 for n in range(30)]
+            assert [cell for _, cell in rows] == [[v] for v in values[:, column]]
+    polled = sorted(seen["x2/inc"], key=lambda row: row[0])
+    assert [cell for _, cell in polled] == [[1.5], [-2.25], [1e300]]
+    assert [t - T0_NS for t, _ in polled] == [500_000, 10_200_000, 19_900_000]
+    assert seen["events"] == [(T0_NS + 10_000_000, ["X0: gain 20 -> 30"])]
+
+
+@pytest.mark.parametrize("kind", ["csv", "rrd", "mcap"])
+def test_a_cut_recording_is_exported_as_far_as_it_goes(recording: Path, kind: str) -> None:
+    recording.write_bytes(recording.read_bytes()[:-700])
+    export(recording, recording.with_name(f"a.{kind}"), kind, lambda _f: None)
+    assert recording.with_name(f"a.{kind}").stat().st_size > 100
