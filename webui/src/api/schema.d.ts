@@ -52,6 +52,66 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/descriptions": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Import Description
+         * @description Make a profile from an ESI, EDS or DCF file; the job's result is ImportedDescription.
+         */
+        post: operations["import_description"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/descriptions/devices": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Described Devices
+         * @description The devices of an ESI file, to choose from; empty for an EDS or DCF file, which has one.
+         */
+        post: operations["described_devices"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/descriptions/from-drive": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Read Dictionary
+         * @description Make a profile from a drive's own dictionary; the job's result is ImportedDescription.
+         */
+        post: operations["read_dictionary"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives": {
         parameters: {
             query?: never;
@@ -326,6 +386,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/missing-ports": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Drive Missing Ports
+         * @description Ports over which a drive could be reached as well, and what only they reach.
+         */
+        get: operations["drive_missing_ports"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/parameters": {
         parameters: {
             query?: never;
@@ -386,6 +466,8 @@ export interface paths {
         /**
          * Add Port
          * @description Connect a drive over a second bus; each parameter then goes the way that carries it.
+         *
+         *     Refused where settings read there differ from the drive's, unless that is accepted.
          */
         post: operations["add_port"];
         delete?: never;
@@ -607,9 +689,29 @@ export interface paths {
         };
         /**
          * Profiles
-         * @description Profiles that servodeck brings.
+         * @description Profiles that servodeck brings, and the user's own; broken ones say why.
          */
         get: operations["profiles"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/profiles/{profile}/eds": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Profile
+         * @description A profile's objects as a CANopen EDS file.
+         */
+        get: operations["export_profile"];
         put?: never;
         post?: never;
         delete?: never;
@@ -632,6 +734,26 @@ export interface paths {
          * @description Look for drives; the job's result is ``{"found": [FoundDrive]}``.
          */
         post: operations["scan"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/search-line": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Search Line Settings
+         * @description Try baud rates and parities of a serial bus; the job's result is LineSearchResult.
+         */
+        post: operations["search_line_settings"];
         delete?: never;
         options?: never;
         head?: never;
@@ -903,6 +1025,18 @@ export interface components {
             cycle_us: number;
             /** Url */
             url: string;
+        };
+        /**
+         * DescribedDevice
+         * @description One device of a maker's file: a file often holds a whole series.
+         */
+        DescribedDevice: {
+            /** Name */
+            name: string;
+            /** Product Code */
+            product_code: number | null;
+            /** Revision */
+            revision: number | null;
         };
         /**
          * Diff
@@ -1202,6 +1336,55 @@ export interface components {
             uses_limit: boolean;
         };
         /**
+         * ImportFinding
+         * @description Something odd about a description: where, what, and what was made of it.
+         */
+        ImportFinding: {
+            /**
+             * Outcome
+             * @enum {string}
+             */
+            outcome: "repaired" | "left out" | "noted";
+            /** Place */
+            place: string;
+            /** Text */
+            text: string;
+        };
+        /**
+         * ImportedDescription
+         * @description Result of an import job: the new profile, usable at once.
+         */
+        ImportedDescription: {
+            /** Findings */
+            findings: components["schemas"]["ImportFinding"][];
+            /** Links */
+            links: string[];
+            /**
+             * Not Listed
+             * @description findings beyond those listed
+             */
+            not_listed: number;
+            /** Parameters */
+            parameters: number;
+            /**
+             * Path
+             * @description the file to edit on the server's machine
+             */
+            path: string;
+            /** Product Code */
+            product_code: number | null;
+            /** Profile */
+            profile: string;
+            /** Revision */
+            revision: number | null;
+            /** Summary */
+            summary: string;
+            /** Title */
+            title: string;
+            /** Vendor Id */
+            vendor_id: number | null;
+        };
+        /**
          * Interfaces
          * @description What this machine can connect through.
          */
@@ -1410,6 +1593,31 @@ export interface components {
             type: "lease";
         };
         /**
+         * LineSearchRequest
+         * @description Search the baud rate and parity of a serial bus; few stations, for each costs time.
+         */
+        LineSearchRequest: {
+            /**
+             * Stations
+             * @default [
+             *       1
+             *     ]
+             */
+            stations: number[];
+            /** Url */
+            url: string;
+        };
+        /**
+         * LineSearchResult
+         * @description Result of a line search: the URL with the settings found, None where nothing answered.
+         */
+        LineSearchResult: {
+            /** Found */
+            found: components["schemas"]["FoundDrive"][];
+            /** Url */
+            url: string | null;
+        };
+        /**
          * LoadSetRequest
          * @description Write chosen rows of a parameter set to a drive.
          */
@@ -1458,6 +1666,26 @@ export interface components {
              * @constant
              */
             type: "log";
+        };
+        /**
+         * MissingPort
+         * @description A port that a drive's family has and that is not connected.
+         */
+        MissingPort: {
+            /** Groups */
+            groups: string[];
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "ethercat" | "canopen" | "modbus" | "mlink";
+            /**
+             * Parameters
+             * @description parameters that only this port would reach
+             */
+            parameters: number;
+            /** Wiring */
+            wiring: string;
         };
         /**
          * MoveRequest
@@ -1698,6 +1926,12 @@ export interface components {
          * @description A further port of a drive that is already connected.
          */
         PortRequest: {
+            /**
+             * Accept Difference
+             * @description settings read there differ, and it is the same drive even so
+             * @default false
+             */
+            accept_difference: boolean;
             /** Station */
             station: number;
             /** Url */
@@ -1775,17 +2009,29 @@ export interface components {
         };
         /**
          * ProfileInfo
-         * @description A profile that servodeck brings.
+         * @description A profile that servodeck brings, or one of the user's own.
          */
         ProfileInfo: {
             /** Links */
             links: string[];
             /** Maker */
             maker: string;
+            /**
+             * Own
+             * @description in the user's folder, imported or written there
+             * @default false
+             */
+            own: boolean;
             /** Parameters */
             parameters: number;
             /** Partial */
             partial: boolean;
+            /**
+             * Problem
+             * @description why this own profile cannot be used
+             * @default
+             */
+            problem: string;
             /** Profile */
             profile: string;
             /** Title */
@@ -1845,6 +2091,18 @@ export interface components {
         ReadAllRequest: {
             /** Keys */
             keys?: string[] | null;
+        };
+        /**
+         * ReadDictionaryRequest
+         * @description Make a profile from what a drive tells of its own objects.
+         */
+        ReadDictionaryRequest: {
+            /** Profile */
+            profile: string;
+            /** Station */
+            station: number;
+            /** Url */
+            url: string;
         };
         /**
          * Refused
@@ -2227,6 +2485,7 @@ export type Bus = components['schemas']['Bus'];
 export type ConnectRequest = components['schemas']['ConnectRequest'];
 export type CyclicInfo = components['schemas']['CyclicInfo'];
 export type CyclicRequest = components['schemas']['CyclicRequest'];
+export type DescribedDevice = components['schemas']['DescribedDevice'];
 export type Diff = components['schemas']['Diff'];
 export type DiffRow = components['schemas']['DiffRow'];
 export type DriveSummary = components['schemas']['DriveSummary'];
@@ -2238,6 +2497,8 @@ export type Health = components['schemas']['Health'];
 export type Hello = components['schemas']['Hello'];
 export type HomeRequest = components['schemas']['HomeRequest'];
 export type HomingMethodInfo = components['schemas']['HomingMethodInfo'];
+export type ImportFinding = components['schemas']['ImportFinding'];
+export type ImportedDescription = components['schemas']['ImportedDescription'];
 export type Interfaces = components['schemas']['Interfaces'];
 export type JobChanged = components['schemas']['JobChanged'];
 export type JobInfo = components['schemas']['JobInfo'];
@@ -2248,9 +2509,12 @@ export type JogStop = components['schemas']['JogStop'];
 export type Lease = components['schemas']['Lease'];
 export type LeaseChanged = components['schemas']['LeaseChanged'];
 export type LeaseTake = components['schemas']['LeaseTake'];
+export type LineSearchRequest = components['schemas']['LineSearchRequest'];
+export type LineSearchResult = components['schemas']['LineSearchResult'];
 export type LoadSetRequest = components['schemas']['LoadSetRequest'];
 export type LogEntry = components['schemas']['LogEntry'];
 export type Logged = components['schemas']['Logged'];
+export type MissingPort = components['schemas']['MissingPort'];
 export type MoveRequest = components['schemas']['MoveRequest'];
 export type NetworkInterface = components['schemas']['NetworkInterface'];
 export type ParameterRow = components['schemas']['ParameterRow'];
@@ -2268,6 +2532,7 @@ export type ProfileInfo = components['schemas']['ProfileInfo'];
 export type ProfileMatch = components['schemas']['ProfileMatch'];
 export type Quality = components['schemas']['Quality'];
 export type ReadAllRequest = components['schemas']['ReadAllRequest'];
+export type ReadDictionaryRequest = components['schemas']['ReadDictionaryRequest'];
 export type Refused = components['schemas']['Refused'];
 export type SaveSetRequest = components['schemas']['SaveSetRequest'];
 export type ScanRequest = components['schemas']['ScanRequest'];
@@ -2538,6 +2803,249 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    import_description: {
+        parameters: {
+            query: {
+                /** @description name of the file */
+                file: string;
+                profile?: string | null;
+                product_code?: number | null;
+                revision?: number | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    described_devices: {
+        parameters: {
+            query: {
+                /** @description name of the file */
+                file: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DescribedDevice"][];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_dictionary: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ReadDictionaryRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
             };
             /** @description No such thing */
             404: {
@@ -3802,6 +4310,82 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["LogEntry"][];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    drive_missing_ports: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MissingPort"][];
                 };
             };
             /** @description No such thing */
@@ -5183,6 +5767,81 @@ export interface operations {
             };
         };
     };
+    export_profile: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description name of the profile */
+                profile: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     scan: {
         parameters: {
             query?: never;
@@ -5193,6 +5852,84 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["ScanRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    search_line_settings: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LineSearchRequest"];
             };
         };
         responses: {
