@@ -47,6 +47,10 @@ export const bench = {
     'It is {name}: add as its second connection',
     '这是 {name}：添加为第二连接',
   ],
+  'connect.acceptDifference': [
+    'Add it although its identity differs: I have checked the cable',
+    '身份不同仍添加：我已检查电缆',
+  ],
   'connect.name': ['Name', '名称'],
   'connect.notes': ['Notes', '备注'],
   'connect.connect': ['Connect', '连接'],

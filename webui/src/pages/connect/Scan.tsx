@@ -90,6 +90,8 @@ function Found({ found }: { found: FoundDrive }) {
   const [profiles, setProfiles] = useState<ProfileInfo[]>([])
   const [profile, setProfile] = useState(found.matches[0]?.profile ?? '')
   const [name, setName] = useState('')
+  const [accept, setAccept] = useState(false)
+  const [doubted, setDoubted] = useState(false)
   useEffect(() => {
     ask(api.GET('/api/v1/profiles')).then(setProfiles, () => {})
   }, [])
@@ -97,15 +99,19 @@ function Found({ found }: { found: FoundDrive }) {
   const used = drives.find((drive) =>
     drive.ports.some((port) => port.url === found.url && port.station === found.station),
   )
-  const addPort = (drive: string) =>
-    connect.run(() =>
+  const addPort = async (drive: string) => {
+    const added = await connect.run(() =>
       ask(
         api.POST('/api/v1/drives/{drive_id}/ports', {
           params: { path: { drive_id: drive } },
-          body: { url: found.url, station: found.station },
+          body: { url: found.url, station: found.station, accept_difference: accept },
         }),
       ),
     )
+    // Agreed to for one try, and only after the difference has been told.
+    setAccept(false)
+    setDoubted(!added)
+  }
   return (
     <div className="found">
       <p>
@@ -173,6 +179,13 @@ function Found({ found }: { found: FoundDrive }) {
               {t('connect.secondPort', { name: drive.name })}
             </Button>
           ))}
+      {!used && doubted && (
+        <Checkbox
+          label={t('connect.acceptDifference')}
+          checked={accept}
+          onChange={(event) => setAccept(event.currentTarget.checked)}
+        />
+      )}
       {!used && profile !== '' && (
         <p className={match?.confidence === 'certain' ? 'dim' : 'warn-text'}>
           {match ? match.why : t('connect.noMatch')}
