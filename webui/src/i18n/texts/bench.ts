@@ -48,8 +48,8 @@ export const bench = {
     '这是 {name}：添加为第二连接',
   ],
   'connect.acceptDifference': [
-    'Add it although its identity differs: I have checked the cable',
-    '身份不同仍添加：我已检查电缆',
+    'It is the same drive although settings read there differ: I have checked the cable',
+    '虽然读到的设置不同，但确为同一台驱动器：我已检查电缆',
   ],
   'connect.name': ['Name', '名称'],
   'connect.notes': ['Notes', '备注'],
