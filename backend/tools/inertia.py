@@ -358,14 +358,14 @@ def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) 
             motor_inertia_kgm2=facts.motor_inertia_kgm2,
             valid=recording.valid,
         )
-        reference = _reference_inertia(facts)
-        if found.load_ratio is None and reference and np.isfinite(found.inertia_kgm2.value):
-            return replace(found, load_ratio=found.inertia_kgm2.value / reference - 1.0)
-        return found
     except ValueError as error:
         raise NotAllowed(
             f"the recording cannot be evaluated: {error}", remedy="allow more travel or time"
         ) from error
+    reference = _reference_inertia(facts)
+    if found.load_ratio is None and reference and np.isfinite(found.inertia_kgm2.value):
+        return replace(found, load_ratio=found.inertia_kgm2.value / reference - 1.0)
+    return found
 
 
 def _raw(

@@ -1,0 +1,191 @@
+"""Loop gains of a drive in physical units, by the convention of its profile.
+
+Bandwidth convention (MMS7): speed gain = 2π·bandwidth·J with J as the drive holds it, integral
+corner = 2π·value times that, position gain = 2π·value (004:2847). Gain convention: position in
+1/s, speed in Hz with J from the inertia ratio, integral as a time. Gains without a printed
+meaning are shown raw and never designed for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.analysis.design import DriveLoops, Gains
+from backend.axis import Axis
+from backend.drive import Drive
+from backend.tools.axis_facts import AxisFacts, read_facts, si_raw, si_value
+from drivers.errors import NotAllowed
+from profiles.schema import GainSpec, StiffnessTable
+
+TURN = 2 * np.pi
+#: Loop period of the drives: half of it to compute, half of it until the torque's mean follows.
+_LOOP_PERIOD_S = 50e-6
+
+
+@dataclass(frozen=True)
+class GainState:
+    """Gains now: Hz, 1/s, s; None where the family has none or its unit has no printed meaning.
+
+    ``speed_nms`` is the gain in Nm per rad/s with the drive's own inertia. ``level`` is the
+    stiffness level that acts instead of the single gains, None when they act themselves.
+    """
+
+    convention: str
+    position_1_s: float | None
+    speed_hz: float | None
+    speed_nms: float | None
+    integral_hz: float | None
+    level: int | None
+    raw: dict[str, int]
+
+
+def spec_of(drive: Drive) -> GainSpec:
+    """Raises NotAllowed where the profile knows no gains."""
+    if drive.profile.gains is None:
+        raise NotAllowed(
+            f"{drive.name}: the profile of {drive.profile.title} does not name its gains",
+            drive=drive.name, remedy="set them on the Parameters page",
+        )  # fmt: skip
+    return drive.profile.gains
+
+
+def _table(drive: Drive) -> StiffnessTable | None:
+    return drive.profile.stiffness[0] if drive.profile.stiffness else None
+
+
+async def read_gains(axis: Axis, facts: AxisFacts | None = None) -> GainState:
+    """Read them now.
+
+    Raises:
+        DriveError: a parameter cannot be read.
+    """
+    drive, spec = axis.drive, spec_of(axis.drive)
+    facts = facts or await read_facts(axis)
+    keys = [k for k in (spec.position, spec.speed, spec.integral) if k is not None]
+    raw = {key: await drive.raw(key) for key in keys}
+    values = {key: si_value(drive.parameter(key), _engineering(drive, key, r))
+              for key, r in raw.items()}  # fmt: skip
+    table, level = _table(drive), None
+    if table is not None and table.mode_key is not None:
+        raw[table.mode_key] = await drive.raw(table.mode_key)
+        if raw[table.mode_key] == table.table_raw:
+            level = await drive.raw(table.level_key)
+            values |= _row(drive, table, level)
+    if spec.convention == "unit":
+        return GainState(spec.convention, None, None, None, None, level, raw)
+    position = values.get(spec.position or "")
+    integral = values.get(spec.integral or "")
+    if spec.convention == "bandwidth" and position is not None:
+        position *= TURN
+    if spec.convention == "gain" and integral:
+        integral = 1.0 / (TURN * integral)
+    speed = values.get(spec.speed or "")
+    inertia = facts.drive_inertia_kgm2
+    return GainState(
+        spec.convention, position, speed,
+        None if speed is None or inertia is None else TURN * speed * inertia,
+        integral, level, raw,
+    )  # fmt: skip
+
+
+def _engineering(drive: Drive, key: str, raw: int) -> float:
+    value = drive.parameter(key).to_value(raw)
+    return float(value) if not isinstance(value, str) else 0.0
+
+
+def _row(drive: Drive, table: StiffnessTable, level: int) -> dict[str, float | None]:
+    row = table.rows.get(level)
+    if row is None:
+        return {}
+    values: dict[str, float | None] = {}
+    for key, value in zip(table.columns, row, strict=True):
+        engineering = value if table.column_units else _engineering(drive, key, round(value))
+        values[key] = si_value(drive.parameter(key), engineering)
+    return values
+
+
+def plan_gains(drive: Drive, gains: Gains, inertia_kgm2: float) -> dict[str, int]:
+    """Raw values that make the drive's loops these gains, its inertia parameter included.
+
+    Raises:
+        NotAllowed: a family whose gains have no printed meaning.
+        OutOfRange: later, by the write, when a value exceeds the parameter's limits.
+    """
+    spec = spec_of(drive)
+    if spec.convention == "unit":
+        raise NotAllowed(
+            f"{drive.name}: the manual does not print what the gains of {drive.profile.title} mean",
+            drive=drive.name, remedy="use its stiffness levels and measure the effect",
+        )  # fmt: skip
+    raw: dict[str, int] = {}
+    if spec.inertia is not None and spec.inertia_meaning == "total":
+        raw[spec.inertia] = si_raw(drive.parameter(spec.inertia), inertia_kgm2)
+    if spec.speed is not None:
+        raw[spec.speed] = si_raw(drive.parameter(spec.speed), gains.speed_bandwidth_hz)
+    if spec.integral is not None:
+        integral = gains.integral_hz
+        if spec.convention == "gain":
+            integral = 1.0 / (TURN * gains.integral_hz)
+        raw[spec.integral] = si_raw(drive.parameter(spec.integral), integral)
+    if spec.position is not None:
+        position = gains.position_1_s
+        if spec.convention == "bandwidth":
+            position /= TURN
+        raw[spec.position] = si_raw(drive.parameter(spec.position), position)
+    table = _table(drive)
+    if table is not None and table.mode_key is not None and table.manual_raw is not None:
+        raw[table.mode_key] = table.manual_raw
+    return {key: _within(drive, key, value) for key, value in raw.items()}
+
+
+def _within(drive: Drive, key: str, raw: int) -> int:
+    """The nearest value that the parameter can hold: a gain may always be lower than designed."""
+    low, high = drive.parameter(key).raw_limits
+    raw = raw if high is None else min(raw, int(high))
+    return raw if low is None else max(raw, int(low))
+
+
+def plan_level(drive: Drive, level: int) -> dict[str, int]:
+    """Raw values that select a stiffness level.
+
+    Raises:
+        NotAllowed: the family has no table.
+    """
+    table = _table(drive)
+    if table is None:
+        raise NotAllowed(f"{drive.name} has no stiffness levels", drive=drive.name)
+    raw = {table.level_key: level}
+    if table.mode_key is not None and table.table_raw is not None:
+        raw[table.mode_key] = table.table_raw
+    return raw
+
+
+def loops_of(drive: Drive, facts: AxisFacts) -> DriveLoops:
+    """The fixed parts of the drive's loop, for prediction.
+
+    The speed is the difference of two samples (half a period late), the torque is held for one
+    period (half a period late).
+
+    Raises:
+        NotAllowed: the current loop's bandwidth is not known.
+    """
+    if facts.current_bandwidth_hz is None:
+        raise NotAllowed(
+            f"{drive.name}: the bandwidth of the current loop is not known, so no loop can be "
+            "predicted", drive=drive.name, remedy="tune it by levels and measure the effect",
+        )  # fmt: skip
+    spec = spec_of(drive)
+    highest = None
+    if spec.speed is not None:
+        _low, high = drive.parameter(spec.speed).raw_limits
+        if high is not None:
+            highest = si_value(drive.parameter(spec.speed),
+                               _engineering(drive, spec.speed, int(high)))  # fmt: skip
+    return DriveLoops(
+        current_bandwidth_hz=facts.current_bandwidth_hz,
+        delay_s=_LOOP_PERIOD_S,
+        speed_filter_hz=facts.speed_filter_hz,
+        highest_speed_bandwidth_hz=highest,
+    )

@@ -1,0 +1,278 @@
+"""Notches of a drive: read, show what a wanted notch would become, write.
+
+Encodings come from the profile (`NotchSpec`); what a drive does with levels whose formula no
+manual prints is not guessed here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.notch import (
+    IntegerRange,
+    Notch,
+    NotchCoefficients,
+    RealisedNotch,
+    coefficients_response,
+    decode_coefficients,
+    decode_hz_width_db,
+    encode_coefficients,
+    encode_hz_width,
+    encode_hz_width_db,
+    realised,
+)
+from backend.axis import Axis
+from backend.drive import Drive
+from backend.tools.temporary import write_settings
+from drivers.errors import NotAllowed, OutOfRange
+from profiles.schema import NotchSlot, NotchSpec, Parameter, Profile
+
+#: Depth shown for families whose manual prints none; the effect has to be measured.
+UNKNOWN_DEPTH_DB = -40.0
+
+
+@dataclass(frozen=True)
+class SlotState:
+    """One notch of the drive. ``notch`` is None where its values mean none (or levels only)."""
+
+    slot: int
+    enabled: bool
+    notch: Notch | None
+    realised: RealisedNotch | None
+    raw: Mapping[str, int]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Preview:
+    """What a wanted notch would become; ``realised`` is None where no formula is known."""
+
+    slot: int
+    asked: Notch | None
+    raw: Mapping[str, int]
+    realised: RealisedNotch | None
+    note: str = ""
+
+
+def spec_of(profile: Profile, drive: str) -> NotchSpec:
+    """Raises NotAllowed where the family documents no notch."""
+    if profile.notch is None:
+        raise NotAllowed(
+            f"{drive}: {profile.title} documents no notch filters", drive=drive,
+            remedy="lower the loop gain, or stiffen the mechanics",
+        )  # fmt: skip
+    return profile.notch
+
+
+def _slot(spec: NotchSpec, number: int, drive: str) -> NotchSlot:
+    if not 0 <= number < len(spec.slots):
+        raise OutOfRange(
+            f"{drive} has no notch {number + 1}", drive=drive, value=number + 1,
+            limit=f"1…{len(spec.slots)}", remedy="choose one of its notches",
+        )  # fmt: skip
+    return spec.slots[number]
+
+
+def _value_keys(slot: NotchSlot) -> tuple[str, ...]:
+    keys = (
+        slot.a1_key, slot.a2_key, slot.b1_key, slot.b2_key,
+        slot.frequency_key, slot.width_key, slot.depth_key,
+    )  # fmt: skip
+    return tuple(key for key in keys if key is not None)
+
+
+def _range(parameter: Parameter) -> IntegerRange:
+    low, high = parameter.raw_limits
+    return IntegerRange(int(low or 0), int(high if high is not None else 0xFFFF))
+
+
+def _coefficients(slot: NotchSlot, raw: Mapping[str, int]) -> NotchCoefficients:
+    keys = (slot.a1_key, slot.a2_key, slot.b1_key, slot.b2_key)
+    values = [raw[key] for key in keys if key is not None]
+    return NotchCoefficients(*values)
+
+
+def encode(
+    profile: Profile, drive: str, number: int, notch: Notch | None, enable_now: int | None
+) -> Preview:
+    """Raw values for one slot; None switches it off. ``enable_now`` is its enable word as it is.
+
+    Raises:
+        NotAllowed: no notches, or an encoding without a printed formula.
+        OutOfRange: the drive cannot make this notch.
+    """
+    spec = spec_of(profile, drive)
+    slot = _slot(spec, number, drive)
+    raw: dict[str, int] = {}
+    made: RealisedNotch | None = None
+    note = ""
+    if notch is not None:
+        try:
+            raw, made, note = _encoded(profile, spec, slot, notch)
+        except ValueError as error:
+            raise OutOfRange(
+                f"{drive}: notch {number + 1}: {error}", drive=drive,
+                value=f"{notch.center_hz:g} Hz", remedy="move its centre or change its width",
+            ) from error  # fmt: skip
+    raw |= _enable(profile, slot, notch is not None, enable_now)
+    return Preview(number, notch, raw, made, note)
+
+
+def _enable(profile: Profile, slot: NotchSlot, on: bool, enable_now: int | None) -> dict[str, int]:
+    if slot.enable_key is not None:
+        bit = 1 << (slot.enable_bit or 0)
+        word = enable_now or 0
+        return {slot.enable_key: word | bit if on else word & ~bit}
+    if not on and slot.frequency_key is not None:
+        # Families without an enable bit switch a notch off by its highest frequency.
+        _low, high = profile.by_key[slot.frequency_key].raw_limits
+        if high is None:
+            raise NotAllowed("the manual does not say how this notch is switched off")
+        return {slot.frequency_key: int(high)}
+    return {}
+
+
+def _encoded(
+    profile: Profile, spec: NotchSpec, slot: NotchSlot, notch: Notch
+) -> tuple[dict[str, int], RealisedNotch | None, str]:
+    keys = profile.by_key
+    if spec.encoding == "coefficients":
+        if spec.sample_time_s is None:
+            raise ValueError("the loop period of this family is not known")
+        stored = encode_coefficients(notch, spec.sample_time_s)
+        names = (slot.a1_key, slot.a2_key, slot.b1_key, slot.b2_key)
+        values = (stored.a1, stored.a2, stored.b1, stored.b2)
+        raw = {k: v for k, v in zip(names, values, strict=True) if k is not None}
+        return raw, realised(stored, spec.sample_time_s), ""
+    if slot.frequency_key is None or slot.width_key is None:
+        raise ValueError("the profile does not name its parameters")
+    frequency, width = keys[slot.frequency_key], keys[slot.width_key]
+    if spec.encoding == "hz_width":
+        hz, wide = encode_hz_width(notch, _range(frequency), _range(width))
+        return (
+            {slot.frequency_key: hz, slot.width_key: wide}, None,
+            "the manual prints no depth: measure the effect",
+        )  # fmt: skip
+    if spec.encoding == "hz_width_db" and slot.depth_key is not None:
+        depth = keys[slot.depth_key]
+        hz, wide, db = encode_hz_width_db(notch, _range(frequency), _range(width), _range(depth))
+        shown = decode_hz_width_db(hz, wide, db)
+        made = RealisedNotch(shown.center_hz, shown.width_hz, shown.depth_db, 0.0, True)
+        return {slot.frequency_key: hz, slot.width_key: wide, slot.depth_key: db}, made, ""
+    raise ValueError(
+        "no manual prints what its levels mean: set levels on the Parameters page and measure"
+    )
+
+
+def response(profile: Profile, notch: Notch, frequency_hz: FloatArray) -> ComplexArray:
+    """What the family's drive makes of a notch.
+
+    Raises:
+        ValueError: it cannot make it.
+    """
+    spec = profile.notch
+    if spec is None:
+        raise ValueError("the family documents no notch")
+    if spec.encoding == "coefficients" and spec.sample_time_s is not None:
+        stored = encode_coefficients(notch, spec.sample_time_s)
+        return coefficients_response(stored, frequency_hz, spec.sample_time_s)
+    if spec.encoding == "hz_width_db":
+        encoded = encode(profile, profile.drive, 0, notch, None)
+        slot = spec.slots[0]
+        hz, wide, db = (
+            encoded.raw[k] for k in (slot.frequency_key, slot.width_key, slot.depth_key) if k
+        )
+        return decode_hz_width_db(hz, wide, db).response(frequency_hz)
+    return notch.response(frequency_hz)
+
+
+async def read_notches(drive: Drive) -> tuple[SlotState, ...]:
+    """All notches of a drive, read now.
+
+    Raises:
+        NotAllowed: the family documents none.
+    """
+    spec = spec_of(drive.profile, drive.name)
+    return tuple([await _read(drive, spec, n) for n in range(len(spec.slots))])
+
+
+async def _read(drive: Drive, spec: NotchSpec, number: int) -> SlotState:
+    slot = spec.slots[number]
+    raw = {key: await drive.raw(key) for key in _value_keys(slot)}
+    enabled = True
+    if slot.enable_key is not None:
+        word = await drive.raw(slot.enable_key)
+        raw[slot.enable_key] = word
+        enabled = bool(word >> (slot.enable_bit or 0) & 1)
+    try:
+        return _decoded(drive, spec, slot, number, raw, enabled)
+    except ValueError as error:
+        return SlotState(number, enabled, None, None, raw, str(error) if enabled else "")
+
+
+def _decoded(
+    drive: Drive, spec: NotchSpec, slot: NotchSlot, number: int, raw: dict[str, int], enabled: bool
+) -> SlotState:
+    if spec.encoding == "coefficients" and spec.sample_time_s is not None:
+        stored = _coefficients(slot, raw)
+        notch = decode_coefficients(stored, spec.sample_time_s)
+        return SlotState(number, enabled, notch, realised(stored, spec.sample_time_s), raw)
+    frequency = raw.get(slot.frequency_key or "", 0)
+    width, depth = raw.get(slot.width_key or "", 0), raw.get(slot.depth_key or "", 0)
+    if slot.enable_key is None and slot.frequency_key is not None:
+        _low, high = drive.profile.by_key[slot.frequency_key].raw_limits
+        enabled = high is None or frequency < high
+    if spec.encoding == "hz_width_db":
+        notch = decode_hz_width_db(frequency, width, depth)
+        made = RealisedNotch(notch.center_hz, notch.width_hz, notch.depth_db, 0.0, True)
+        return SlotState(number, enabled, notch, made, raw)
+    if spec.encoding == "hz_width":
+        notch = Notch(float(frequency), float(max(width, 1)), UNKNOWN_DEPTH_DB)
+        return SlotState(number, enabled, notch, None, raw, "depth not printed in the manual")
+    return SlotState(number, enabled, None, None, raw, "levels without a printed meaning")
+
+
+async def plan_notches(drive: Drive, wanted: Sequence[Notch | None]) -> dict[str, int]:
+    """Raw values that make the drive's slots these notches, those without one switched off.
+
+    Raises:
+        OutOfRange, NotAllowed: the drive cannot make one of them; nothing is written.
+    """
+    spec = spec_of(drive.profile, drive.name)
+    if len(wanted) > len(spec.slots):
+        raise OutOfRange(
+            f"{drive.name} has {len(spec.slots)} notches, not {len(wanted)}", drive=drive.name,
+            value=len(wanted), limit=str(len(spec.slots)),
+        )  # fmt: skip
+    words = {s.enable_key: await drive.raw(s.enable_key) for s in spec.slots if s.enable_key}
+    raw: dict[str, int] = {}
+    for number, slot in enumerate(spec.slots):
+        notch = wanted[number] if number < len(wanted) else None
+        made = encode(drive.profile, drive.name, number, notch, words.get(slot.enable_key or ""))
+        raw |= made.raw
+        if slot.enable_key is not None:
+            words[slot.enable_key] = made.raw[slot.enable_key]
+    if spec.apply_key is not None and spec.apply_raw is not None:
+        raw[spec.apply_key] = spec.apply_raw
+    return raw
+
+
+async def write_notches(axis: Axis, wanted: Sequence[Notch | None]) -> dict[str, int]:
+    """Write all slots; returns the raw values that were there, for undo.
+
+    Raises:
+        NotAllowed: the axis is enabled, or the drive cannot make one. Nothing is half written.
+    """
+    return await write_settings(axis, await plan_notches(axis.drive, wanted))
+
+
+def combined(profile: Profile, notches: Sequence[Notch], frequency_hz: FloatArray) -> ComplexArray:
+    """All notches in series as the drive makes them."""
+    total: ComplexArray = np.ones(frequency_hz.shape, dtype=np.complex128)
+    for notch in notches:
+        total = np.asarray(total * response(profile, notch, frequency_hz))
+    return total
