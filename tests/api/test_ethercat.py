@@ -79,10 +79,8 @@ def traces(blocks: list[bytes]) -> tuple[np.ndarray, np.ndarray, int]:
 
 
 def hold(page: Live, drive: str, seconds: float) -> None:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        page.send(type="jog_renew", drive=drive)
-        time.sleep(0.02)
+    with page.holding(drive):
+        time.sleep(seconds)
 
 
 def test_scan_read_write_save(station: Station, axes: tuple[str, str]) -> None:

@@ -57,10 +57,9 @@ def test_jog_and_move(station: Station, z: str) -> None:
     with station.live() as page:
         page.send(type="jog_start", drive=z, direction=1, speed=200, acceleration=4000,
                   travel_limit=10, torque_limit=100)  # fmt: skip
-        end = time.monotonic() + 1.5
-        while time.monotonic() < end:
-            page.send(type="jog_renew", drive=z)
-            time.sleep(0.02)
+        with page.holding(z):
+            until(lambda: station.state(z)["velocity"] > 150, 5)
+            time.sleep(0.3)
         assert float(station.state(z)["velocity"]) == pytest.approx(200, rel=0.1)
         page.send(type="jog_stop", drive=z)
         ended = page.wait("jog_ended", drive=z)

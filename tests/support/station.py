@@ -6,7 +6,8 @@ import asyncio
 import json
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -155,6 +156,23 @@ class Live:
             if message["type"] == kind and all(message.get(k) == v for k, v in fields.items()):
                 return message
         raise AssertionError(f"no {kind} message within {timeout_s} s")
+
+    @contextmanager
+    def holding(self, drive: str) -> Iterator[None]:
+        """Renew the jog of ``drive`` from a thread, as a page does while a button is held."""
+        released = threading.Event()
+
+        def renew() -> None:
+            while not released.wait(0.02):
+                self.send(type="jog_renew", drive=drive)
+
+        button = threading.Thread(target=renew, daemon=True)
+        button.start()
+        try:
+            yield
+        finally:
+            released.set()
+            button.join()
 
     def close(self) -> None:
         self.socket.close()
