@@ -16,7 +16,7 @@ from pathlib import Path
 
 from pydantic.json_schema import models_json_schema
 
-from backend.api import live_messages, models
+from backend.api import live_messages, models, models_description
 from backend.api.app import make_app
 from backend.bench import Bench
 
@@ -37,8 +37,15 @@ def description() -> str:
         and issubclass(model, live_messages.Message)
         and model.__module__ == live_messages.__name__
     ]
-    # Carried in the result of a scan job, so no route names it.
-    messages.append((models.FoundDrive, "serialization"))
+    # Carried in the results of jobs, so no route names them.
+    messages += [
+        (model, "serialization")
+        for model in (
+            models.FoundDrive,
+            models_description.ImportedDescription,
+            models_description.LineSearchResult,
+        )
+    ]
     _, extra = models_json_schema(messages, ref_template="#/components/schemas/{model}")
     schemas = document["components"]["schemas"]
     schemas.update({k: v for k, v in extra["$defs"].items() if k not in schemas})

@@ -281,17 +281,22 @@ def found_drive(bench: Bench, url: str, kind: str, found: Found) -> models.Found
         firmware=found.firmware,
         state=found.state,
         notes=list(found.notes),
-        matches=[
-            models.ProfileMatch(
-                profile=match.profile.drive,
-                title=match.profile.title,
-                confidence=match.confidence,
-                why=match.why,
-            )
-            for match in match_profiles(kind, found)
-        ],
+        matches=matches(kind, found),
         connected_as=user,
     )
+
+
+def matches(kind: str, found: Found) -> list[models.ProfileMatch]:
+    """Profiles that fit, best first."""
+    return [
+        models.ProfileMatch(
+            profile=match.profile.drive,
+            title=match.profile.title,
+            confidence=match.confidence,
+            why=match.why,
+        )
+        for match in match_profiles(kind, found)
+    ]
 
 
 def difference(row: Difference) -> models.DiffRow:

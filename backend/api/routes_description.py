@@ -10,7 +10,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from backend.api import convert
 from backend.api.context import TheBench, TheMember
 from backend.api.errors import NotFound
-from backend.api.models import JobInfo
+from backend.api.models import JobInfo, ProfileMatch
 from backend.api.models_description import (
     PROFILE_NAME,
     DescribedDevice,
@@ -25,11 +25,13 @@ from backend.jobs import JobResult, Progress
 from backend.line_search import search_line
 from backend.second_port import missing_ports
 from drivers.errors import NotAllowed
+from drivers.link import Found
 from profiles import drive_names, load_profile
 from profiles.importer import ImportFailed, export_eds
 from profiles.importer.esi import MAX_BYTES
 from profiles.importer.process import DevicesTask, FileTask
 from profiles.loader import ProfileError, user_folder
+from profiles.schema import LinkKind
 
 router = APIRouter()
 
@@ -128,6 +130,18 @@ async def read_dictionary(bench: TheBench, request: ReadDictionaryRequest) -> Jo
         return made.model_dump(mode="json")
 
     return convert.job(bench.jobs.start("import", f"Read the dictionary of {place}", work))
+
+
+@router.get("/profiles/matches")
+async def profile_matches(
+    kind: Annotated[LinkKind, Query(description="kind of bus")],
+    name: Annotated[str, Query(max_length=200)] = "",
+    vendor_id: Annotated[int | None, Query(ge=0, le=0xFFFFFFFF)] = None,
+    product_code: Annotated[int | None, Query(ge=0, le=0xFFFFFFFF)] = None,
+) -> list[ProfileMatch]:
+    """Profiles that fit an identity, best first; for what a scan found before an import."""
+    found = Found(0, vendor_id=vendor_id, product_code=product_code, name=name)
+    return convert.matches(kind, found)
 
 
 @router.get("/profiles/{profile}/eds", response_class=Response)

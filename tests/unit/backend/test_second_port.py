@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import pytest
 
 from backend.drive import Drive, Port
@@ -9,7 +11,6 @@ from backend.parameter_set import storable
 from backend.second_port import missing_ports, require_same_drive
 from drivers.codec import encode
 from drivers.errors import NotAllowed
-from drivers.link import Link
 from profiles import load_profile
 from tests.support.memory_link import MemoryLink
 
@@ -19,13 +20,12 @@ SHARED = [
 ]
 
 
-def drive_with(value: int, kind: str) -> tuple[Port, MemoryLink]:
+def drive_with(value: int, kind: Literal["canopen", "modbus"]) -> tuple[Port, MemoryLink]:
     memory = MemoryLink({
         (p.index or 0, p.subindex or 0): encode(p.type, value) for p in SHARED
     })  # fmt: skip
     memory.kind = kind
-    link: Link = memory  # type: ignore[assignment]
-    return Port(link, 1, PROFILE.link("canopen" if kind == "canopen" else "modbus")), memory
+    return Port(memory, 1, PROFILE.link(kind)), memory
 
 
 async def test_equal_settings_are_the_same_drive() -> None:

@@ -1,8 +1,9 @@
 import { axis } from './texts/axis'
 import { bench } from './texts/bench'
 import { frame } from './texts/frame'
+import { notListed } from './texts/notlisted'
 import { parameters } from './texts/parameters'
 
 /** Every text of the page, in every language. A key that is not here does not compile. */
-export const catalogue = { ...frame, ...bench, ...axis, ...parameters }
+export const catalogue = { ...frame, ...bench, ...axis, ...parameters, ...notListed }
 export type Key = keyof typeof catalogue

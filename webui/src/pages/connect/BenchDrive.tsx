@@ -8,6 +8,7 @@ import { useT } from '../../i18n'
 import { Icon } from '../../widgets/Icon'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { MissingPorts } from './MissingPorts'
 import { QualityTable } from './QualityTable'
 
 /** A drive of the bench: identity, connection, name and notes. */
@@ -68,6 +69,7 @@ export function BenchDrive({ drive }: { drive: DriveSummary }) {
           </span>
         </p>
       ))}
+      <MissingPorts drive={drive} />
       {drive.notes && <p className="notes">{drive.notes}</p>}
       <details>
         <summary>{t('connect.quality')}</summary>

@@ -10,6 +10,7 @@ import { useAction } from '../../widgets/useAction'
 import { BenchDrive } from './BenchDrive'
 import { Buses } from './Buses'
 import { ConnectHelp } from './ConnectHelp'
+import { NotListedPanel } from './NotListed'
 import { Scan } from './Scan'
 
 /** One way to a bus: what it is, whether it can be used, and the URL to start from. */
@@ -100,7 +101,7 @@ export function ConnectPage() {
             className="mono-input"
             onChange={(event) => setUrl(event.currentTarget.value)}
           />
-          <Scan url={url.trim()} />
+          <Scan url={url.trim()} onUrl={setUrl} />
         </Panel>
         <Panel title={t('connect.bench')}>
           {drives?.length === 0 && <p className="dim">{t('connect.benchEmpty')}</p>}
@@ -109,6 +110,7 @@ export function ConnectPage() {
           ))}
         </Panel>
       </div>
+      <NotListedPanel />
       <Buses />
       <ConnectHelp />
     </div>

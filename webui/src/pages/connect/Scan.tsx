@@ -1,15 +1,17 @@
 import { Button, Checkbox, NativeSelect, TextInput } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
-import type { FoundDrive, ProfileInfo } from '../../api/schema'
+import type { FoundDrive, ImportedDescription, MissingPort, ProfileInfo } from '../../api/schema'
 import { type T, useT } from '../../i18n'
 import { setJob, useDrives, useJob } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { isSerial, LineSearch } from './LineSearch'
+import { NotListedButton } from './NotListed'
 import { parseStations } from './stations'
 
-export function Scan({ url }: { url: string }) {
+export function Scan({ url, onUrl }: { url: string; onUrl: (url: string) => void }) {
   const t = useT()
   const [stations, setStations] = useState('')
   const [id, setId] = useState<string | null>(null)
@@ -54,7 +56,9 @@ export function Scan({ url }: { url: string }) {
         onChange={(event) => setEarly(event.currentTarget.checked)}
       />
       <ProblemNote problem={scan.problem} onClose={scan.clear} />
-      <JobNote id={id} onClose={() => setId(null)} />
+      {/* Without onClose: what was found stays until the next scan. */}
+      <JobNote id={id} />
+      {isSerial(url) && <LineSearch url={url} stations={list} onFound={onUrl} />}
       {job?.state === 'done' && (
         <section aria-label={t('connect.results')}>
           <h3>{t('connect.found', { count: found.length })}</h3>
@@ -83,6 +87,11 @@ function identity(t: T, found: FoundDrive): string {
     .join(' · ')
 }
 
+/** A bus URL begins with the kind of its bus. */
+function kindOf(url: string): MissingPort['kind'] {
+  return url.split(':', 1)[0] as MissingPort['kind']
+}
+
 function Found({ found }: { found: FoundDrive }) {
   const t = useT()
   const connect = useAction()
@@ -92,10 +101,12 @@ function Found({ found }: { found: FoundDrive }) {
   const [name, setName] = useState('')
   const [accept, setAccept] = useState(false)
   const [doubted, setDoubted] = useState(false)
+  const reload = () => ask(api.GET('/api/v1/profiles')).then(setProfiles, () => {})
   useEffect(() => {
-    ask(api.GET('/api/v1/profiles')).then(setProfiles, () => {})
+    void reload()
   }, [])
-  const match = found.matches.find((each) => each.profile === profile)
+  const [matches, setMatches] = useState(found.matches)
+  const match = matches.find((each) => each.profile === profile)
   const used = drives.find((drive) =>
     drive.ports.some((port) => port.url === found.url && port.station === found.station),
   )
@@ -111,6 +122,14 @@ function Found({ found }: { found: FoundDrive }) {
     // Agreed to for one try, and only after the difference has been told.
     setAccept(false)
     setDoubted(!added)
+  }
+  /** A profile was made for this drive: offer it, with how well it fits. */
+  const take = async (made: ImportedDescription) => {
+    await reload()
+    setProfile(made.profile)
+    const { name, vendor_id, product_code } = found
+    const query = { kind: kindOf(found.url), name, vendor_id, product_code }
+    ask(api.GET('/api/v1/profiles/matches', { params: { query } })).then(setMatches, () => {})
   }
   return (
     <div className="found">
@@ -135,12 +154,13 @@ function Found({ found }: { found: FoundDrive }) {
             onChange={(event) => setProfile(event.currentTarget.value)}
             data={[
               ...(profile === '' ? [{ value: '', label: t('connect.choose') }] : []),
-              ...found.matches.map((each) => ({
+              ...matches.map((each) => ({
                 value: each.profile,
                 label: `${each.title} — ${t(`confidence.${each.confidence}`)}`,
               })),
               ...profiles
-                .filter((each) => !found.matches.some((known) => known.profile === each.profile))
+                .filter((each) => !matches.some((known) => known.profile === each.profile))
+                .filter((each) => each.problem === '')
                 .map((each) => ({
                   value: each.profile,
                   label: `${each.title} — ${t('confidence.none')}`,
@@ -192,6 +212,9 @@ function Found({ found }: { found: FoundDrive }) {
         </p>
       )}
       <ProblemNote problem={connect.problem} onClose={connect.clear} />
+      {!used && !matches.some((each) => each.confidence === 'certain') && (
+        <NotListedButton found={found} onMade={(made) => void take(made)} />
+      )}
     </div>
   )
 }

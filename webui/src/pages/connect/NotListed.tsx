@@ -1,0 +1,93 @@
+import { Button, Modal, NativeSelect } from '@mantine/core'
+import { useCallback, useEffect, useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { FoundDrive, ImportedDescription, ProfileInfo } from '../../api/schema'
+import { useT } from '../../i18n'
+import { useLink } from '../../live/store'
+import { Icon } from '../../widgets/Icon'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { offerDownload } from '../files/sets'
+import { ImportForm } from './ImportForm'
+
+/** Offered where no profile fits a found drive for certain. */
+export function NotListedButton({
+  found,
+  onMade,
+}: {
+  found: FoundDrive
+  onMade: (made: ImportedDescription) => void
+}) {
+  const t = useT()
+  const [open, setOpen] = useState(false)
+  return (
+    <>
+      <Button leftSection={<Icon name="upload" />} onClick={() => setOpen(true)}>
+        {t('notListed.open')}
+      </Button>
+      {open && (
+        <Modal opened size="lg" onClose={() => setOpen(false)} title={t('notListed.title')}>
+          <ImportForm found={found} onMade={onMade} />
+        </Modal>
+      )}
+    </>
+  )
+}
+
+/** Import without a drive at hand, and export of what there is. */
+export function NotListedPanel() {
+  const t = useT()
+  const { open } = useLink()
+  const [profiles, setProfiles] = useState<ProfileInfo[]>([])
+  const [chosen, setChosen] = useState('')
+  const save = useAction()
+  const refresh = useCallback(() => {
+    ask(api.GET('/api/v1/profiles')).then(setProfiles, () => {})
+  }, [])
+  useEffect(() => {
+    if (open) refresh()
+  }, [open, refresh])
+  const profile = chosen || (profiles[0]?.profile ?? '')
+  const broken = profiles.find((each) => each.profile === profile)?.problem ?? ''
+  const download = () =>
+    save.run(async () => {
+      const text = await ask(
+        api.GET('/api/v1/profiles/{profile}/eds', {
+          params: { path: { profile } },
+          parseAs: 'text',
+        }),
+      )
+      offerDownload(`${profile}.eds`, [text], 'text/plain')
+    })
+  return (
+    <Panel title={t('notListed.title')}>
+      <details>
+        <summary>{t('notListed.import')}</summary>
+        <ImportForm onMade={refresh} />
+      </details>
+      <details>
+        <summary>{t('notListed.export')}</summary>
+        <div className="row">
+          <NativeSelect
+            className="grow"
+            label={t('connect.profile')}
+            value={profile}
+            onChange={(event) => setChosen(event.currentTarget.value)}
+            data={profiles.map((each) => ({ value: each.profile, label: each.title }))}
+          />
+          <Button
+            disabled={profile === '' || broken !== ''}
+            loading={save.busy}
+            leftSection={<Icon name="download" />}
+            onClick={() => void download()}
+          >
+            {t('notListed.exportNow')}
+          </Button>
+        </div>
+        {broken !== '' && <p className="warn-text">{t('notListed.broken', { problem: broken })}</p>}
+        <ProblemNote problem={save.problem} onClose={save.clear} />
+      </details>
+    </Panel>
+  )
+}
