@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -83,6 +84,20 @@ def hold(page: Live, drive: str, seconds: float) -> None:
         time.sleep(seconds)
 
 
+def undisturbed(motion: Callable[[], Any]) -> Any:
+    """The motion's outcome. One that a stalling test machine ended is done again.
+
+    A computer that stops the bus' process for 30 ms must end the motion: the product is right
+    then, and the test has not seen what it wants to see.
+    """
+    for _ in range(5):
+        outcome = motion()
+        problem = outcome.get("problem")
+        if problem is None or "no valid process data" not in problem["detail"]:
+            return outcome
+    raise AssertionError(f"this machine stalls too often: {outcome}")
+
+
 def test_scan_read_write_save(station: Station, axes: tuple[str, str]) -> None:
     result = station.done(station.http.post("/scan", json={"url": URL}))
     assert [drive["station"] for drive in result["found"]] == [1, 2]
@@ -117,10 +132,15 @@ def test_jog_plays_one_position_per_cycle(station: Station, cyclic: tuple[str, s
         page.send(type="scope_start", subscription=1, channels=channels)
         info = page.wait("scope_info", subscription=1)
         assert all(channel["synchronous"] for channel in info["channels"])
-        page.send(type="jog_start", drive=a, direction=1, **JOG)
-        hold(page, a, 2.0)
-        page.send(type="jog_stop", drive=a)
-        ended = page.wait("jog_ended", drive=a, timeout_s=20)
+
+        def jog() -> Any:
+            page.binary.clear()
+            page.send(type="jog_start", drive=a, direction=1, **JOG)
+            hold(page, a, 2.0)
+            page.send(type="jog_stop", drive=a)
+            return page.wait("jog_ended", drive=a, timeout_s=20)
+
+        ended = undisturbed(jog)
         assert ended["problem"] is None, ended
         page.send(type="scope_stop", subscription=1)
     times, samples, _dropped = traces(page.binary)
@@ -138,9 +158,13 @@ def test_jog_plays_one_position_per_cycle(station: Station, cyclic: tuple[str, s
 def test_silence_of_the_page_brakes(station: Station, cyclic: tuple[str, str]) -> None:
     a, _ = cyclic
     with station.live() as page:
-        page.send(type="jog_start", drive=a, direction=1, **JOG)
-        hold(page, a, 1.5)
-        ended = page.wait("jog_ended", drive=a, timeout_s=20)
+
+        def jog() -> Any:
+            page.send(type="jog_start", drive=a, direction=1, **JOG)
+            hold(page, a, 1.5)
+            return page.wait("jog_ended", drive=a, timeout_s=20)
+
+        ended = undisturbed(jog)
     assert "200 ms" in ended["reason"]
     until(lambda: abs(station.state(a)["velocity"]) < 2, 5)
 
@@ -165,8 +189,11 @@ def test_signal_generator(
     body = {"mode": mode, "shape": "sine", "amplitude": amplitude, "duration_s": 1.0,
             "frequency_hz": 4.0, "travel_limit": 5, "speed_limit": 1500,
             "torque_limit": 250}  # fmt: skip
-    result = station.done(station.http.post(f"/drives/{a}/jobs/generate", json=body), 60)
-    assert result["cycles"] == 1000
+    job = undisturbed(
+        lambda: station.job(station.http.post(f"/drives/{a}/jobs/generate", json=body), 60)
+    )
+    assert job["state"] == "done", job
+    assert job["result"]["cycles"] == 1000
     assert station.state(a)["state"] == "Switch on disabled"
 
 
