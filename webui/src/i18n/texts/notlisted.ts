@@ -62,10 +62,7 @@ export const notListed = {
     'Not connected over {kind}: {count} parameters are only there ({groups}).',
     '未通过 {kind} 连接：有 {count} 个参数仅在该端口（{groups}）。',
   ],
-  'port.missingNothing': [
-    'It also has {kind}, which reaches nothing more.',
-    '它还有 {kind}，但不提供更多参数。',
-  ],
+  'port.missingNothing': ['It can be connected over {kind} too.', '也可以通过 {kind} 连接。'],
   'port.connect': ['Connect {kind} too', '同时连接 {kind}'],
   'port.url': ['Bus URL', '总线 URL'],
   'port.station': ['Station', '站号'],
