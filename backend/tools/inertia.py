@@ -381,7 +381,7 @@ def _raw(
 
 def reevaluate(
     arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, object]
-) -> InertiaResult:
+) -> InertiaOutcome:
     """The answer again, from kept raw data.
 
     Raises:
@@ -401,7 +401,12 @@ def reevaluate(
     valid = np.asarray(arrays["valid"], np.bool_)
     columns = {k: np.asarray(v, np.float64) for k, v in arrays.items() if k != "valid"}
     rate = float(str(meta["sample_rate_hz"]))
-    return evaluate(Recording(rate, **columns, valid=valid), settings, AxisFacts(**told))
+    facts = AxisFacts(**told)
+    recording = Recording(rate, **columns, valid=valid)
+    return InertiaOutcome(
+        evaluate(recording, settings, facts), f"host, {settings.scheme}", facts.torque_known,
+        settings.ends_rev, recording.velocity_rad_s.size / rate, _ratio_against(facts, settings),
+    )  # fmt: skip
 
 
 def as_json(outcome: InertiaOutcome) -> dict[str, object]:

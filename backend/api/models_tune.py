@@ -1,0 +1,220 @@
+"""Messages of tuning: measurements, notches, gains, candidates."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from backend.api.models import Message
+
+
+class TuneLimits(Message):
+    """The motion envelope: rev from the start, rpm, % of rated torque, s."""
+
+    travel_limit: float = Field(gt=0)
+    speed_limit: float = Field(gt=0)
+    torque_limit: float = Field(gt=0, le=400)
+    time_limit_s: float = Field(default=60.0, gt=0, le=300)
+    rated_torque_nm: float | None = Field(
+        default=None, gt=0, description="overrides what the drive says"
+    )
+    cycle_ms: float = Field(
+        default=1.0, gt=0, le=10,
+        description="cycle of the exchange that is started where none runs, and ended afterwards",
+    )  # fmt: skip
+
+
+class SweepRequest(TuneLimits):
+    """Frequency response."""
+
+    kind: Literal["mechanics", "speed_loop", "position_loop"] = "mechanics"
+    loop: Literal["auto", "none", "speed", "position"] = "auto"
+    f_min_hz: float = Field(default=5.0, ge=3)
+    f_max_hz: float | None = Field(default=None, gt=0)
+    share: float = Field(default=0.35, gt=0, le=0.9, description="of the permitted torque")
+    realisations: int = Field(default=2, ge=1, le=8)
+    base_motion: bool = True
+
+
+class InertiaRequest(TuneLimits):
+    """Inertia and friction."""
+
+    scheme: Literal["free", "limited", "taught"] = "free"
+    ends_rev: tuple[float, float] | None = None
+    search_torque: float = Field(default=20.0, gt=0, le=100)
+    search_speed: float = Field(default=30.0, gt=0)
+    repetitions: int = Field(default=4, ge=1, le=10)
+    motor_inertia_kgm2: float | None = Field(default=None, gt=0)
+
+
+class StepRequest(TuneLimits):
+    """A step of speed (rpm) or a move (rev)."""
+
+    kind: Literal["speed", "move"] = "speed"
+    size: float = 100.0
+    hold_s: float = Field(default=0.25, gt=0, le=5)
+    speed: float = Field(default=300.0, gt=0)
+    acceleration: float = Field(default=6000.0, gt=0)
+    window: float | None = Field(default=None, gt=0)
+
+
+class AutotuneRequest(TuneLimits):
+    """All steps in one job."""
+
+    mark: Literal["robust", "balanced", "fast"] = "balanced"
+    load: Literal["stiff", "medium", "compliant"] | None = None
+    loop: Literal["auto", "none", "speed", "position"] = "auto"
+    scheme: Literal["free", "limited", "taught"] = "free"
+    ends_rev: tuple[float, float] | None = None
+    apply: bool = True
+    motor_inertia_kgm2: float | None = Field(default=None, gt=0)
+
+
+class NotchShape(Message):
+    """Vendor-neutral notch: centre, −3 dB bandwidth, depth (negative dB)."""
+
+    center_hz: float = Field(gt=0)
+    width_hz: float = Field(gt=0)
+    depth_db: float = Field(le=0)
+
+
+class RealisedInfo(Message):
+    """What the drive really does after rounding; null where it cannot be said."""
+
+    center_hz: float
+    width_hz: float | None
+    depth_db: float
+    dc_gain_db: float | None
+    stable: bool
+
+
+class NotchSlotInfo(Message):
+    """One notch of the drive."""
+
+    slot: int
+    enabled: bool
+    notch: NotchShape | None
+    realised: RealisedInfo | None
+    raw: dict[str, int]
+    note: str
+
+
+class NotchPreviewRequest(Message):
+    """Wanted notches, one per slot; null is off. Nothing is written."""
+
+    notches: list[NotchShape | None]
+    frequency_hz: list[float] = Field(default_factory=list, max_length=5000)
+
+
+class NotchPreviewInfo(Message):
+    """What they would become, and their common response at the frequencies asked for."""
+
+    slots: list[NotchSlotInfo]
+    magnitude_db: list[float]
+    phase_deg: list[float]
+
+
+class NotchWrite(Message):
+    """Notches for all slots; those beyond the list are switched off."""
+
+    notches: list[NotchShape | None]
+
+
+class GainValues(Message):
+    """Gains with a physical meaning. ``inertia_kgm2`` is the whole axis'."""
+
+    speed_bandwidth_hz: float = Field(gt=0)
+    integral_hz: float = Field(gt=0)
+    position_1_s: float = Field(gt=0)
+    inertia_kgm2: float = Field(gt=0)
+
+
+class GainWrite(Message):
+    """Either physical gains or a stiffness level."""
+
+    gains: GainValues | None = None
+    level: int | None = None
+
+
+class GainInfo(Message):
+    """Gains now; null where they have no printed meaning or do not exist."""
+
+    convention: str
+    position_1_s: float | None
+    speed_hz: float | None
+    speed_nms: float | None
+    integral_hz: float | None
+    level: int | None
+    inertia_kgm2: float | None
+    current_bandwidth_hz: float | None
+    speed_filter_hz: float | None
+    rated_torque_nm: float | None
+    raw: dict[str, int]
+
+
+class Undo(Message):
+    """Raw values that were there before; writing them back undoes the change."""
+
+    before: dict[str, int]
+
+
+class MeasurementInfo(Message):
+    """One stored measurement."""
+
+    file: str
+    kind: str
+    drive: str
+    profile: str
+    serial: int | None
+    saved: datetime | None
+    problem: str = ""
+
+
+class MeasurementContent(Message):
+    """Its settings, and its result evaluated anew from the raw data."""
+
+    info: MeasurementInfo
+    settings: dict[str, object]
+    result: dict[str, object]
+
+
+class CandidatesRequest(Message):
+    """Design on a stored frequency response of the mechanics."""
+
+    measurement: str
+    inertia_kgm2: float = Field(gt=0)
+    load: Literal["stiff", "medium", "compliant"] | None = None
+    sample_rate_hz: float | None = Field(
+        default=None, gt=0, description="only candidates that can be verified at this rate"
+    )
+
+
+class CandidatesInfo(Message):
+    """The table, fastest first; up to three rows carry a mark."""
+
+    load: str
+    candidates: list[dict[str, object]]
+
+
+class PredictRequest(Message):
+    """Notches and gains on a stored frequency response of the mechanics."""
+
+    measurement: str
+    notches: list[NotchShape] = Field(default_factory=list)
+    gains: GainValues
+
+
+class PredictionInfo(Message):
+    """Predicted speed loop: curves over ``frequency_hz`` and the step of its reference."""
+
+    frequency_hz: list[float]
+    open_db: list[float]
+    open_deg: list[float]
+    closed_db: list[float]
+    closed_deg: list[float]
+    sensitivity_db: list[float]
+    step_time_s: list[float]
+    step: list[float]
+    margins: dict[str, float | bool | None]
