@@ -108,6 +108,7 @@ class Bench:
         self.jobs = JobRunner(self._job_changed)
         self.leases = Leases(lambda _drive: self._drives_changed())
         self.scope = ScopeHub(lambda drive: self.member(drive).axis)
+        self.state_folder = state_folder
         self._config = state_folder / "bench.json"
         self._opening = asyncio.Lock()
 

@@ -11,11 +11,19 @@ from fastapi.responses import FileResponse
 from fastapi.routing import APIRoute
 
 import backend
-from backend.api import errors, routes_bench, routes_description, routes_drive, routes_sets
+from backend.api import (
+    errors,
+    routes_bench,
+    routes_description,
+    routes_drive,
+    routes_recordings,
+    routes_sets,
+)
 from backend.api.errors import NotFound, answer, problem_of
 from backend.api.live import LiveHub
 from backend.api.models import Problem
 from backend.bench import Bench
+from backend.recording.service import Recordings
 from drivers.errors import NotAllowed
 
 PREFIX = "/api/v1"
@@ -38,10 +46,16 @@ _SECURITY_HEADERS = {
 def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
     """The application over a bench. ``hosts`` are the Host names that it answers to."""
 
+    recordings = Recordings(bench, bench.state_folder / "recordings")
+
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        recordings.open()
         await bench.restore()
         yield
+        # What moves is stopped before a slow disk may keep the server waiting.
+        await bench.jobs.close()
+        await recordings.close()
         await bench.close()
 
     app = FastAPI(
@@ -65,11 +79,18 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
         },
     )
     app.state.bench = bench
+    app.state.recordings = recordings
     errors.install(app)
     live = LiveHub(bench)
     app.state.live = live
     api = APIRouter(prefix=PREFIX)
-    for part in (routes_bench, routes_drive, routes_sets, routes_description):
+    for part in (
+        routes_bench,
+        routes_drive,
+        routes_sets,
+        routes_description,
+        routes_recordings,
+    ):
         api.include_router(part.router)
     app.include_router(api)
 

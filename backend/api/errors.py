@@ -44,6 +44,7 @@ _TITLES = {
     "busy": "In use",
     "bad-description": "Not a usable description",
     "bad-parameter-set": "Not a usable parameter set",
+    "bad-recording": "Not a usable recording",
     "storage-failed": "Could not be stored",
     "restore-failed": "Not everything was restored",
     "not-found": "Not found",

@@ -1,0 +1,169 @@
+"""Messages of recordings and support bundles."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from backend.api.models import Message
+
+ExportKind = Literal["csv", "rrd", "mcap"]
+
+
+class RecordChannel(Message):
+    """A signal to record."""
+
+    drive: str
+    key: str
+
+
+class RecordTrigger(Message):
+    """When a recording begins. ``rising``, ``falling`` and ``change`` look at a recorded signal."""
+
+    kind: Literal["rising", "falling", "change", "fault"]
+    drive: str = Field(default="", description="fault: empty for any drive")
+    key: str = ""
+    level: float = Field(default=0.0, allow_inf_nan=False)
+    mask: int | None = Field(default=None, ge=1, le=2**32 - 1, description="bits of `change`")
+
+
+class StartRecording(Message):
+    """What to record."""
+
+    name: str = Field(default="", max_length=100, description="empty: the date and time")
+    channels: list[RecordChannel] = Field(min_length=1, max_length=64)
+    period_s: float = Field(default=0.0, ge=0, le=10, description="polled signals; 0: as fast as")
+    duration_s: float | None = Field(default=None, gt=0, le=7 * 86400)
+    pre_s: float = Field(default=0.0, ge=0, le=60, description="kept from before the trigger")
+    trigger: RecordTrigger | None = None
+    notes: str = Field(default="", max_length=4000)
+    tags: list[str] = Field(default=[], max_length=20)
+
+
+class RecordedChannel(Message):
+    """A recorded signal."""
+
+    drive: str
+    drive_name: str
+    key: str
+    name: str
+    unit: str
+    synchronous: bool
+
+
+class RecordedAxis(Message):
+    """An axis as it was when the recording began."""
+
+    drive: str
+    name: str
+    profile: str
+    title: str
+    serial: int | None
+    firmware: str
+    parameters: int = Field(description="how many are in the file")
+
+
+class RecordingInfo(Message):
+    """A recording of the list, running or stored."""
+
+    name: str
+    state: Literal["waiting", "recording", "complete", "interrupted", "failed", "unusable"]
+    created: datetime | None
+    person: str
+    notes: str
+    tags: list[str]
+    kept: bool = Field(description="retention never deletes it")
+    channels: list[RecordedChannel]
+    axes: list[RecordedAxis]
+    samples: int
+    lost: int = Field(description="samples lost by the bus before they came to the recorder")
+    duration_s: float
+    bytes: int
+    exports: list[ExportKind]
+    reason: str = Field(description="why it ended")
+    problem: str
+
+
+class RecordingList(Message):
+    """Recordings, newest first, and the room that is left."""
+
+    recordings: list[RecordingInfo]
+    free_bytes: int
+    reserve_bytes: int = Field(description="a recording ends when less is free")
+    retention: RetentionBounds
+
+
+class RetentionBounds(Message):
+    """When the oldest recordings are deleted; null: never."""
+
+    max_total_bytes: int | None = Field(ge=1_000_000)
+    keep_days: float | None = Field(gt=0)
+
+
+class ChangeRecording(Message):
+    """What people write about a recording; absent things stay."""
+
+    notes: str | None = Field(default=None, max_length=4000)
+    tags: list[str] | None = Field(default=None, max_length=20)
+    kept: bool | None = None
+
+
+class RecordingEvent(Message):
+    """Something that happened during a recording; seconds since its first sample."""
+
+    t_s: float
+    kind: str
+    level: str
+    drive: str
+    text: str
+
+
+class RecordedParameter(Message):
+    """A setting at the start of a recording."""
+
+    key: str
+    name: str
+    unit: str
+    raw: int | float | str | None
+    value: int | float | str | None
+    time: float | None
+    error: str
+
+
+class RecordingDetail(Message):
+    """A recording with its events and the settings of its axes."""
+
+    info: RecordingInfo
+    events: list[RecordingEvent]
+    parameters: dict[str, list[RecordedParameter]]
+
+
+class BundleInfo(Message):
+    """A support bundle."""
+
+    name: str
+    created: datetime
+    bytes: int
+
+
+class BundleList(Message):
+    """Support bundles, newest first."""
+
+    bundles: list[BundleInfo]
+    armed: bool
+    before_s: float
+    after_s: float
+
+
+class ArmRequest(Message):
+    """Whether a fault freezes the last seconds."""
+
+    armed: bool
+
+
+class BundleRequest(Message):
+    """Why a support bundle is made."""
+
+    reason: str = Field(default="asked for", min_length=1, max_length=200)

@@ -1,0 +1,366 @@
+"""Routes of recordings and support bundles."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi.responses import FileResponse
+
+from backend.api import convert
+from backend.api.errors import NotFound
+from backend.api.models import JobInfo
+from backend.api.recording_models import (
+    ArmRequest,
+    BundleInfo,
+    BundleList,
+    BundleRequest,
+    ChangeRecording,
+    ExportKind,
+    RecordedAxis,
+    RecordedChannel,
+    RecordedParameter,
+    RecordingDetail,
+    RecordingEvent,
+    RecordingInfo,
+    RecordingList,
+    RetentionBounds,
+    StartRecording,
+)
+from backend.recording.capture import AFTER_S, BEFORE_S, FaultCapture
+from backend.recording.library import Retention, Stored
+from backend.recording.reader import RecordingReader
+from backend.recording.recorder import Recorder, Settings, Trigger, describe_streams
+from backend.recording.service import Recordings
+from backend.recording.writer import RESERVE_BYTES
+from drivers.errors import NotAllowed
+
+router = APIRouter()
+
+_TYPES = {"csv": "text/csv", "rrd": "application/octet-stream", "mcap": "application/octet-stream"}
+
+
+def recordings_of(request: Request) -> Recordings:
+    """The recordings of this server."""
+    recordings = request.app.state.recordings
+    if not isinstance(recordings, Recordings):
+        raise TypeError("the application was made without recordings")
+    return recordings
+
+
+TheRecordings = Annotated[Recordings, Depends(recordings_of)]
+
+
+def _capture(recordings: TheRecordings) -> FaultCapture:
+    if recordings.capture is None:
+        raise NotAllowed("the server is starting or ending", remedy="try again")
+    return recordings.capture
+
+
+TheCapture = Annotated[FaultCapture, Depends(_capture)]
+
+
+# --- conversion -------------------------------------------------------------------------
+
+
+def _state(stored: Stored) -> Literal["complete", "interrupted", "failed", "unusable"]:
+    return "unusable" if stored.summary is None else stored.summary.state
+
+
+def _stored(stored: Stored) -> RecordingInfo:
+    summary = stored.summary
+    header: dict[str, Any] = summary.header if summary else {}
+    remarks = stored.remarks
+    own_tags = [str(tag) for tag in header.get("tags", [])]
+    return RecordingInfo(
+        name=stored.name,
+        state=_state(stored),
+        created=convert.moment(float(header.get("created", stored.modified))),
+        person=str(header.get("person", "")),
+        notes=remarks.notes or str(header.get("notes", "")),
+        tags=list(remarks.tags) or own_tags,
+        kept=remarks.kept,
+        channels=[
+            RecordedChannel(
+                drive=c.drive,
+                drive_name=c.drive_name,
+                key=c.key,
+                name=c.name,
+                unit=c.unit,
+                synchronous=c.synchronous,
+            )
+            for c in (summary.channels if summary else ())
+        ],
+        axes=[_axis(axis) for axis in header.get("axes", [])],
+        samples=summary.samples if summary else 0,
+        lost=summary.lost if summary else 0,
+        duration_s=summary.duration_s if summary else 0.0,
+        bytes=stored.bytes,
+        exports=[kind for kind in ("csv", "rrd", "mcap") if kind in stored.exports],
+        reason=summary.reason if summary else "",
+        problem=stored.problem or (summary.problem if summary else ""),
+    )
+
+
+def _axis(axis: dict[str, Any]) -> RecordedAxis:
+    return RecordedAxis(
+        drive=str(axis["drive"]),
+        name=str(axis["name"]),
+        profile=str(axis["profile"]),
+        title=str(axis["title"]),
+        serial=axis["serial"],
+        firmware=str(axis["firmware"]),
+        parameters=len(axis["parameters"]),
+    )
+
+
+def _running(recordings: Recordings, recorder: Recorder) -> RecordingInfo:
+    settings, written = recorder.settings, recorder.written()
+    members = recordings.bench.members
+    known = [c for c in settings.channels if c[0] in members]
+    streams = describe_streams(recordings.bench, [(False, known)])
+    synchronous = recorder.synchronous()
+    duration = 0.0
+    if written.first_s is not None and written.last_s is not None:
+        duration = written.last_s - written.first_s
+    return RecordingInfo(
+        name=recorder.name,
+        state="recording" if recorder.phase in ("recording", "ended") else "waiting",
+        created=convert.moment(recorder.began),
+        person=settings.person,
+        notes=settings.notes,
+        tags=list(settings.tags),
+        kept=False,
+        channels=[
+            RecordedChannel(**c, synchronous=(c["drive"], c["key"]) in synchronous)
+            for c in streams[0]["channels"]
+        ],
+        axes=[],
+        samples=written.samples,
+        lost=recorder.lost,
+        duration_s=duration,
+        bytes=written.bytes,
+        exports=[],
+        reason="",
+        problem=recorder.problem,
+    )
+
+
+async def _info(recordings: Recordings, name: str) -> RecordingInfo:
+    file = recordings.library.path(name).name
+    if file in recordings.running:
+        return _running(recordings, recordings.running[file])
+    try:
+        return _stored(await asyncio.to_thread(recordings.library.describe, name))
+    except NotAllowed as error:
+        raise NotFound(error.message, value=name, remedy=error.remedy) from error
+
+
+def _existing(recordings: Recordings, name: str) -> Path:
+    try:
+        return recordings.library.existing(name)
+    except NotAllowed as error:
+        raise NotFound(error.message, value=name, remedy=error.remedy) from error
+
+
+# --- recordings -------------------------------------------------------------------------
+
+
+@router.get("/recordings")
+async def list_recordings(
+    recordings: TheRecordings, search: Annotated[str, Query(max_length=200)] = ""
+) -> RecordingList:
+    """Running and stored recordings that contain every word of ``search``."""
+    running = list(recordings.running.values())
+    stored = await asyncio.to_thread(
+        recordings.library.entries, search, [recorder.name for recorder in running]
+    )
+    bounds = recordings.library.retention
+    return RecordingList(
+        recordings=[_running(recordings, r) for r in running] + [_stored(s) for s in stored],
+        free_bytes=recordings.free(),
+        reserve_bytes=RESERVE_BYTES,
+        retention=RetentionBounds(
+            max_total_bytes=bounds.max_total_bytes, keep_days=bounds.keep_days
+        ),
+    )
+
+
+@router.post("/recordings", status_code=201)
+async def start_recording(recordings: TheRecordings, request: StartRecording) -> RecordingInfo:
+    """Begin a recording, or begin to wait for its trigger."""
+    trigger = request.trigger
+    recorder = await recordings.start(
+        Settings(
+            name=request.name,
+            channels=tuple((c.drive, c.key) for c in request.channels),
+            period_s=request.period_s,
+            duration_s=request.duration_s,
+            pre_s=request.pre_s,
+            trigger=None
+            if trigger is None
+            else Trigger(trigger.kind, trigger.drive, trigger.key, trigger.level, trigger.mask),
+            notes=request.notes,
+            tags=tuple(request.tags),
+            person="local user",
+        )
+    )
+    return _running(recordings, recorder)
+
+
+@router.put("/recordings/retention")
+async def set_retention(recordings: TheRecordings, request: RetentionBounds) -> RetentionBounds:
+    """Set when the oldest recordings are deleted."""
+    recordings.library.set_retention(
+        Retention(max_total_bytes=request.max_total_bytes, keep_days=request.keep_days)
+    )
+    return request
+
+
+@router.get("/recordings/{name}")
+async def get_recording(recordings: TheRecordings, name: str) -> RecordingDetail:
+    """A recording with its events and the settings of its axes when it began."""
+    info = await _info(recordings, name)
+    if info.state in ("waiting", "recording", "unusable"):
+        return RecordingDetail(info=info, events=[], parameters={})
+    return await asyncio.to_thread(_detail, recordings.library.existing(name), info)
+
+
+def _detail(path: Path, info: RecordingInfo) -> RecordingDetail:
+    with RecordingReader(path) as reader:
+        first = reader.summary().first_s or reader.clock.sample_s
+        events = [
+            RecordingEvent(
+                t_s=float(event.get("t_s", first)) - first,
+                kind=str(event.get("kind", "")),
+                level=str(event.get("level", "info")),
+                drive=str(event.get("drive", "")),
+                text=str(event.get("text", "")),
+            )
+            for event in reader.events()
+        ]
+        parameters = {
+            str(axis["drive"]): [RecordedParameter(**row) for row in axis["parameters"]]
+            for axis in reader.header.get("axes", [])
+        }
+    return RecordingDetail(info=info, events=events, parameters=parameters)
+
+
+@router.patch("/recordings/{name}")
+async def change_recording(
+    recordings: TheRecordings, name: str, request: ChangeRecording
+) -> RecordingInfo:
+    """Write notes or tags on a stored recording, or protect it from retention."""
+    _existing(recordings, name)
+    recordings.require_ended(name)
+    tags = None if request.tags is None else tuple(request.tags)
+    stored = await asyncio.to_thread(
+        lambda: recordings.library.annotate(name, notes=request.notes, tags=tags, kept=request.kept)
+    )
+    return _stored(stored)
+
+
+@router.delete("/recordings/{name}", status_code=204)
+async def delete_recording(recordings: TheRecordings, name: str) -> Response:
+    """Delete a stored recording with its exports."""
+    _existing(recordings, name)
+    await recordings.delete(name)
+    return Response(status_code=204)
+
+
+@router.post("/recordings/{name}/stop")
+async def stop_recording(recordings: TheRecordings, name: str) -> RecordingInfo | None:
+    """End a recording; null where its trigger had not come, so that nothing was kept."""
+    recorder = await recordings.stop(name)
+    if not recorder.path.exists():
+        return None
+    return await _info(recordings, name)
+
+
+@router.post("/recordings/{name}/trigger")
+async def trigger_recording(recordings: TheRecordings, name: str) -> RecordingInfo:
+    """Begin a waiting recording although its trigger did not come."""
+    recorder = recordings.active(name)
+    recorder.trigger_now()
+    return _running(recordings, recorder)
+
+
+@router.get("/recordings/{name}/file", response_class=FileResponse)
+async def download_recording(recordings: TheRecordings, name: str) -> FileResponse:
+    """The recording's own file."""
+    path = _existing(recordings, name)
+    recordings.require_ended(name)
+    return FileResponse(path, media_type="application/octet-stream", filename=path.name)
+
+
+@router.post("/recordings/{name}/exports/{kind}")
+async def export_recording(recordings: TheRecordings, name: str, kind: ExportKind) -> JobInfo:
+    """Write a recording in another format, in a process of its own."""
+    _existing(recordings, name)
+    return convert.job(recordings.export(name, kind))
+
+
+@router.get("/recordings/{name}/exports/{kind}", response_class=FileResponse)
+async def download_export(recordings: TheRecordings, name: str, kind: ExportKind) -> FileResponse:
+    """A finished export."""
+    path = recordings.library.export_path(name, kind)
+    if not path.is_file():
+        raise NotFound(
+            f"{path.name} was not exported yet", value=path.name, remedy="export it first"
+        )
+    return FileResponse(path, media_type=_TYPES[kind], filename=path.name)
+
+
+# --- support bundles --------------------------------------------------------------------
+
+
+@router.get("/bundles")
+async def list_bundles(capture: TheCapture) -> BundleList:
+    """Support bundles that faults or people made."""
+    rows = [
+        BundleInfo(
+            name=name,
+            created=convert.moment(capture.path(name).stat().st_mtime),
+            bytes=capture.path(name).stat().st_size,
+        )
+        for name in capture.names()
+    ]
+    return BundleList(bundles=rows, armed=capture.armed, before_s=BEFORE_S, after_s=AFTER_S)
+
+
+@router.put("/bundles/armed")
+async def arm_capture(capture: TheCapture, request: ArmRequest) -> ArmRequest:
+    """Say whether a fault freezes the last seconds."""
+    capture.armed = request.armed
+    return request
+
+
+@router.post("/bundles", status_code=201)
+async def make_bundle(capture: TheCapture, request: BundleRequest) -> BundleInfo:
+    """Make a support bundle of the last seconds now."""
+    name = await capture.bundle(request.reason)
+    status = capture.path(name).stat()
+    return BundleInfo(name=name, created=convert.moment(status.st_mtime), bytes=status.st_size)
+
+
+def _bundle(capture: FaultCapture, name: str) -> Path:
+    try:
+        return capture.path(name)
+    except NotAllowed as error:
+        raise NotFound(error.message, value=name, remedy=error.remedy) from error
+
+
+@router.get("/bundles/{name}", response_class=FileResponse)
+async def download_bundle(capture: TheCapture, name: str) -> FileResponse:
+    """The zip."""
+    path = _bundle(capture, name)
+    return FileResponse(path, media_type="application/zip", filename=path.name)
+
+
+@router.delete("/bundles/{name}", status_code=204)
+async def delete_bundle(capture: TheCapture, name: str) -> Response:
+    """Delete a bundle."""
+    _bundle(capture, name).unlink()
+    return Response(status_code=204)

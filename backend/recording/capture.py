@@ -1,0 +1,256 @@
+"""Always armed: the last seconds of every axis, frozen into a support bundle on a fault."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+
+from backend import __version__
+from backend.bench import Bench
+from backend.cyclic import INPUT_ROLES, OUTPUT_ROLES
+from backend.drive import Reading
+from backend.files import StorageFailed, checked_name
+from backend.monitor import Snapshot
+from backend.recording import facts
+from backend.recording.bundle import Evidence, Value, build
+from backend.recording.recorder import describe_streams
+from backend.recording.writer import RESERVE_BYTES, free_bytes
+from backend.scope import Subscription
+from drivers.errors import DriveError, NotAllowed
+from drivers.link import ScopeBlock
+
+SUFFIX = ".zip"
+#: Seconds before and after the fault.
+BEFORE_S, AFTER_S = 10.0, 2.0
+#: Bounds of the rings; older things go first.
+MAX_BLOCK_BYTES = 128 * 1024 * 1024
+MAX_VALUES = 200_000
+LOG_ENTRIES = 500
+#: A fault that comes and goes makes one bundle in this time.
+PAUSE_S = 30.0
+KEEP_BUNDLES = 50
+#: A drive with a fault may answer slowly; then the values known before are taken.
+READ_TIMEOUT_S = 10.0
+
+OnFault = Callable[[str, str], None]
+
+
+@dataclass(eq=False, slots=True)
+class _Tap:
+    """The cyclic stream of one drive into the ring."""
+
+    subscription: Subscription
+    channels: tuple[tuple[str, str], ...]
+
+
+class FaultCapture:
+    """Rings of the last seconds. Costs the buses nothing: it hears what is read anyway.
+
+    What the cyclic exchange carries is kept with every cycle; on polled buses every value that
+    the monitor, a page or a tool reads is kept with its time.
+    """
+
+    def __init__(self, bench: Bench, folder: Path, on_fault: OnFault) -> None:
+        self.folder = folder
+        self.armed = True
+        self._bench = bench
+        self._on_fault = on_fault
+        self._taps: dict[str, _Tap] = {}
+        self._blocks: deque[tuple[_Tap, ScopeBlock]] = deque()
+        self._block_bytes = 0
+        self._values: deque[Value] = deque(maxlen=MAX_VALUES)
+        self._faults: dict[str, frozenset[str]] = {}
+        self._pending: list[str] = []
+        self._told: dict[tuple[str, str], float] = {}
+        self._task: asyncio.Task[None] | None = None
+        bench.on_snapshot.append(self._snapshot)
+        bench.on_readings.append(self._readings)
+        bench.on_drives.append(self._drives)
+
+    async def close(self) -> None:
+        """Leave the streams; a bundle that is being made is finished first."""
+        self._bench.on_snapshot.remove(self._snapshot)
+        self._bench.on_readings.remove(self._readings)
+        self._bench.on_drives.remove(self._drives)
+        if self._task is not None:
+            await asyncio.wait([self._task], timeout=READ_TIMEOUT_S)
+        for drive in list(self._taps):
+            self._untap(drive)
+
+    # --- the rings --------------------------------------------------------------------
+
+    def _drives(self) -> None:
+        """Follow the cyclic exchanges as they start and end."""
+        for drive in [d for d in self._taps if not self._cyclic_keys(d)]:
+            self._untap(drive)
+        for drive in self._bench.members:
+            keys = self._cyclic_keys(drive)
+            old = self._taps.get(drive)
+            if old is not None and [k for _, k in old.channels] != keys:
+                self._untap(drive)
+            if keys and drive not in self._taps:
+                ((stream, _),) = self._bench.scope.subscribe(drive, keys, 0.0)
+                tap = _Tap(stream, tuple((drive, key) for key in keys))
+                stream.sink = partial(self._take, tap)
+                self._taps[drive] = tap
+
+    def _cyclic_keys(self, drive_id: str) -> list[str]:
+        member = self._bench.members.get(drive_id)
+        session = member.axis.session if member is not None else None
+        if member is None or session is None:
+            return []
+        keys = [member.drive.key(role) for role in (*INPUT_ROLES, *OUTPUT_ROLES)]
+        return [key for key in keys if key and session.carries(member.drive, key)]
+
+    def _untap(self, drive: str) -> None:
+        tap = self._taps.pop(drive)
+        if tap.subscription.leave is not None:
+            tap.subscription.leave()
+
+    def _take(self, tap: _Tap, block: ScopeBlock) -> None:
+        self._blocks.append((tap, block))
+        self._block_bytes += block.samples.nbytes
+        oldest = time.monotonic() - BEFORE_S - AFTER_S
+        while self._blocks and (
+            self._blocks[0][1].t0_s < oldest or self._block_bytes > MAX_BLOCK_BYTES
+        ):
+            self._block_bytes -= self._blocks.popleft()[1].samples.nbytes
+
+    def _readings(self, drive: str, readings: list[Reading]) -> None:
+        now = time.time()
+        for reading in readings:
+            # `mark_saved` and the like repeat old readings; those are no news.
+            if reading.time is None or now - reading.time > 1.0:
+                continue
+            value = reading.value.hex() if isinstance(reading.value, bytes) else reading.value
+            self._values.append(Value(reading.time, drive, reading.key, value))
+        while self._values and self._values[0].time < now - BEFORE_S - AFTER_S:
+            self._values.popleft()
+
+    # --- faults -----------------------------------------------------------------------
+
+    def _snapshot(self, drive: str, snapshot: Snapshot) -> None:
+        if not snapshot.fresh:
+            return
+        now = {f.code: f for f in snapshot.faults if f.kind == "fault"}
+        before = self._faults.get(drive)
+        self._faults[drive] = frozenset(now)
+        # A fault that is there when a drive is connected has no past that we have seen.
+        new = [f for code, f in now.items() if before is not None and code not in before]
+        if not new:
+            return
+        text = ", ".join(f"{f.code} {f.name}" for f in new)
+        member = self._bench.members.get(drive)
+        self._on_fault(drive, text)
+        if member is None or not self.armed:
+            return
+        at = time.monotonic()
+        if all(at - self._told.get((drive, f.code), -PAUSE_S) < PAUSE_S for f in new):
+            return
+        self._told |= {(drive, f.code): at for f in new}
+        self._pending.append(f"{member.drive.name}: {text}")
+        if self._task is None or self._task.done():
+            self._task = asyncio.create_task(self._freeze(time.time()), name="fault-capture")
+
+    async def _freeze(self, when: float) -> None:
+        """After the last of the story was heard, write it down; again if more came meanwhile."""
+        while self._pending:
+            await asyncio.sleep(AFTER_S)
+            reason = "; ".join(self._pending)
+            self._pending.clear()
+            await self._keep(reason, when)
+            when = time.time()
+
+    async def _keep(self, reason: str, when: float) -> None:
+        try:
+            name = await self.bundle(reason, when=when)
+        except (DriveError, OSError) as error:
+            self._bench.journal.add(f"no support bundle for {reason}: {error}", level="error")
+            return
+        self._bench.journal.add(f"{reason}: the last seconds are kept in {name}", level="warning")
+
+    # --- bundles ----------------------------------------------------------------------
+
+    async def bundle(self, reason: str, *, when: float | None = None) -> str:
+        """Make a support bundle now; returns its file name.
+
+        Raises:
+            StorageFailed: no space.
+        """
+        when = time.time() if when is None else when
+        self.folder.mkdir(parents=True, exist_ok=True)
+        free = free_bytes(self.folder)
+        if free < RESERVE_BYTES:
+            raise StorageFailed(
+                f"the disk is nearly full, {free >> 20} MiB are left", value=free,
+                limit=f"{RESERVE_BYTES >> 20} MiB stay free", remedy="delete old recordings",
+            )  # fmt: skip
+        evidence = await self._evidence(reason, when)
+        path = self._path_for(reason, when)
+        await asyncio.to_thread(build, evidence, path)
+        for old in self.names()[KEEP_BUNDLES:]:
+            self.path(old).unlink(missing_ok=True)
+        return path.name
+
+    async def _evidence(self, reason: str, when: float) -> Evidence:
+        # The rings go on; what matters is taken before the slow reading of parameters.
+        blocks, values = list(self._blocks), list(self._values)
+        members = list(self._bench.members.values())
+        states = [facts.state(member) for member in members]
+        clock = {"sample_s": time.monotonic(), "epoch_s": time.time()}
+        rows = await asyncio.gather(
+            *(facts.parameters(m, fresh=True, timeout_s=READ_TIMEOUT_S) for m in members)
+        )
+        taps = [t for t in dict.fromkeys(tap for tap, _ in blocks) if self._known(t)]
+        return Evidence(
+            reason=reason,
+            time=when,
+            version=__version__,
+            axes=[
+                facts.identity(self._bench, member) | {"state": state, "parameters": parameters}
+                for member, state, parameters in zip(members, states, rows, strict=True)
+            ],
+            links=facts.links(self._bench, members),
+            log=self._bench.journal.entries()[:LOG_ENTRIES],
+            history=values,
+            streams=describe_streams(self._bench, [(True, tap.channels) for tap in taps]),
+            blocks=[(taps.index(tap), block) for tap, block in blocks if tap in taps],
+            clock=clock,
+        )
+
+    def _known(self, tap: _Tap) -> bool:
+        return all(drive in self._bench.members for drive, _ in tap.channels)
+
+    def _path_for(self, reason: str, when: float) -> Path:
+        stamp = datetime.fromtimestamp(when, UTC).strftime("%Y-%m-%d %H-%M-%S")
+        words = re.sub(r"[^\w.\-]+", " ", reason, flags=re.ASCII).strip()[:50].strip(" .")
+        stem, number = f"{stamp} {words}".strip(), 2
+        path = self.folder / checked_name(stem, SUFFIX)
+        while path.exists():
+            path = self.folder / checked_name(f"{stem} {number}", SUFFIX)
+            number += 1
+        return path
+
+    def names(self) -> list[str]:
+        """Bundles, newest first."""
+        found = sorted(self.folder.glob(f"*{SUFFIX}"), key=lambda p: -p.stat().st_mtime)
+        return [path.name for path in found if not path.name.startswith(".")]
+
+    def path(self, name: str) -> Path:
+        """The file of a bundle.
+
+        Raises:
+            NotAllowed: there is none of this name.
+        """
+        path = self.folder / checked_name(name, SUFFIX)
+        if not path.is_file():
+            raise NotAllowed(f"there is no support bundle {path.name}", value=path.name,
+                             remedy="choose one from the list")  # fmt: skip
+        return path

@@ -1,0 +1,95 @@
+"""What is written down about the axes beside the samples: identity, parameters, link, faults."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from backend import parameter_set
+from backend.bench import Bench, Member
+from backend.drive import Reading
+from drivers.errors import DriveError
+
+
+def identity(bench: Bench, member: Member) -> dict[str, Any]:
+    """Who the axis is."""
+    drive = member.drive
+    found = drive.found
+    return {
+        "drive": drive.id,
+        "name": drive.name,
+        "profile": drive.profile.drive,
+        "title": drive.profile.title,
+        "serial": found.serial if found else None,
+        "firmware": found.firmware if found else "",
+        "ports": [{"url": bench.url_of(p), "station": p.station} for p in drive.ports],
+        "notes": drive.notes,
+    }
+
+
+async def parameters(member: Member, *, fresh: bool, timeout_s: float) -> list[dict[str, Any]]:
+    """Settings of the drive with the time each was read; what cannot be read says why.
+
+    ``fresh`` reads all of them now, else only those that were never read. After ``timeout_s``
+    it goes on with what it has.
+    """
+    drive = member.drive
+    wanted = [
+        p.key
+        for p in parameter_set.storable(drive.profile, motor_individual=True)
+        if not drive.unreachable_why(p)
+    ]
+    missing = [key for key in wanted if fresh or key not in drive.readings]
+    with contextlib.suppress(DriveError, TimeoutError):
+        async with asyncio.timeout(timeout_s):
+            await drive.read_many(missing)
+    return [_row(member, drive.readings.get(key), key) for key in wanted]
+
+
+def _row(member: Member, reading: Reading | None, key: str) -> dict[str, Any]:
+    parameter = member.drive.parameter(key)
+    row: dict[str, Any] = {"key": key, "name": parameter.name, "unit": parameter.unit}
+    if reading is None:
+        return row | {"raw": None, "value": None, "time": None, "error": "not read"}
+    raw, value = _plain(reading.raw), _plain(reading.value)
+    return row | {"raw": raw, "value": value, "time": reading.time, "error": reading.error}
+
+
+def _plain(value: object) -> object:
+    return value.hex() if isinstance(value, bytes) else value
+
+
+def state(member: Member) -> dict[str, Any]:
+    """The monitor's last snapshot."""
+    snapshot = member.monitor.snapshot
+    content = asdict(snapshot)
+    content["state"] = str(snapshot.state)
+    content["faults"] = [
+        {
+            "code": f.code,
+            "name": f.name,
+            "kind": f.kind,
+            "causes": list(f.causes),
+            "remedies": list(f.remedies),
+            "source": f.source,
+        }
+        for f in snapshot.faults
+    ]
+    return content
+
+
+def links(bench: Bench, members: Sequence[Member]) -> list[dict[str, Any]]:
+    """Counters of every port."""
+    return [
+        {
+            "drive": member.drive.id,
+            "url": bench.url_of(port),
+            "station": port.station,
+            **asdict(port.link.quality(port.station)),
+        }
+        for member in members
+        for port in member.drive.ports
+    ]

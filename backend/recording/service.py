@@ -1,0 +1,256 @@
+"""Recording as the server offers it: the running ones, the stored ones, and fault capture."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import time
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from backend.bench import Bench
+from backend.drive import Reading
+from backend.files import StorageFailed
+from backend.jobs import Job, JobResult, Progress
+from backend.journal import Entry
+from backend.recording.capture import FaultCapture
+from backend.recording.library import RecordingLibrary
+from backend.recording.recorder import Recorder, Settings
+from backend.recording.writer import free_bytes
+from drivers.errors import Busy, NotAllowed
+
+#: Running at once; each has a file and a thread.
+MAX_RUNNING = 8
+
+
+class Recordings:
+    """Everything about recordings of one bench. ``open`` in the running event loop."""
+
+    def __init__(self, bench: Bench, folder: Path) -> None:
+        self.bench = bench
+        self.library = RecordingLibrary(folder)
+        self.running: dict[str, Recorder] = {}
+        self.ended: dict[str, Recorder] = {}
+        self.capture: FaultCapture | None = None
+        self._known: dict[tuple[str, str], object] = {}
+        self._exporting: dict[tuple[str, str], Job] = {}
+
+    def open(self) -> None:
+        """Arm the fault capture and listen."""
+        self.capture = FaultCapture(self.bench, self.library.folder / "bundles", self._fault)
+        self.bench.journal.listen(self._logged)
+        self.bench.on_readings.append(self._readings)
+
+    async def close(self) -> None:
+        """End what runs, in order."""
+        await asyncio.gather(*(r.stop("servodeck was ended") for r in self.running.values()))
+        if self.capture is not None:
+            await self.capture.close()
+        if self._readings in self.bench.on_readings:
+            self.bench.on_readings.remove(self._readings)
+
+    # --- running ones -----------------------------------------------------------------
+
+    async def start(self, settings: Settings) -> Recorder:
+        """Begin a recording, or begin to wait for its trigger.
+
+        Raises:
+            NotAllowed: no such drive or key, a bad name, too many. StorageFailed: no space.
+        """
+        if len(self.running) >= MAX_RUNNING:
+            raise Busy(
+                f"{MAX_RUNNING} recordings run already", limit=str(MAX_RUNNING),
+                remedy="end one of them",
+            )  # fmt: skip
+        settings = self._canonical(settings)
+        stamp = datetime.now(UTC).strftime("%Y-%m-%d %H-%M-%S")
+        name = self.library.free_name(settings.name or f"recording {stamp}")
+        recorder = Recorder(self.bench, self.library.path(name), settings, self._ended)
+        self.running[name] = recorder
+        try:
+            await self._prune()
+            await recorder.start()
+        except BaseException:
+            self.running.pop(name, None)
+            raise
+        what = "waits for its trigger" if recorder.phase == "waiting" else "started"
+        self.bench.journal.add(f"recording {name} {what}", person=settings.person)
+        return recorder
+
+    def _canonical(self, settings: Settings) -> Settings:
+        """The same with the profile's keys, where makers' numbers were given."""
+
+        def key(drive: str, given: str) -> str:
+            return self.bench.member(drive).drive.parameter(given).key
+
+        trigger = settings.trigger
+        if trigger is not None and trigger.kind != "fault":
+            trigger = replace(trigger, key=key(trigger.drive, trigger.key))
+        elif trigger is not None and trigger.drive:
+            self.bench.member(trigger.drive)
+        channels = tuple((drive, key(drive, given)) for drive, given in settings.channels)
+        return replace(settings, channels=channels, trigger=trigger)
+
+    async def stop(self, name: str, reason: str = "stopped") -> Recorder:
+        """End a recording.
+
+        Raises:
+            NotAllowed: none of this name runs.
+        """
+        recorder = self.active(name)
+        await recorder.stop(reason)
+        return recorder
+
+    def active(self, name: str) -> Recorder:
+        """A running recording.
+
+        Raises:
+            NotAllowed: none of this name runs.
+        """
+        file = self.library.path(name).name
+        recorder = self.running.get(file)
+        if recorder is None:
+            raise NotAllowed(
+                f"no recording {file} runs", value=file, remedy="look at the list of recordings"
+            )
+        return recorder
+
+    def _ended(self, recorder: Recorder) -> None:
+        self.running.pop(recorder.name, None)
+        self.ended[recorder.name] = recorder
+        while len(self.ended) > 20:
+            del self.ended[next(iter(self.ended))]
+        written = recorder.written()
+        text = f"recording {recorder.name} ended: {recorder.reason}, {written.samples} samples"
+        if recorder.lost:
+            text += f"; {recorder.lost} samples were lost before they came to it"
+        self.bench.journal.add(text, level="warning" if recorder.lost else "info")
+
+    async def _prune(self) -> None:
+        gone = await asyncio.to_thread(self.library.prune, list(self.running))
+        for name in gone:
+            self.bench.journal.add(f"recording {name} was deleted to keep within the bounds")
+
+    # --- what is written down beside the samples ----------------------------------------
+
+    def _fault(self, drive: str, text: str) -> None:
+        for recorder in list(self.running.values()):
+            if recorder.concerns(drive):
+                recorder.fault(drive, text)
+
+    def _logged(self, entry: Entry) -> None:
+        for recorder in list(self.running.values()):
+            if recorder.concerns(entry.drive):
+                recorder.event("log", entry.text, entry.level, drive=entry.drive or "")
+
+    def _readings(self, drive: str, readings: list[Reading]) -> None:
+        """A setting that changed while something records is an event of it."""
+        if not self.running:
+            self._known.clear()
+            return
+        member = self.bench.members.get(drive)
+        if member is None:
+            return
+        for reading in readings:
+            parameter = member.drive.parameter(reading.key)
+            place = (drive, reading.key)
+            if parameter.access != "rw" or reading.raw is None:
+                continue
+            before = self._known.get(place, reading.raw)
+            self._known[place] = reading.raw
+            if before == reading.raw:
+                continue
+            text = f"{member.drive.name}: {parameter.name} is now {reading.value} {parameter.unit}"
+            for recorder in list(self.running.values()):
+                if recorder.concerns(drive) and not recorder.records(drive, reading.key):
+                    recorder.event("parameter", text.strip(), drive=drive)
+
+    # --- stored ones ------------------------------------------------------------------
+
+    def require_ended(self, name: str) -> Path:
+        """The file of a recording that does not run.
+
+        Raises:
+            Busy: it runs. NotAllowed: there is none.
+        """
+        path = self.library.existing(name)
+        if path.name in self.running:
+            raise Busy(f"{path.name} is being recorded", value=path.name, remedy="end it first")
+        return path
+
+    async def delete(self, name: str) -> None:
+        """Delete a recording.
+
+        Raises:
+            Busy: it runs or is being exported. NotAllowed: there is none.
+        """
+        path = self.require_ended(name)
+        if any(
+            file == path.name and j.state == "running" for (file, _), j in self._exporting.items()
+        ):
+            raise Busy(f"{path.name} is being exported", value=path.name, remedy="wait for it")
+        await asyncio.to_thread(self.library.delete, name)
+        self.bench.journal.add(f"recording {path.name} was deleted")
+
+    def export(self, name: str, kind: str) -> Job:
+        """Export a recording in a process of its own; the job's result names the file.
+
+        Raises:
+            Busy: it runs. NotAllowed: there is none, or no such format.
+        """
+        source = self.require_ended(name)
+        target = self.library.export_path(name, kind)
+        place = (source.name, kind)
+        old = self._exporting.get(place)
+        if old is not None and old.state == "running":
+            return old
+
+        async def work(progress: Progress) -> JobResult:
+            progress(0.0, f"Writing {target.name}")
+            await run_export(source, target, kind, progress)
+            return {"file": target.name, "bytes": target.stat().st_size}
+
+        job = self.bench.jobs.start("export", f"Export {source.name} as {kind.upper()}", work)
+        self._exporting[place] = job
+        return job
+
+    def free(self) -> int:
+        """Free bytes of the disk with the recordings."""
+        folder = self.library.folder
+        while not folder.exists():
+            folder = folder.parent
+        return free_bytes(folder)
+
+
+async def run_export(source: Path, target: Path, kind: str, progress: Progress) -> None:
+    """The export process, with its progress; it dies with the task.
+
+    Raises:
+        StorageFailed: it failed; its last words are in the message.
+    """
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "backend.recording.export", str(source), str(target), kind,
+        stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert process.stderr is not None
+    words = asyncio.create_task(process.stderr.read())
+    began = time.monotonic()
+    try:
+        async for line in process.stdout:
+            fraction = float(line)
+            left = (time.monotonic() - began) * (1 - fraction) / max(fraction, 0.01)
+            progress(fraction, f"Writing {target.name}, about {left:.0f} s left")
+        status = await process.wait()
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+        text = (await words).decode(errors="replace").strip()
+    if status != 0:
+        last = text.splitlines()[-1] if text else f"exit code {status}"
+        raise StorageFailed(
+            f"{target.name} could not be written: {last}", value=target.name,
+            remedy="free some space and try again; the recording itself is unharmed",
+        )  # fmt: skip
