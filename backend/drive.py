@@ -474,7 +474,9 @@ class Drive:
         self, error: DriveError, parameter: Parameter, value: Raw | None = None
     ) -> DriveError:
         """The same error, naming drive and parameter in its text."""
-        error.at(self.name, parameter.key)
+        # A link names the node; the person knows the drive by the name on the bench.
+        error.drive = self.name
+        error.at(parameter=parameter.key)
         if value is not None and error.value is None:
             error.value = value
         prefix = f"{self.name}: {parameter.key} {parameter.name}: "

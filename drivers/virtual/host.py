@@ -184,7 +184,13 @@ class Wires:
         return device
 
     def _mute(self, command: dict[str, object]) -> None:
-        self._slave(command).mute = bool(command.get("on", True))
+        on = bool(command.get("on", True))
+        can_wire = self._can_wires.get(str(command.get("wire")))
+        if can_wire is None:
+            self._slave(command).mute = on
+            return
+        for node in can_wire[0].nodes:
+            node.mute = on
 
     def _swap(self, command: dict[str, object]) -> None:
         """Two drives change places on their wire."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -94,3 +95,39 @@ def test_a_second_port_where_nobody_answers_is_refused(station: Station, z: str)
     assert answer.status_code == 504
     assert "nothing can be read at station 9" in answer.json()["detail"]
     assert len(station.ok(station.http.get(f"/drives/{z}"))["ports"]) == 1
+
+
+def test_a_restarted_node_is_told_and_read_anew(station: Station, z: str) -> None:
+    key = "6083:00"
+    station.ok(station.http.put(f"/drives/{z}/parameters/{key}", json={"raw": 777}))
+    station.drives.command(do="power_cycle", axis="Low-voltage axis", off_s=0.3)
+
+    def told() -> bool:
+        texts = [entry["text"] for entry in station.ok(station.http.get("/log"))]
+        return any("restarted" in text for text in texts)
+
+    until(told, 10, "the log tells of the restart")
+
+    # What was not saved is gone, and the page must not show it any more.
+    def row() -> Any:
+        rows = station.ok(station.http.get(f"/drives/{z}/parameters"))
+        return next(r["reading"] for r in rows if r["key"] == key)
+
+    until(lambda: row()["raw"] not in (None, 777), 10, "the value that the drive has now")
+    until(lambda: station.state(z)["fresh"], 10)
+    assert not station.ok(station.http.get(f"/drives/{z}"))["unsaved"]
+
+
+def test_a_mute_node_is_named_with_a_remedy(station: Station, z: str) -> None:
+    station.drives.command(do="mute", wire=CAN, on=True)
+    try:
+        answer = station.http.put(f"/drives/{z}/parameters/6083:00", json={"raw": 321})
+        assert answer.status_code == 504, answer.text
+        problem = answer.json()
+        assert "did not answer" in problem["detail"]
+        assert problem["drive"] == "Z"
+        assert problem["parameter"] == "6083:00"
+        assert problem["remedy"]
+    finally:
+        station.drives.command(do="mute", wire=CAN, on=False)
+    until(lambda: station.state(z)["fresh"], 20)
