@@ -17,12 +17,16 @@ from backend.api import (
     routes_description,
     routes_drive,
     routes_recordings,
+    routes_rerun,
     routes_sets,
+    routes_tune,
 )
 from backend.api.errors import NotFound, answer, problem_of
 from backend.api.live import LiveHub
 from backend.api.models import Problem
 from backend.bench import Bench
+from backend.recording.rerun_assets import ViewerAssets
+from backend.recording.rerun_feed import RerunFeed
 from backend.recording.service import Recordings
 from drivers.errors import NotAllowed
 
@@ -47,6 +51,7 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
     """The application over a bench. ``hosts`` are the Host names that it answers to."""
 
     recordings = Recordings(bench, bench.state_folder / "recordings")
+    feed = RerunFeed(bench)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
@@ -55,6 +60,7 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
         yield
         # What moves is stopped before a slow disk may keep the server waiting.
         await bench.jobs.close()
+        await feed.close()
         await recordings.close()
         await bench.close()
 
@@ -90,6 +96,7 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
         routes_sets,
         routes_description,
         routes_recordings,
+        routes_tune,
     ):
         api.include_router(part.router)
     app.include_router(api)
@@ -100,6 +107,13 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
             await socket.close(code=1008)
             return
         await live.serve(socket)
+
+    routes_rerun.install(
+        app,
+        feed,
+        ViewerAssets(),
+        lambda s: _allowed(s.headers.get("host"), s.headers.get("origin"), hosts),
+    )
 
     @app.middleware("http")
     async def guard(

@@ -1,0 +1,85 @@
+"""rerun's viewer from our own origin: its files, the page around it, and the live feed."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+
+from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
+from fastapi.responses import FileResponse
+
+from backend.api.errors import NotFound
+from backend.recording.rerun_assets import FILES, ViewerAssets
+from backend.recording.rerun_feed import RerunFeed
+from drivers.errors import NotAllowed
+
+_FOLDER = Path(__file__).resolve().parents[1] / "recording" / "viewer"
+#: The viewer is WebAssembly; only here may the browser compile it.
+_POLICY = (
+    "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'; "
+    "img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; worker-src 'self' blob:; "
+    "frame-ancestors 'self'; base-uri 'none'; form-action 'none'; object-src 'none'"
+)
+_HEADERS = {"Content-Security-Policy": _POLICY, "Cache-Control": "no-cache"}
+_FOREVER = "public, max-age=31536000, immutable"
+#: A page that has not pulled for this long has gone without saying so.
+SILENT_S = 60.0
+SEND_TIMEOUT_S = 10.0
+
+
+def install(
+    app: FastAPI, feed: RerunFeed, assets: ViewerAssets, allowed: Callable[[WebSocket], bool]
+) -> None:
+    """Add the routes. ``allowed`` checks Host and Origin of a websocket."""
+
+    @app.get("/rerun/", include_in_schema=False)
+    async def viewer() -> Response:
+        text = (_FOLDER / "index.html").read_text("utf-8").replace("{version}", assets.version)
+        return Response(text, media_type="text/html", headers=_HEADERS)
+
+    @app.get("/rerun/viewer.{kind}", include_in_schema=False)
+    async def viewer_part(kind: str) -> Response:
+        types = {"js": "text/javascript", "css": "text/css"}
+        if kind not in types:
+            raise NotFound(f"there is no viewer.{kind}")
+        return FileResponse(_FOLDER / f"viewer.{kind}", media_type=types[kind], headers=_HEADERS)
+
+    @app.get("/rerun/{version}/{name}", include_in_schema=False)
+    async def viewer_file(request: Request, version: str, name: str) -> Response:
+        if version != assets.version or name not in FILES:
+            raise NotFound(
+                f"the viewer has no {name} of version {version}", remedy="load the page again"
+            )
+        if "gzip" not in request.headers.get("accept-encoding", ""):
+            raise NotAllowed("the viewer is sent compressed", remedy="use a browser")
+        path = await assets.file(name)
+        return FileResponse(
+            path,
+            media_type=FILES[name],
+            headers={
+                "Content-Encoding": "gzip",
+                "Cache-Control": _FOREVER,
+                "rerun-final-length": str(assets.size(name)),
+                "Content-Security-Policy": _POLICY,
+            },
+        )
+
+    @app.websocket("/rerun/feed")
+    async def live_feed(socket: WebSocket) -> None:
+        if not allowed(socket):
+            await socket.close(code=1008)
+            return
+        await socket.accept()
+        client = feed.join()
+        try:
+            with contextlib.suppress(WebSocketDisconnect, TimeoutError):
+                while True:
+                    async with asyncio.timeout(SILENT_S):
+                        await socket.receive_text()
+                    frame = await client.pull()
+                    async with asyncio.timeout(SEND_TIMEOUT_S):
+                        await socket.send_bytes(frame)
+        finally:
+            await feed.leave(client)
