@@ -4,6 +4,74 @@
  */
 
 export interface paths {
+    "/api/v1/bundles": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Bundles
+         * @description Support bundles that faults or people made.
+         */
+        get: operations["list_bundles"];
+        put?: never;
+        /**
+         * Make Bundle
+         * @description Make a support bundle of the last seconds now.
+         */
+        post: operations["make_bundle"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/bundles/armed": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Arm Capture
+         * @description Say whether a fault freezes the last seconds.
+         */
+        put: operations["arm_capture"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/bundles/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Bundle
+         * @description The zip.
+         */
+        get: operations["download_bundle"];
+        put?: never;
+        post?: never;
+        /**
+         * Delete Bundle
+         * @description Delete a bundle.
+         */
+        delete: operations["delete_bundle"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/buses": {
         parameters: {
             query?: never;
@@ -226,6 +294,30 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/gains": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read Gains
+         * @description Loop gains, read now.
+         */
+        get: operations["read_gains"];
+        /**
+         * Write Gains
+         * @description Write gains or a stiffness level and make them act; saving is another step.
+         */
+        put: operations["write_gains"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/homing-methods": {
         parameters: {
             query?: never;
@@ -240,6 +332,26 @@ export interface paths {
         get: operations["homing_methods"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/jobs/autotune": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Autotune
+         * @description All steps from inertia to verification; `before` of the result undoes what was applied.
+         */
+        post: operations["start_autotune"];
         delete?: never;
         options?: never;
         head?: never;
@@ -280,6 +392,26 @@ export interface paths {
          * @description Home the axis.
          */
         post: operations["start_homing"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/jobs/inertia": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Inertia
+         * @description Measure inertia and friction. The result has the form of ``servodeck inertia --out``.
+         */
+        post: operations["start_inertia"];
         delete?: never;
         options?: never;
         head?: never;
@@ -366,6 +498,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/step": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Step
+         * @description Step of speed, or a move, with its numbers.
+         */
+        post: operations["start_step"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/jobs/sweep": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Sweep
+         * @description Measure a frequency response. The result has the form of ``servodeck sweep --out``.
+         */
+        post: operations["start_sweep"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/log": {
         parameters: {
             query?: never;
@@ -400,6 +572,50 @@ export interface paths {
         get: operations["drive_missing_ports"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/notches": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read Notches
+         * @description All notches of the drive, read now.
+         */
+        get: operations["read_notches"];
+        /**
+         * Write Notches
+         * @description Write all notches and make them act; saving is another step.
+         */
+        put: operations["write_notches"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/notches/preview": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Preview Notches
+         * @description What the drive would make of these notches. Nothing is read or written.
+         */
+        post: operations["preview_notches"];
         delete?: never;
         options?: never;
         head?: never;
@@ -576,6 +792,66 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/tune/candidates": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Candidates
+         * @description Notch sets and gains for a stored response. Nothing is written.
+         */
+        post: operations["candidates"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/tune/predict": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Predict
+         * @description The speed loop that notches and gains would make of a stored response.
+         */
+        post: operations["predict"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/tune/undo": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Undo Tuning
+         * @description Put back what a change returned as `before`; returns what was there until now.
+         */
+        post: operations["undo_tuning"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/health": {
         parameters: {
             query?: never;
@@ -680,6 +956,74 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/measurements": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Measurements
+         * @description Stored measurements, newest first; unusable ones say why.
+         */
+        get: operations["list_measurements"];
+        put?: never;
+        /**
+         * Upload Measurement
+         * @description Take a file of another computer; the body is the file.
+         */
+        post: operations["upload_measurement"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/measurements/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read Measurement
+         * @description One measurement, evaluated anew from its raw data.
+         */
+        get: operations["read_measurement"];
+        put?: never;
+        post?: never;
+        /**
+         * Delete Measurement
+         * @description Delete a file.
+         */
+        delete: operations["delete_measurement"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/measurements/{name}/file": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Measurement
+         * @description The file itself, raw signals included.
+         */
+        get: operations["download_measurement"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/profiles": {
         parameters: {
             query?: never;
@@ -734,6 +1078,162 @@ export interface paths {
         get: operations["export_profile"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/recordings": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Recordings
+         * @description Running and stored recordings that contain every word of ``search``.
+         */
+        get: operations["list_recordings"];
+        put?: never;
+        /**
+         * Start Recording
+         * @description Begin a recording, or begin to wait for its trigger.
+         */
+        post: operations["start_recording"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/recordings/retention": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Set Retention
+         * @description Set when the oldest recordings are deleted.
+         */
+        put: operations["set_retention"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/recordings/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Recording
+         * @description A recording with its events and the settings of its axes when it began.
+         */
+        get: operations["get_recording"];
+        put?: never;
+        post?: never;
+        /**
+         * Delete Recording
+         * @description Delete a stored recording with its exports.
+         */
+        delete: operations["delete_recording"];
+        options?: never;
+        head?: never;
+        /**
+         * Change Recording
+         * @description Write notes or tags on a stored recording, or protect it from retention.
+         */
+        patch: operations["change_recording"];
+        trace?: never;
+    };
+    "/api/v1/recordings/{name}/exports/{kind}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Export
+         * @description A finished export.
+         */
+        get: operations["download_export"];
+        put?: never;
+        /**
+         * Export Recording
+         * @description Write a recording in another format, in a process of its own.
+         */
+        post: operations["export_recording"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/recordings/{name}/file": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Download Recording
+         * @description The recording's own file.
+         */
+        get: operations["download_recording"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/recordings/{name}/stop": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Stop Recording
+         * @description End a recording; null where its trigger had not come, so that nothing was kept.
+         */
+        post: operations["stop_recording"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/recordings/{name}/trigger": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Trigger Recording
+         * @description Begin a waiting recording although its trigger did not come.
+         */
+        post: operations["trigger_recording"];
         delete?: never;
         options?: never;
         head?: never;
@@ -896,6 +1396,74 @@ export interface components {
             source: string;
         };
         /**
+         * ArmRequest
+         * @description Whether a fault freezes the last seconds.
+         */
+        ArmRequest: {
+            /** Armed */
+            armed: boolean;
+        };
+        /**
+         * AutotuneRequest
+         * @description All steps in one job.
+         */
+        AutotuneRequest: {
+            /**
+             * Apply
+             * @default true
+             */
+            apply: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /** Ends Rev */
+            ends_rev?: [
+                number,
+                number
+            ] | null;
+            /** Load */
+            load?: ("stiff" | "medium" | "compliant") | null;
+            /**
+             * Loop
+             * @default auto
+             * @enum {string}
+             */
+            loop: "auto" | "none" | "speed" | "position";
+            /**
+             * Mark
+             * @default balanced
+             * @enum {string}
+             */
+            mark: "robust" | "balanced" | "fast";
+            /** Motor Inertia Kgm2 */
+            motor_inertia_kgm2?: number | null;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Scheme
+             * @default free
+             * @enum {string}
+             */
+            scheme: "free" | "limited" | "taught";
+            /** Speed Limit */
+            speed_limit: number;
+            /**
+             * Time Limit S
+             * @default 60
+             */
+            time_limit_s: number;
+            /** Torque Limit */
+            torque_limit: number;
+            /** Travel Limit */
+            travel_limit: number;
+        };
+        /**
          * AxisState
          * @description State of an axis, in engineering units where units are named.
          */
@@ -976,6 +1544,46 @@ export interface components {
             velocity: number | null;
         };
         /**
+         * BundleInfo
+         * @description A support bundle.
+         */
+        BundleInfo: {
+            /** Bytes */
+            bytes: number;
+            /**
+             * Created
+             * Format: date-time
+             */
+            created: string;
+            /** Name */
+            name: string;
+        };
+        /**
+         * BundleList
+         * @description Support bundles, newest first.
+         */
+        BundleList: {
+            /** After S */
+            after_s: number;
+            /** Armed */
+            armed: boolean;
+            /** Before S */
+            before_s: number;
+            /** Bundles */
+            bundles: components["schemas"]["BundleInfo"][];
+        };
+        /**
+         * BundleRequest
+         * @description Why a support bundle is made.
+         */
+        BundleRequest: {
+            /**
+             * Reason
+             * @default asked for
+             */
+            reason: string;
+        };
+        /**
          * Bus
          * @description An opened bus.
          */
@@ -988,6 +1596,47 @@ export interface components {
             quality: components["schemas"]["Quality"];
             /** Url */
             url: string;
+        };
+        /**
+         * CandidatesInfo
+         * @description The table, fastest first; up to three rows carry a mark.
+         */
+        CandidatesInfo: {
+            /** Candidates */
+            candidates: {
+                [key: string]: unknown;
+            }[];
+            /** Load */
+            load: string;
+        };
+        /**
+         * CandidatesRequest
+         * @description Design on a stored frequency response of the mechanics.
+         */
+        CandidatesRequest: {
+            /** Inertia Kgm2 */
+            inertia_kgm2: number;
+            /** Load */
+            load?: ("stiff" | "medium" | "compliant") | null;
+            /** Measurement */
+            measurement: string;
+            /**
+             * Sample Rate Hz
+             * @description only candidates that can be verified at this rate
+             */
+            sample_rate_hz?: number | null;
+        };
+        /**
+         * ChangeRecording
+         * @description What people write about a recording; absent things stay.
+         */
+        ChangeRecording: {
+            /** Kept */
+            kept?: boolean | null;
+            /** Notes */
+            notes?: string | null;
+            /** Tags */
+            tags?: string[] | null;
         };
         /**
          * ConnectRequest
@@ -1235,6 +1884,59 @@ export interface components {
             vendor_id: number | null;
         };
         /**
+         * GainInfo
+         * @description Gains now; null where they have no printed meaning or do not exist.
+         */
+        GainInfo: {
+            /** Convention */
+            convention: string;
+            /** Current Bandwidth Hz */
+            current_bandwidth_hz: number | null;
+            /** Inertia Kgm2 */
+            inertia_kgm2: number | null;
+            /** Integral Hz */
+            integral_hz: number | null;
+            /** Level */
+            level: number | null;
+            /** Position 1 S */
+            position_1_s: number | null;
+            /** Rated Torque Nm */
+            rated_torque_nm: number | null;
+            /** Raw */
+            raw: {
+                [key: string]: number;
+            };
+            /** Speed Filter Hz */
+            speed_filter_hz: number | null;
+            /** Speed Hz */
+            speed_hz: number | null;
+            /** Speed Nms */
+            speed_nms: number | null;
+        };
+        /**
+         * GainValues
+         * @description Gains with a physical meaning. ``inertia_kgm2`` is the whole axis'.
+         */
+        GainValues: {
+            /** Inertia Kgm2 */
+            inertia_kgm2: number;
+            /** Integral Hz */
+            integral_hz: number;
+            /** Position 1 S */
+            position_1_s: number;
+            /** Speed Bandwidth Hz */
+            speed_bandwidth_hz: number;
+        };
+        /**
+         * GainWrite
+         * @description Either physical gains or a stiffness level.
+         */
+        GainWrite: {
+            gains?: components["schemas"]["GainValues"] | null;
+            /** Level */
+            level?: number | null;
+        };
+        /**
          * GenerateRequest
          * @description A test signal in a cyclic mode; amplitude in rev (CSP), rpm (CSV) or % (CST).
          */
@@ -1403,6 +2105,62 @@ export interface components {
             title: string;
             /** Vendor Id */
             vendor_id: number | null;
+        };
+        /**
+         * InertiaRequest
+         * @description Inertia and friction.
+         */
+        InertiaRequest: {
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /** Ends Rev */
+            ends_rev?: [
+                number,
+                number
+            ] | null;
+            /** Motor Inertia Kgm2 */
+            motor_inertia_kgm2?: number | null;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Repetitions
+             * @default 4
+             */
+            repetitions: number;
+            /**
+             * Scheme
+             * @default free
+             * @enum {string}
+             */
+            scheme: "free" | "limited" | "taught";
+            /**
+             * Search Speed
+             * @default 30
+             */
+            search_speed: number;
+            /**
+             * Search Torque
+             * @default 20
+             */
+            search_torque: number;
+            /** Speed Limit */
+            speed_limit: number;
+            /**
+             * Time Limit S
+             * @default 60
+             */
+            time_limit_s: number;
+            /** Torque Limit */
+            torque_limit: number;
+            /** Travel Limit */
+            travel_limit: number;
         };
         /**
          * Interfaces
@@ -1688,6 +2446,44 @@ export interface components {
             type: "log";
         };
         /**
+         * MeasurementContent
+         * @description Its settings, and its result evaluated anew from the raw data.
+         */
+        MeasurementContent: {
+            info: components["schemas"]["MeasurementInfo"];
+            /** Result */
+            result: {
+                [key: string]: unknown;
+            };
+            /** Settings */
+            settings: {
+                [key: string]: unknown;
+            };
+        };
+        /**
+         * MeasurementInfo
+         * @description One stored measurement.
+         */
+        MeasurementInfo: {
+            /** Drive */
+            drive: string;
+            /** File */
+            file: string;
+            /** Kind */
+            kind: string;
+            /**
+             * Problem
+             * @default
+             */
+            problem: string;
+            /** Profile */
+            profile: string;
+            /** Saved */
+            saved: string | null;
+            /** Serial */
+            serial: number | null;
+        };
+        /**
          * MissingPort
          * @description A port that a drive's family has and that is not connected.
          */
@@ -1775,6 +2571,66 @@ export interface components {
             url: string;
             /** Usable */
             usable: boolean;
+        };
+        /**
+         * NotchPreviewInfo
+         * @description What they would become, and their common response at the frequencies asked for.
+         */
+        NotchPreviewInfo: {
+            /** Magnitude Db */
+            magnitude_db: number[];
+            /** Phase Deg */
+            phase_deg: number[];
+            /** Slots */
+            slots: components["schemas"]["NotchSlotInfo"][];
+        };
+        /**
+         * NotchPreviewRequest
+         * @description Wanted notches, one per slot; null is off. Nothing is written.
+         */
+        NotchPreviewRequest: {
+            /** Frequency Hz */
+            frequency_hz?: number[];
+            /** Notches */
+            notches: (components["schemas"]["NotchShape"] | null)[];
+        };
+        /**
+         * NotchShape
+         * @description Vendor-neutral notch: centre, −3 dB bandwidth, depth (negative dB).
+         */
+        NotchShape: {
+            /** Center Hz */
+            center_hz: number;
+            /** Depth Db */
+            depth_db: number;
+            /** Width Hz */
+            width_hz: number;
+        };
+        /**
+         * NotchSlotInfo
+         * @description One notch of the drive.
+         */
+        NotchSlotInfo: {
+            /** Enabled */
+            enabled: boolean;
+            notch: components["schemas"]["NotchShape"] | null;
+            /** Note */
+            note: string;
+            /** Raw */
+            raw: {
+                [key: string]: number;
+            };
+            realised: components["schemas"]["RealisedInfo"] | null;
+            /** Slot */
+            slot: number;
+        };
+        /**
+         * NotchWrite
+         * @description Notches for all slots; those beyond the list are switched off.
+         */
+        NotchWrite: {
+            /** Notches */
+            notches: (components["schemas"]["NotchShape"] | null)[];
         };
         /**
          * ParameterRow
@@ -1958,6 +2814,43 @@ export interface components {
             url: string;
         };
         /**
+         * PredictRequest
+         * @description Notches and gains on a stored frequency response of the mechanics.
+         */
+        PredictRequest: {
+            gains: components["schemas"]["GainValues"];
+            /** Measurement */
+            measurement: string;
+            /** Notches */
+            notches?: components["schemas"]["NotchShape"][];
+        };
+        /**
+         * PredictionInfo
+         * @description Predicted speed loop: curves over ``frequency_hz`` and the step of its reference.
+         */
+        PredictionInfo: {
+            /** Closed Db */
+            closed_db: number[];
+            /** Closed Deg */
+            closed_deg: number[];
+            /** Frequency Hz */
+            frequency_hz: number[];
+            /** Margins */
+            margins: {
+                [key: string]: number | boolean | null;
+            };
+            /** Open Db */
+            open_db: number[];
+            /** Open Deg */
+            open_deg: number[];
+            /** Sensitivity Db */
+            sensitivity_db: number[];
+            /** Step */
+            step: number[];
+            /** Step Time S */
+            step_time_s: number[];
+        };
+        /**
          * Problem
          * @description RFC 9457 problem details, with what a person needs to act.
          */
@@ -2125,6 +3018,220 @@ export interface components {
             url: string;
         };
         /**
+         * RealisedInfo
+         * @description What the drive really does after rounding; null where it cannot be said.
+         */
+        RealisedInfo: {
+            /** Center Hz */
+            center_hz: number;
+            /** Dc Gain Db */
+            dc_gain_db: number | null;
+            /** Depth Db */
+            depth_db: number;
+            /** Stable */
+            stable: boolean;
+            /** Width Hz */
+            width_hz: number | null;
+        };
+        /**
+         * RecordChannel
+         * @description A signal to record.
+         */
+        RecordChannel: {
+            /** Drive */
+            drive: string;
+            /** Key */
+            key: string;
+        };
+        /**
+         * RecordTrigger
+         * @description When a recording begins. ``rising``, ``falling`` and ``change`` look at a recorded signal.
+         */
+        RecordTrigger: {
+            /**
+             * Drive
+             * @description fault: empty for any drive
+             * @default
+             */
+            drive: string;
+            /**
+             * Key
+             * @default
+             */
+            key: string;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "rising" | "falling" | "change" | "fault";
+            /**
+             * Level
+             * @default 0
+             */
+            level: number;
+            /**
+             * Mask
+             * @description bits of `change`
+             */
+            mask?: number | null;
+        };
+        /**
+         * RecordedAxis
+         * @description An axis as it was when the recording began.
+         */
+        RecordedAxis: {
+            /** Drive */
+            drive: string;
+            /** Firmware */
+            firmware: string;
+            /** Name */
+            name: string;
+            /**
+             * Parameters
+             * @description how many are in the file
+             */
+            parameters: number;
+            /** Profile */
+            profile: string;
+            /** Serial */
+            serial: number | null;
+            /** Title */
+            title: string;
+        };
+        /**
+         * RecordedChannel
+         * @description A recorded signal.
+         */
+        RecordedChannel: {
+            /** Drive */
+            drive: string;
+            /** Drive Name */
+            drive_name: string;
+            /** Key */
+            key: string;
+            /** Name */
+            name: string;
+            /** Synchronous */
+            synchronous: boolean;
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * RecordedParameter
+         * @description A setting at the start of a recording.
+         */
+        RecordedParameter: {
+            /** Error */
+            error: string;
+            /** Key */
+            key: string;
+            /** Name */
+            name: string;
+            /** Raw */
+            raw: number | string | null;
+            /** Time */
+            time: number | null;
+            /** Unit */
+            unit: string;
+            /** Value */
+            value: number | string | null;
+        };
+        /**
+         * RecordingDetail
+         * @description A recording with its events and the settings of its axes.
+         */
+        RecordingDetail: {
+            /** Events */
+            events: components["schemas"]["RecordingEvent"][];
+            info: components["schemas"]["RecordingInfo"];
+            /** Parameters */
+            parameters: {
+                [key: string]: components["schemas"]["RecordedParameter"][];
+            };
+        };
+        /**
+         * RecordingEvent
+         * @description Something that happened during a recording; seconds since its first sample.
+         */
+        RecordingEvent: {
+            /** Drive */
+            drive: string;
+            /** Kind */
+            kind: string;
+            /** Level */
+            level: string;
+            /** T S */
+            t_s: number;
+            /** Text */
+            text: string;
+        };
+        /**
+         * RecordingInfo
+         * @description A recording of the list, running or stored.
+         */
+        RecordingInfo: {
+            /** Axes */
+            axes: components["schemas"]["RecordedAxis"][];
+            /** Bytes */
+            bytes: number;
+            /** Channels */
+            channels: components["schemas"]["RecordedChannel"][];
+            /** Created */
+            created: string | null;
+            /** Duration S */
+            duration_s: number;
+            /** Exports */
+            exports: ("csv" | "rrd" | "mcap")[];
+            /**
+             * Kept
+             * @description retention never deletes it
+             */
+            kept: boolean;
+            /**
+             * Lost
+             * @description samples lost by the bus before they came to the recorder
+             */
+            lost: number;
+            /** Name */
+            name: string;
+            /** Notes */
+            notes: string;
+            /** Person */
+            person: string;
+            /** Problem */
+            problem: string;
+            /**
+             * Reason
+             * @description why it ended
+             */
+            reason: string;
+            /** Samples */
+            samples: number;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "waiting" | "recording" | "complete" | "interrupted" | "failed" | "unusable";
+            /** Tags */
+            tags: string[];
+        };
+        /**
+         * RecordingList
+         * @description Recordings, newest first, and the room that is left.
+         */
+        RecordingList: {
+            /** Free Bytes */
+            free_bytes: number;
+            /** Recordings */
+            recordings: components["schemas"]["RecordingInfo"][];
+            /**
+             * Reserve Bytes
+             * @description a recording ends when less is free
+             */
+            reserve_bytes: number;
+            retention: components["schemas"]["RetentionBounds"];
+        };
+        /**
          * Refused
          * @description A message of the page could not be carried out.
          */
@@ -2138,6 +3245,16 @@ export interface components {
              * @constant
              */
             type: "refused";
+        };
+        /**
+         * RetentionBounds
+         * @description When the oldest recordings are deleted; null: never.
+         */
+        RetentionBounds: {
+            /** Keep Days */
+            keep_days: number | null;
+            /** Max Total Bytes */
+            max_total_bytes: number | null;
         };
         /**
          * SaveSetRequest
@@ -2361,6 +3478,45 @@ export interface components {
             serial: number | null;
         };
         /**
+         * StartRecording
+         * @description What to record.
+         */
+        StartRecording: {
+            /** Channels */
+            channels: components["schemas"]["RecordChannel"][];
+            /** Duration S */
+            duration_s?: number | null;
+            /**
+             * Name
+             * @description empty: the date and time
+             * @default
+             */
+            name: string;
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /**
+             * Period S
+             * @description polled signals; 0: as fast as
+             * @default 0
+             */
+            period_s: number;
+            /**
+             * Pre S
+             * @description kept from before the trigger
+             * @default 0
+             */
+            pre_s: number;
+            /**
+             * Tags
+             * @default []
+             */
+            tags: string[];
+            trigger?: components["schemas"]["RecordTrigger"] | null;
+        };
+        /**
          * StateChanged
          * @description Axis state, at 10 Hz at most.
          */
@@ -2372,6 +3528,62 @@ export interface components {
              * @constant
              */
             type: "state";
+        };
+        /**
+         * StepRequest
+         * @description A step of speed (rpm) or a move (rev).
+         */
+        StepRequest: {
+            /**
+             * Acceleration
+             * @default 6000
+             */
+            acceleration: number;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /**
+             * Hold S
+             * @default 0.25
+             */
+            hold_s: number;
+            /**
+             * Kind
+             * @default speed
+             * @enum {string}
+             */
+            kind: "speed" | "move";
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Size
+             * @default 100
+             */
+            size: number;
+            /**
+             * Speed
+             * @default 300
+             */
+            speed: number;
+            /** Speed Limit */
+            speed_limit: number;
+            /**
+             * Time Limit S
+             * @default 60
+             */
+            time_limit_s: number;
+            /** Torque Limit */
+            torque_limit: number;
+            /** Travel Limit */
+            travel_limit: number;
+            /** Window */
+            window?: number | null;
         };
         /**
          * StopAll
@@ -2414,6 +3626,69 @@ export interface components {
             stopped: string[];
         };
         /**
+         * SweepRequest
+         * @description Frequency response.
+         */
+        SweepRequest: {
+            /**
+             * Base Motion
+             * @default true
+             */
+            base_motion: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /** F Max Hz */
+            f_max_hz?: number | null;
+            /**
+             * F Min Hz
+             * @default 5
+             */
+            f_min_hz: number;
+            /**
+             * Kind
+             * @default mechanics
+             * @enum {string}
+             */
+            kind: "mechanics" | "speed_loop" | "position_loop";
+            /**
+             * Loop
+             * @default auto
+             * @enum {string}
+             */
+            loop: "auto" | "none" | "speed" | "position";
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Realisations
+             * @default 2
+             */
+            realisations: number;
+            /**
+             * Share
+             * @description of the permitted torque
+             * @default 0.35
+             */
+            share: number;
+            /** Speed Limit */
+            speed_limit: number;
+            /**
+             * Time Limit S
+             * @default 60
+             */
+            time_limit_s: number;
+            /** Torque Limit */
+            torque_limit: number;
+            /** Travel Limit */
+            travel_limit: number;
+        };
+        /**
          * TransitionRequest
          * @description Drive the CiA 402 state machine to a state.
          */
@@ -2428,6 +3703,16 @@ export interface components {
              * @description mode of operation to set before
              */
             mode?: number | null;
+        };
+        /**
+         * Undo
+         * @description Raw values that were there before; writing them back undoes the change.
+         */
+        Undo: {
+            /** Before */
+            before: {
+                [key: string]: number;
+            };
         };
         /**
          * ValuesChanged
@@ -2500,8 +3785,16 @@ export interface components {
     pathItems: never;
 }
 export type ActiveFault = components['schemas']['ActiveFault'];
+export type ArmRequest = components['schemas']['ArmRequest'];
+export type AutotuneRequest = components['schemas']['AutotuneRequest'];
 export type AxisState = components['schemas']['AxisState'];
+export type BundleInfo = components['schemas']['BundleInfo'];
+export type BundleList = components['schemas']['BundleList'];
+export type BundleRequest = components['schemas']['BundleRequest'];
 export type Bus = components['schemas']['Bus'];
+export type CandidatesInfo = components['schemas']['CandidatesInfo'];
+export type CandidatesRequest = components['schemas']['CandidatesRequest'];
+export type ChangeRecording = components['schemas']['ChangeRecording'];
 export type ConnectRequest = components['schemas']['ConnectRequest'];
 export type CyclicInfo = components['schemas']['CyclicInfo'];
 export type CyclicRequest = components['schemas']['CyclicRequest'];
@@ -2512,6 +3805,9 @@ export type DriveSummary = components['schemas']['DriveSummary'];
 export type DriveUpdate = components['schemas']['DriveUpdate'];
 export type DrivesChanged = components['schemas']['DrivesChanged'];
 export type FoundDrive = components['schemas']['FoundDrive'];
+export type GainInfo = components['schemas']['GainInfo'];
+export type GainValues = components['schemas']['GainValues'];
+export type GainWrite = components['schemas']['GainWrite'];
 export type GenerateRequest = components['schemas']['GenerateRequest'];
 export type Health = components['schemas']['Health'];
 export type Hello = components['schemas']['Hello'];
@@ -2519,6 +3815,7 @@ export type HomeRequest = components['schemas']['HomeRequest'];
 export type HomingMethodInfo = components['schemas']['HomingMethodInfo'];
 export type ImportFinding = components['schemas']['ImportFinding'];
 export type ImportedDescription = components['schemas']['ImportedDescription'];
+export type InertiaRequest = components['schemas']['InertiaRequest'];
 export type Interfaces = components['schemas']['Interfaces'];
 export type JobChanged = components['schemas']['JobChanged'];
 export type JobInfo = components['schemas']['JobInfo'];
@@ -2534,9 +3831,16 @@ export type LineSearchResult = components['schemas']['LineSearchResult'];
 export type LoadSetRequest = components['schemas']['LoadSetRequest'];
 export type LogEntry = components['schemas']['LogEntry'];
 export type Logged = components['schemas']['Logged'];
+export type MeasurementContent = components['schemas']['MeasurementContent'];
+export type MeasurementInfo = components['schemas']['MeasurementInfo'];
 export type MissingPort = components['schemas']['MissingPort'];
 export type MoveRequest = components['schemas']['MoveRequest'];
 export type NetworkInterface = components['schemas']['NetworkInterface'];
+export type NotchPreviewInfo = components['schemas']['NotchPreviewInfo'];
+export type NotchPreviewRequest = components['schemas']['NotchPreviewRequest'];
+export type NotchShape = components['schemas']['NotchShape'];
+export type NotchSlotInfo = components['schemas']['NotchSlotInfo'];
+export type NotchWrite = components['schemas']['NotchWrite'];
 export type ParameterRow = components['schemas']['ParameterRow'];
 export type ParameterValue = components['schemas']['ParameterValue'];
 export type ParameterWrite = components['schemas']['ParameterWrite'];
@@ -2545,6 +3849,8 @@ export type Ping = components['schemas']['Ping'];
 export type Pong = components['schemas']['Pong'];
 export type PortInfo = components['schemas']['PortInfo'];
 export type PortRequest = components['schemas']['PortRequest'];
+export type PredictRequest = components['schemas']['PredictRequest'];
+export type PredictionInfo = components['schemas']['PredictionInfo'];
 export type Problem = components['schemas']['Problem'];
 export type ProcedureInfo = components['schemas']['ProcedureInfo'];
 export type ProcedureRequest = components['schemas']['ProcedureRequest'];
@@ -2553,7 +3859,18 @@ export type ProfileMatch = components['schemas']['ProfileMatch'];
 export type Quality = components['schemas']['Quality'];
 export type ReadAllRequest = components['schemas']['ReadAllRequest'];
 export type ReadDictionaryRequest = components['schemas']['ReadDictionaryRequest'];
+export type RealisedInfo = components['schemas']['RealisedInfo'];
+export type RecordChannel = components['schemas']['RecordChannel'];
+export type RecordTrigger = components['schemas']['RecordTrigger'];
+export type RecordedAxis = components['schemas']['RecordedAxis'];
+export type RecordedChannel = components['schemas']['RecordedChannel'];
+export type RecordedParameter = components['schemas']['RecordedParameter'];
+export type RecordingDetail = components['schemas']['RecordingDetail'];
+export type RecordingEvent = components['schemas']['RecordingEvent'];
+export type RecordingInfo = components['schemas']['RecordingInfo'];
+export type RecordingList = components['schemas']['RecordingList'];
 export type Refused = components['schemas']['Refused'];
+export type RetentionBounds = components['schemas']['RetentionBounds'];
 export type SaveSetRequest = components['schemas']['SaveSetRequest'];
 export type ScanRequest = components['schemas']['ScanRequest'];
 export type ScopeChannel = components['schemas']['ScopeChannel'];
@@ -2565,17 +3882,399 @@ export type SequenceRequest = components['schemas']['SequenceRequest'];
 export type SerialPort = components['schemas']['SerialPort'];
 export type Session = components['schemas']['Session'];
 export type SetFileInfo = components['schemas']['SetFileInfo'];
+export type StartRecording = components['schemas']['StartRecording'];
 export type StateChanged = components['schemas']['StateChanged'];
+export type StepRequest = components['schemas']['StepRequest'];
 export type StopAll = components['schemas']['StopAll'];
 export type StopRequest = components['schemas']['StopRequest'];
 export type StopResult = components['schemas']['StopResult'];
+export type SweepRequest = components['schemas']['SweepRequest'];
 export type TransitionRequest = components['schemas']['TransitionRequest'];
+export type Undo = components['schemas']['Undo'];
 export type ValuesChanged = components['schemas']['ValuesChanged'];
 export type WatchState = components['schemas']['WatchState'];
 export type WatchValues = components['schemas']['WatchValues'];
 export type WriteResult = components['schemas']['WriteResult'];
 export type $defs = Record<string, never>;
 export interface operations {
+    list_bundles: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BundleList"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    make_bundle: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BundleRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BundleInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    arm_capture: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ArmRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ArmRequest"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    download_bundle: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    delete_bundle: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     buses: {
         parameters: {
             query?: never;
@@ -3746,6 +5445,164 @@ export interface operations {
             };
         };
     };
+    read_gains: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GainInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    write_gains: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["GainWrite"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Undo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     homing_methods: {
         parameters: {
             query?: never;
@@ -3764,6 +5621,88 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HomingMethodInfo"][];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_autotune: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["AutotuneRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
                 };
             };
             /** @description No such thing */
@@ -3918,6 +5857,88 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["HomeRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_inertia: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["InertiaRequest"];
             };
         };
         responses: {
@@ -4312,6 +6333,170 @@ export interface operations {
             };
         };
     };
+    start_step: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["StepRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_sweep: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SweepRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     drive_log: {
         parameters: {
             query?: never;
@@ -4406,6 +6591,244 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MissingPort"][];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_notches: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NotchSlotInfo"][];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    write_notches: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NotchWrite"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Undo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    preview_notches: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NotchPreviewRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NotchPreviewInfo"];
                 };
             };
             /** @description No such thing */
@@ -5263,6 +7686,248 @@ export interface operations {
             };
         };
     };
+    candidates: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CandidatesRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CandidatesInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    predict: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PredictRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PredictionInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    undo_tuning: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Undo"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Undo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     health: {
         parameters: {
             query?: never;
@@ -5713,6 +8378,380 @@ export interface operations {
             };
         };
     };
+    list_measurements: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MeasurementInfo"][];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    upload_measurement: {
+        parameters: {
+            query: {
+                name: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MeasurementInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_measurement: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MeasurementContent"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    delete_measurement: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    download_measurement: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     profiles: {
         parameters: {
             query?: never;
@@ -5885,6 +8924,846 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_recordings: {
+        parameters: {
+            query?: {
+                search?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RecordingList"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["StartRecording"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RecordingInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    set_retention: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["RetentionBounds"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RetentionBounds"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    get_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RecordingDetail"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    delete_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    change_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ChangeRecording"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RecordingInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    download_export: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+                kind: "csv" | "rrd" | "mcap";
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    export_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+                kind: "csv" | "rrd" | "mcap";
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    download_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    stop_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RecordingInfo"] | null;
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    trigger_recording: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RecordingInfo"];
+                };
             };
             /** @description No such thing */
             404: {
