@@ -14,6 +14,7 @@ export default defineConfig({
   server: {
     proxy: {
       '/api': { target: process.env.SERVODECK_SERVER ?? 'http://127.0.0.1:8000', ws: true },
+      '/rerun': { target: process.env.SERVODECK_SERVER ?? 'http://127.0.0.1:8000', ws: true },
     },
   },
   test: { environment: 'node', include: ['src/**/*.test.ts'] },

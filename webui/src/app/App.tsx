@@ -10,6 +10,7 @@ import { IoPage } from '../pages/io/IoPage'
 import { MotionPage } from '../pages/motion/MotionPage'
 import { OverviewPage } from '../pages/overview/OverviewPage'
 import { ParametersPage } from '../pages/parameters/ParametersPage'
+import { RerunPage } from '../pages/rerun/RerunPage'
 import { ScopePage } from '../pages/scope/ScopePage'
 import { Frame } from './Frame'
 import { isAxisPage, useRoute } from './router'
@@ -32,7 +33,7 @@ const AXIS = {
   io: IoPage,
   alarms: AlarmsPage,
 }
-const BENCH = { connect: ConnectPage, scope: ScopePage, files: FilesPage }
+const BENCH = { connect: ConnectPage, scope: ScopePage, rerun: RerunPage, files: FilesPage }
 
 function Page() {
   const t = useT()

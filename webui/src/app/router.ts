@@ -1,7 +1,7 @@
 import { useSyncExternalStore } from 'react'
 
 export const AXIS_PAGES = ['overview', 'parameters', 'motion', 'io', 'alarms'] as const
-export const BENCH_PAGES = ['connect', 'scope', 'files'] as const
+export const BENCH_PAGES = ['connect', 'scope', 'rerun', 'files'] as const
 export type AxisPage = (typeof AXIS_PAGES)[number]
 export type BenchPage = (typeof BENCH_PAGES)[number]
 export type Page = AxisPage | BenchPage

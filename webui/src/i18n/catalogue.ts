@@ -3,7 +3,8 @@ import { bench } from './texts/bench'
 import { frame } from './texts/frame'
 import { notListed } from './texts/notlisted'
 import { parameters } from './texts/parameters'
+import { recordings } from './texts/recordings'
 
 /** Every text of the page, in every language. A key that is not here does not compile. */
-export const catalogue = { ...frame, ...bench, ...axis, ...parameters, ...notListed }
+export const catalogue = { ...frame, ...bench, ...axis, ...parameters, ...recordings, ...notListed }
 export type Key = keyof typeof catalogue

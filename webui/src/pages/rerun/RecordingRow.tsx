@@ -1,0 +1,134 @@
+import { ActionIcon, Button, Modal } from '@mantine/core'
+import { useState } from 'react'
+import { api, API_ROOT, ask } from '../../api/client'
+import type { JobInfo, RecordingInfo } from '../../api/schema'
+import { useT } from '../../i18n'
+import { dateTime, duration } from '../../widgets/format'
+import { Icon } from '../../widgets/Icon'
+import { JobNote, useJobEnd } from '../../widgets/JobNote'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { size } from './viewer'
+
+type Kind = 'csv' | 'rrd' | 'mcap'
+
+/** One recording: what it is, end, open, export, delete. */
+export function RecordingRow({
+  recording,
+  onOpen,
+  onChanged,
+}: {
+  recording: RecordingInfo
+  onOpen: () => void
+  onChanged: () => void
+}) {
+  const t = useT()
+  const act = useAction()
+  const { name } = recording
+  const running = recording.state === 'recording' || recording.state === 'waiting'
+  const [deleting, setDeleting] = useState(false)
+  const [job, setJob] = useState<{ id: string; kind: Kind; open: boolean } | null>(null)
+  const path = { params: { path: { name } } }
+  useJobEnd(job?.id ?? null, (ended: JobInfo) => {
+    if (ended.state !== 'done' || job === null) return
+    onChanged()
+    if (job.open) onOpen()
+    else fetchFile(name, job.kind)
+  })
+  const need = (kind: Kind, open: boolean) =>
+    act.run(async () => {
+      if (recording.exports.includes(kind)) {
+        if (open) onOpen()
+        else fetchFile(name, kind)
+        return
+      }
+      const started = await ask(
+        api.POST('/api/v1/recordings/{name}/exports/{kind}', {
+          params: { path: { name, kind } },
+        }),
+      )
+      setJob({ id: started.id, kind, open })
+    })
+  return (
+    <article className="set">
+      <div className="grow">
+        <strong>{name}</strong>
+        <p className={recording.problem ? 'warn-text' : 'dim'}>
+          {t(`recordings.state.${recording.state}`)} · {dateTime(recording.created)} ·{' '}
+          {t('recordings.facts', {
+            duration: duration(recording.duration_s),
+            samples: recording.samples,
+            size: size(recording.bytes),
+          })}
+          {recording.lost > 0 && ` · ${t('recordings.lost', { count: recording.lost })}`}{' '}
+          {recording.problem}
+        </p>
+        {recording.notes && <p className="notes">{recording.notes}</p>}
+        <ProblemNote problem={act.problem} onClose={act.clear} />
+        <JobNote id={job?.id ?? null} onClose={() => setJob(null)} />
+      </div>
+      {running ? (
+        <Button
+          loading={act.busy}
+          onClick={() =>
+            void act
+              .run(() => ask(api.POST('/api/v1/recordings/{name}/stop', path)))
+              .then(onChanged)
+          }
+        >
+          {t('recordings.stop')}
+        </Button>
+      ) : (
+        recording.state !== 'unusable' && (
+          <>
+            <Button onClick={() => void need('rrd', true)}>{t('recordings.open')}</Button>
+            {(['csv', 'rrd', 'mcap'] as const).map((kind) => (
+              <Button
+                key={kind}
+                leftSection={<Icon name="download" />}
+                aria-label={`${t('recordings.export', { kind: kind.toUpperCase() })}: ${name}`}
+                onClick={() => void need(kind, false)}
+              >
+                {kind.toUpperCase()}
+              </Button>
+            ))}
+          </>
+        )
+      )}
+      {!running && (
+        <ActionIcon aria-label={t('recordings.delete', { name })} onClick={() => setDeleting(true)}>
+          <Icon name="cross" />
+        </ActionIcon>
+      )}
+      {deleting && (
+        <Modal opened onClose={() => setDeleting(false)} title={t('recordings.delete', { name })}>
+          <p>{t('recordings.deleteText')}</p>
+          <div className="row end">
+            <Button onClick={() => setDeleting(false)}>{t('cancel')}</Button>
+            <Button
+              color="red"
+              variant="filled"
+              loading={act.busy}
+              onClick={() => {
+                setDeleting(false)
+                void act
+                  .run(() => ask(api.DELETE('/api/v1/recordings/{name}', path)))
+                  .then(onChanged)
+              }}
+            >
+              {t('recordings.deleteNow')}
+            </Button>
+          </div>
+        </Modal>
+      )}
+    </article>
+  )
+}
+
+/** Let the browser fetch the file itself: it may be larger than a page should hold. */
+function fetchFile(name: string, kind: Kind): void {
+  const anchor = document.createElement('a')
+  anchor.href = `${API_ROOT}/api/v1/recordings/${encodeURIComponent(name)}/exports/${kind}`
+  anchor.download = ''
+  anchor.click()
+}

@@ -1,0 +1,53 @@
+import { useComputedColorScheme } from '@mantine/core'
+import { useEffect, useRef } from 'react'
+import { stopEverything } from '../../app/stop'
+import { useT } from '../../i18n'
+import { LOADING, size, useViewer, viewerUrl } from './viewer'
+
+/** rerun's own viewer in a frame of our origin; `recording` null shows what happens now. */
+export function Viewer({ recording }: { recording: string | null }) {
+  const t = useT()
+  const theme = useComputedColorScheme('dark')
+  const frame = useRef<HTMLIFrameElement>(null)
+  const [state, setState] = useViewer()
+  useEffect(() => setState(LOADING), [recording, setState])
+  const words = {
+    loading: t('rerun.loading', { percent: Math.round(state.fraction * 100) }),
+    started: t('rerun.started'),
+    live: t('rerun.showing', { size: size(state.bytes) }),
+    stored: t('rerun.stored', { name: recording ?? '' }),
+    lost: t('rerun.lost'),
+    broken: t('rerun.broken'),
+  }[state.phase]
+  return (
+    <>
+      <p
+        className={state.phase === 'broken' ? 'note fault' : 'dim'}
+        role="status"
+        data-phase={state.phase}
+        data-blobs={state.blobs}
+      >
+        {words} {state.problem}
+      </p>
+      {state.dropped > 0 && (
+        <p className="note warn">{t('rerun.dropped', { count: state.dropped })}</p>
+      )}
+      <iframe
+        ref={frame}
+        className="viewer"
+        title={t('rerun.title')}
+        src={viewerUrl(recording, theme)}
+        onLoad={() => {
+          // Keys pressed in the frame do not come to the page; Esc must stop from there too.
+          frame.current?.contentWindow?.addEventListener(
+            'keydown',
+            (event) => {
+              if (event.key === 'Escape' && !event.repeat) void stopEverything()
+            },
+            { capture: true },
+          )
+        }}
+      />
+    </>
+  )
+}
