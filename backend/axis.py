@@ -14,12 +14,20 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 from backend.cyclic import CyclicSession
-from backend.drive import Drive
+from backend.drive import Drive, Reading, address_of
 from backend.faults import active_faults, fault_keys
 from backend.units import AxisUnits, read_units
 from drivers import cia402
 from drivers.cia402 import Mode, State
-from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange
+from drivers.codec import encode
+from drivers.errors import (
+    DriveError,
+    LinkLost,
+    LinkTimeout,
+    NotAllowed,
+    OutOfRange,
+    ProtocolError,
+)
 from drivers.link import OwnsPowerState
 from profiles.schema import Fault, Raw
 
@@ -60,14 +68,37 @@ class Axis:
         self.session: CyclicSession | None = None
         #: STOP was pressed: no word that enables may be sent until a new command is given.
         self.stopped = False
+        #: A stop did not reach the drive; `repeat_stop` sends it again once the drive answers.
+        self.owes_stop = False
+        self._unit_raws: dict[str, Raw | None] = {}
+        drive.listen(self._units_may_have_changed)
+
+    def permit(self) -> None:
+        """A person gave a new command: enabling is allowed again, until the next STOP.
+
+        Never called by work in progress, so that nothing enables again what was stopped.
+        """
+        self.stopped = False
 
     # --- words ------------------------------------------------------------------------
 
     async def units(self) -> AxisUnits:
         """Units with the present gearing, read once until `forget`."""
         if self._units is None:
-            self._units = await read_units(self.drive)
+            units = await read_units(self.drive)
+            known = self.drive.readings
+            self._unit_raws = {
+                key: known[key].raw for key in self.drive.profile.unit_keys if key in known
+            }
+            self._units = units
         return self._units
+
+    def _units_may_have_changed(self, readings: list[Reading]) -> None:
+        """Whoever wrote the gearing (a page, a set, the panel): units are read anew."""
+        for reading in readings:
+            known = self._unit_raws.get(reading.key)
+            if known is not None and reading.raw is not None and reading.raw != known:
+                self._units = None
 
     def forget(self) -> None:
         """The drive restarted or its gearing changed."""
@@ -155,6 +186,9 @@ class Axis:
     async def go_to(self, goal: State, timeout_s: float = STATE_TIMEOUT_S) -> State:
         """Walk the state machine to ``goal``, one transition after the other.
 
+        A fault is reset only on the way to Switch on disabled: enabling never resets one, so
+        that a drive which trips on being enabled is not enabled again and again.
+
         Raises:
             NotAllowed: the drive stays where it is; the message gives the cause that is known.
         """
@@ -166,6 +200,9 @@ class Axis:
         while (word := cia402.next_control_word(state, goal, self.control_word)) is not None or (
             state is not goal
         ):
+            faulty = state in (State.FAULT, State.FAULT_REACTION)
+            if (faulty and goal is not State.SWITCH_ON_DISABLED) or time.monotonic() > deadline:
+                raise await self._refused(state, goal)
             if word is not None:
                 await self.control(word)
                 if self._enable_pause_s:
@@ -181,6 +218,24 @@ class Axis:
             if state is before:
                 raise await self._refused(state, goal)
         return state
+
+    async def transition(self, goal: State, mode: Mode | None) -> None:
+        """Change power state and, where given, the mode, without moving.
+
+        Raises:
+            NotAllowed: the drive stays where it is, or STOP was pressed meanwhile.
+        """
+        await self._require_stop_delivered()
+        # In a running exchange the loop keeps the set-points where the axis stands.
+        aims = self.cyclic_power() is None
+        if mode is not None:
+            if aims:
+                # An axis that is enabled already would follow a stale set-point of the new mode.
+                await self.aim_here(mode)
+            await self.set_mode(mode)
+        if goal is State.OPERATION_ENABLED and aims:
+            await self.aim_here()
+        await self.go_to(goal)
 
     async def _refused(self, state: State, goal: State) -> NotAllowed:
         causes = await self.blocked_by()
@@ -219,6 +274,8 @@ class Axis:
     async def reset_fault(self) -> State:
         """Rising edge of the fault-reset bit, then Switch on disabled.
 
+        Does nothing to an axis that has no fault: the words would cut the power of one that moves.
+
         Raises:
             NotAllowed: the fault is still present.
         """
@@ -230,6 +287,8 @@ class Axis:
                 if time.monotonic() > deadline:
                     raise await self._refused(state, State.SWITCH_ON_DISABLED)
                 await asyncio.sleep(_POLL_S)
+            return state
+        if (state := await self.state()) not in (State.FAULT, State.FAULT_REACTION):
             return state
         await self.control(cia402.DISABLE_VOLTAGE)
         return await self.go_to(State.SWITCH_ON_DISABLED)
@@ -269,11 +328,49 @@ class Axis:
         await self.quick_stop()
 
     async def quick_stop(self) -> None:
-        """Stop now, by one write; harmless when nothing moves."""
-        if self.session is not None and self.cyclic_power() is not None:
-            await self.session.cyclic.halt(self.session.station(self.drive))
-            return
-        await self.control(cia402.QUICK_STOP)
+        """Stop now, by one write; harmless when nothing moves.
+
+        Where it does not reach the drive, `owes_stop` is set.
+        """
+        try:
+            if self.session is not None and self.cyclic_power() is not None:
+                await self.session.cyclic.halt(self.session.station(self.drive))
+            else:
+                await self._quick_stop_by_any_port()
+        except (LinkLost, LinkTimeout, ProtocolError):
+            self.owes_stop = True
+            raise
+        self.owes_stop = False
+
+    async def _quick_stop_by_any_port(self) -> None:
+        """The first port's error is raised when no port takes the word."""
+        drive = self.drive
+        key = drive.require("control_word")
+        try:
+            await self.control(cia402.QUICK_STOP)
+        except (LinkLost, LinkTimeout, ProtocolError):
+            parameter = drive.parameter(key)
+            first = drive.port_for(parameter)
+            data = encode(parameter.type, cia402.QUICK_STOP)
+            for port in drive.ports:
+                if port is first or not port.carries(parameter):
+                    continue
+                try:
+                    await port.link.write(port.station, address_of(parameter), data)
+                except DriveError:
+                    continue
+                return
+            raise
+
+    async def repeat_stop(self) -> bool:
+        """Send the stop that is owed; returns whether one was owed and is delivered now."""
+        if not self.owes_stop:
+            return False
+        try:
+            await self.quick_stop()
+        except DriveError:
+            return False
+        return True
 
     async def halt_and_wait(self, timeout_s: float) -> None:
         """Halt (bit 8) and wait for standstill; quick stop if the axis does not slow down.
@@ -285,6 +382,10 @@ class Axis:
         if await self.standstill(timeout_s):
             return
         await self.quick_stop()
+        await self._require_rest(timeout_s)
+
+    async def _require_rest(self, timeout_s: float) -> None:
+        """Raises LinkTimeout when the axis still moves after a quick stop."""
         if not await self.standstill(timeout_s):
             raise LinkTimeout(
                 f"{self.drive.name} still moves {timeout_s:g} s after quick stop",
@@ -322,14 +423,40 @@ class Axis:
                 before[key] = reading.raw
         try:
             yield before
-        finally:
-            await shielded(lambda: self._restore(before), CLEANUP_TIMEOUT_S, self.drive.name)
+        except BaseException as error:
+            await self._put_back(before, error)
+            raise
+        else:
+            await self._put_back(before, None)
+
+    async def _put_back(self, before: dict[str, Raw], earlier: BaseException | None) -> None:
+        """Restore; what failed before is told as well, it may be an inner restore."""
+        name = self.drive.name
+        try:
+            await shielded(lambda: self._restore(before), CLEANUP_TIMEOUT_S, name)
+        except DriveError as error:
+            if not isinstance(error, RestoreFailed):
+                values = ", ".join(f"{key} (was {raw})" for key, raw in before.items())
+                error = RestoreFailed(
+                    f"{name}: perhaps not restored: {values}: {error.message}",
+                    drive=name,
+                    remedy="compare these values before the next motion",
+                )
+            if isinstance(earlier, DriveError):
+                error.message = f"{earlier.message}; {error.message}"
+                error.args = (error.message,)
+            raise error from earlier
 
     async def _restore(self, before: dict[str, Raw]) -> None:
         failed: list[str] = []
+        same = False
         for key, raw in before.items():
             try:
                 if (await self.drive.read(key)).raw != raw:
+                    if not same:
+                        # The link may have been lost in between, and another drive be there now.
+                        await self.drive.confirm_identity()
+                        same = True
                     await self.drive.write(key, raw)
             except DriveError as error:
                 failed.append(f"{key} (was {raw}): {error.message}")
@@ -358,7 +485,7 @@ class Axis:
                 drive=drive.name,
                 remedy="end the cyclic exchange, or use CSP, CSV or CST",
             )
-        self.stopped = False
+        await self._require_stop_delivered()
         before = await self.state()
         if before is State.OPERATION_ENABLED and not await self.standstill(0.5):
             raise NotAllowed(
@@ -371,16 +498,39 @@ class Axis:
             for role in ("torque_limit_positive", "torque_limit_negative", "max_torque")
             if (key := drive.key(role)) is not None
         ]
-        async with self.restoring(*limits, *await self._restorable_mode()):
+        mode_keys = await self._restorable_mode()
+        async with self.restoring(*limits, *mode_keys) as earlier:
+            shown = next((earlier[key] for key in mode_keys if key in earlier), None)
+            previous = Mode(int(shown)) if shown in set(Mode) else mode
             await self._limit_torque(limits, envelope.torque_percent)
+            # A stale set-point must not start to move the axis: neither at the change of mode,
+            # where it is enabled already, nor when it is enabled.
+            await self.aim_here(mode)
             await self.set_mode(mode)
-            # A stale set-point must not start to move the axis when it is enabled.
             await self.aim_here(mode)
             try:
                 await self.go_to(State.OPERATION_ENABLED)
                 yield
             finally:
-                await shielded(lambda: self._leave(before, mode), CLEANUP_TIMEOUT_S, drive.name)
+                await self._leaving(before, mode, previous)
+
+    async def _require_stop_delivered(self) -> None:
+        """A stop that did not reach the drive comes before any new command.
+
+        Raises:
+            DriveError: it still does not reach it.
+        """
+        if self.owes_stop:
+            await self.quick_stop()
+
+    async def _leaving(self, before: State, mode: Mode, previous: Mode) -> None:
+        try:
+            await shielded(
+                lambda: self._leave(before, mode, previous), CLEANUP_TIMEOUT_S, self.drive.name
+            )
+        except (LinkLost, LinkTimeout, ProtocolError):
+            self.owes_stop = True
+            raise
 
     async def _restorable_mode(self) -> list[str]:
         """The mode's key, unless the drive shows one that cannot be written (none, at power-on)."""
@@ -402,8 +552,13 @@ class Axis:
             raw = int(min(raw, raw if high is None else high))
             raw = int(max(raw, raw if low is None else low))
             current = (await self.drive.read(key)).raw
-            if isinstance(current, int) and current > raw:
+            if not isinstance(current, int):
+                continue
+            if current > raw:
                 await self.drive.write(key, raw)
+            elif current < -raw:
+                # Families that keep the limit of negative torque as a negative number.
+                await self.drive.write(key, -raw)
 
     async def aim_here(self, mode: Mode | None = None) -> None:
         """Set-point to "stay": of ``mode``, or of the mode that the drive shows."""
@@ -423,19 +578,37 @@ class Axis:
         if role and (key := drive.key(role)) is not None:
             await drive.command(key, value)
 
-    async def _leave(self, before: State, mode: Mode) -> None:
+    async def _leave(self, before: State, mode: Mode, previous: Mode) -> None:
+        """To rest, and to the power state of before; after STOP, to Switch on disabled."""
+        if not self.stopped:
+            try:
+                await self._leave_as_before(before, mode, previous)
+            except NotAllowed:
+                # STOP in the middle of it refuses the words that are still to come.
+                if not self.stopped:
+                    raise
+            if not self.stopped:
+                return
         state = await self.state()
-        if self.stopped:
-            await self.standstill(CLEANUP_TIMEOUT_S / 2)
-            if state not in (State.FAULT, State.FAULT_REACTION):
-                await self.go_to(State.SWITCH_ON_DISABLED)
+        if state is State.OPERATION_ENABLED:
+            # The write of STOP itself is still under way, or was lost.
+            await self.quick_stop()
+        if state in (State.FAULT, State.FAULT_REACTION):
             return
+        # Without power an axis that still moves would coast.
+        await self._require_rest(CLEANUP_TIMEOUT_S / 2)
+        await self.go_to(State.SWITCH_ON_DISABLED)
+
+    async def _leave_as_before(self, before: State, mode: Mode, previous: Mode) -> None:
+        state = await self.state()
         if state is State.OPERATION_ENABLED:
             await self.halt_and_wait(CLEANUP_TIMEOUT_S / 2)
             state = await self.state()
         if before is State.OPERATION_ENABLED and state is State.OPERATION_ENABLED:
-            # Halt is released only onto a set-point that is where the axis stands.
-            await self.aim_here(mode)
+            # Halt is released only onto a set-point that is where the axis stands, in this
+            # mode and in the one that comes back.
+            for aimed in dict.fromkeys((mode, previous)):
+                await self.aim_here(aimed)
             if mode is Mode.PP:
                 stay = cia402.ENABLE_OPERATION | cia402.HALT | cia402.CHANGE_IMMEDIATELY
                 await self.control(stay | cia402.NEW_SET_POINT)

@@ -22,8 +22,8 @@ from backend.library import SetLibrary
 from backend.measurements import MeasurementStore
 from backend.monitor import Monitor, Snapshot
 from backend.scope import ScopeHub
-from drivers.errors import Busy, DriveError, NotAllowed, Rejected
-from drivers.link import Address, Found, Link, LinkEvent, NeedsProfile
+from drivers.errors import Busy, DriveError, NotAllowed
+from drivers.link import Found, Link, LinkEvent, NeedsProfile
 from drivers.modbus.link import RegisterLink
 from drivers.urls import link_for
 from profiles import load_all, load_profile
@@ -63,19 +63,6 @@ def match_profiles(kind: str, found: Found) -> list[Match]:
     return sorted(matches, key=lambda m: order.index(m.confidence))
 
 
-async def read_serial(drive: Drive) -> int | None:
-    """Serial number of the drive that answers now (1018h:04), or None where it has none."""
-    for port in drive.ports:
-        if port.link.kind == "modbus":
-            continue
-        try:
-            data = await port.link.read(port.station, Address(0x1018, 4, "UINT32"))
-        except (Rejected, NotAllowed):
-            continue
-        return int.from_bytes(data, "little") or None
-    return None
-
-
 class Member:
     """A drive of the bench with its axis and monitor."""
 
@@ -107,7 +94,9 @@ class Bench:
         self.on_readings: list[Callable[[str, list[Reading]], None]] = []
         self.on_job: list[Callable[[Job], None]] = []
         self.on_drives: list[Callable[[], None]] = []
-        self.jobs = JobRunner(self._job_changed)
+        self.jobs = JobRunner(self._job_changed, self._permit)
+        self._stops: set[asyncio.Task[dict[str, str]]] = set()
+        self._changing: set[str] = set()
         self.leases = Leases(lambda _drive: self._drives_changed())
         self.scope = ScopeHub(lambda drive: self.member(drive).axis)
         self.state_folder = state_folder
@@ -215,12 +204,18 @@ class Bench:
             raise NotAllowed(f"{url} has no connected drives", remedy="connect a drive first")
         for member in users:
             self.require_idle(member)
+        if url in self._changing:
+            raise Busy(f"{url}: the cyclic exchange is just being changed", remedy="wait for it")
         if (old := self.sessions.get(url)) is not None:
             if old.running:
                 raise Busy(f"{url}: the cyclic exchange runs already", remedy="end it first")
             await self.stop_cyclic(url)
         session = CyclicSession(link, [m.drive for m in users])
-        await session.start(cycle_s)
+        self._changing.add(url)
+        try:
+            await session.start(cycle_s)
+        finally:
+            self._changing.discard(url)
         self.sessions[url] = session
         for member in users:
             member.axis.session = session
@@ -390,20 +385,47 @@ class Bench:
             drive_id, number = f"{stem}-{number}", number + 1
         return drive_id
 
-    # --- stopping ---------------------------------------------------------------------
+    # --- moving and stopping ----------------------------------------------------------
+
+    def _permit(self, drive_id: str) -> None:
+        """A new motion begins by a person's command; it takes back an earlier STOP.
+
+        Raises:
+            Busy: the exchange of its bus is being started or ended.
+        """
+        member = self.member(drive_id)
+        busy = self._changing.intersection(self._urls(member.drive))
+        if busy:
+            raise Busy(
+                f"{member.drive.name}: the cyclic exchange of {', '.join(busy)} is just being "
+                "started or ended",
+                drive=member.drive.name,
+                remedy="try again when it has",
+            )
+        member.axis.permit()
 
     async def stop(self, drive_ids: Sequence[str]) -> dict[str, str]:
         """Quick stop of these drives, all at once; motion jobs are cancelled.
 
-        The write does not wait for any job's cleanup. Returns drive id to problem, empty text
-        where the drive took the stop.
+        The write does not wait for any job's cleanup, and goes out even when whoever asked for
+        it is gone by then. Returns drive id to problem, empty text where the drive took the stop.
         """
-
-        async def one(member: Member) -> str:
-            problem = ""
-            if (job := self.jobs.moving(member.drive.id)) is not None and job.task is not None:
+        members = [self.member(drive_id) for drive_id in drive_ids]
+        for member in members:
+            # Before anything else runs: nothing in progress may enable the axis from here on.
+            member.axis.stopped = True
+            job = self.jobs.moving(member.drive.id)
+            if job is not None and job.stoppable and job.task is not None:
                 # Cancelled before the write, so that it sends nothing after it but its cleanup.
                 job.task.cancel()
+        task = asyncio.create_task(self._stop(members), name="stop")
+        self._stops.add(task)
+        task.add_done_callback(self._stops.discard)
+        return await asyncio.shield(task)
+
+    async def _stop(self, members: Sequence[Member]) -> dict[str, str]:
+        async def one(member: Member) -> str:
+            problem = ""
             try:
                 await member.axis.stop()
             except DriveError as error:
@@ -411,7 +433,6 @@ class Bench:
             member.monitor.hurry()
             return problem
 
-        members = [self.member(drive_id) for drive_id in drive_ids]
         problems = await asyncio.gather(*(one(member) for member in members))
         return {m.drive.id: text for m, text in zip(members, problems, strict=True)}
 
@@ -453,12 +474,14 @@ class Bench:
         """Notice another drive at this place before anything is written to it."""
         drive = member.drive
         known = drive.found.serial if drive.found else None
-        serial = await read_serial(drive)
-        if known is None or serial is None or serial == known:
+        if known is None:
             return
-        drive.identity_warning = (
-            f"{drive.name} had serial number {known}; the drive that answers here now has {serial}"
-        )
+        try:
+            await drive.confirm_identity()
+        except NotAllowed:
+            pass
+        else:
+            return
         self.journal.add(drive.identity_warning, level="error", drive=drive.id)
         self._drives_changed()
 
@@ -466,7 +489,7 @@ class Bench:
         """The user says that the drive at this place is the right one."""
         member = self.member(drive_id)
         drive = member.drive
-        serial = await read_serial(drive)
+        serial = await drive.read_serial()
         drive.found = replace(drive.found or Found(drive.ports[0].station), serial=serial)
         drive.identity_warning = ""
         self.journal.add(f"{drive.name}: serial number {serial} accepted", drive=drive.id)

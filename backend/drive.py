@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from drivers import cia402
 from drivers.codec import decode, encode
-from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange
+from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange, Rejected
 from drivers.link import Address, Found, Link, LinkQuality
 from profiles.schema import LinkKind, LinkSpec, Parameter, Profile, Raw
 
@@ -27,6 +27,12 @@ REGISTER_BATCH = 64
 _COMMAND_ROLES = frozenset({
     "control_word", "mode", "position_target", "position_offset", "velocity_target",
     "velocity_offset", "torque_target", "torque_offset",
+})  # fmt: skip
+
+#: Roles that a motion sets for its own length, or that change what its numbers mean.
+_MOTION_ROLES = frozenset({
+    "profile_velocity", "profile_acceleration", "profile_deceleration", "max_torque",
+    "torque_limit_positive", "torque_limit_negative", "home_offset",
 })  # fmt: skip
 
 
@@ -106,6 +112,12 @@ class Drive:
         self._transient = {
             signal.key for signal in profile.signals if signal.role in _COMMAND_ROLES
         } | {step.key for proc in profile.procedures for step in proc.steps if step.do == "write"}
+        self._motion_keys = (
+            {s.key for s in profile.signals if s.role in _MOTION_ROLES}
+            | profile.unit_keys
+            | {"607E:00"}  # polarity (CiA 402-2 clause 7)
+            | {q.key for q in profile.quirks if q.kind == "unit_switch" and q.key is not None}
+        )
         self._own_status = profile.quirk("own_status_word") is not None
 
     # --- what it is ------------------------------------------------------------------
@@ -188,6 +200,14 @@ class Drive:
     def commands_motion(self, key: str) -> bool:
         """Whether writing this parameter commands motion or a procedure at once."""
         return key in self._transient
+
+    def matters_to_motion(self, key: str) -> bool:
+        """Whether a motion under way relies on this parameter staying as it is.
+
+        These are commands, the gearing and unit switches, and what a motion sets for its own
+        length: ramps and torque limits. Gains may be changed while the axis moves.
+        """
+        return key in self._motion_keys or self.commands_motion(key)
 
     @property
     def unsaved(self) -> frozenset[str]:
@@ -384,7 +404,10 @@ class Drive:
         parameter = self.parameter(key)
         self.require_identity()
         if not raw and isinstance(value, (int, float)):
-            value = parameter.to_raw(value)
+            try:
+                value = parameter.to_raw(value)
+            except OverflowError as error:
+                raise self._named(OutOfRange(f"{value:g} is no number"), parameter) from error
         value = self.check(parameter, value)
         port = self.port_for(parameter)
         if parameter.settable == "stopped":
@@ -414,6 +437,34 @@ class Drive:
                 drive=self.name,
                 remedy="check the cables; if it was exchanged, accept it on the Connect page",
             )
+
+    async def read_serial(self) -> int | None:
+        """Serial number of the drive that answers now (1018h:04), or None where it has none."""
+        for port in self.ports:
+            if port.link.kind == "modbus":
+                continue
+            try:
+                data = await port.link.read(port.station, Address(0x1018, 4, "UINT32"))
+            except (Rejected, NotAllowed):
+                continue
+            return int.from_bytes(data, "little") or None
+        return None
+
+    async def confirm_identity(self) -> None:
+        """Ask for the serial number again, where it is known and the drive tells it.
+
+        Raises:
+            NotAllowed: another drive answers here.
+        """
+        known = self.found.serial if self.found else None
+        if known is not None:
+            serial = await self.read_serial()
+            if serial is not None and serial != known:
+                self.identity_warning = (
+                    f"{self.name} had serial number {known}; the drive that answers here now "
+                    f"has {serial}"
+                )
+        self.require_identity()
 
     async def command(self, key: str, raw: int) -> None:
         """Write a motion object without reading back (set-points, control word).

@@ -32,7 +32,11 @@ class Progress:
 
 @dataclass(slots=True, eq=False)
 class Job:
-    """One piece of work. Times are seconds since the epoch."""
+    """One piece of work. Times are seconds since the epoch.
+
+    ``motion``: it holds its axis, so that no other such job can begin. ``stoppable``: STOP
+    cancels it; not so for work that holds the axis still and must not be left half done.
+    """
 
     id: str
     kind: str
@@ -40,6 +44,7 @@ class Job:
     drive: str | None
     motion: bool
     progress: Progress
+    stoppable: bool = True
     state: JobState = "running"
     started: float = field(default_factory=time.time)
     ended: float | None = None
@@ -58,11 +63,19 @@ Work = Callable[[Progress], Awaitable[JobResult | None]]
 
 
 class JobRunner:
-    """Starts jobs and keeps the last hundred that ended."""
+    """Starts jobs and keeps the last hundred that ended.
+
+    ``permit`` is called with the drive's id when a motion job begins; it may refuse by raising.
+    """
 
     KEEP = 100
 
-    def __init__(self, changed: Callable[[Job], None] = lambda _job: None) -> None:
+    def __init__(
+        self,
+        changed: Callable[[Job], None] = lambda _job: None,
+        permit: Callable[[str], None] = lambda _drive: None,
+    ) -> None:
+        self._permit = permit
         self._jobs: dict[str, Job] = {}
         self._numbers = itertools.count(1)
         self._changed = changed
@@ -91,11 +104,12 @@ class JobRunner:
         drive: str | None = None,
         motion: bool = False,
         person: str = "",
+        stoppable: bool = True,
     ) -> Job:
         """Start work.
 
         Raises:
-            Busy: a motion job already holds this axis.
+            Busy: a motion job already holds this axis, or its bus is being changed.
         """
         if motion and drive is not None and (other := self.moving(drive)) is not None:
             raise Busy(
@@ -103,6 +117,8 @@ class JobRunner:
                 drive=drive,
                 remedy="wait for it to end, or stop it",
             )
+        if motion and drive is not None:
+            self._permit(drive)
         job = Job(
             id=f"{kind}-{next(self._numbers)}",
             kind=kind,
@@ -111,6 +127,7 @@ class JobRunner:
             motion=motion,
             progress=Progress(lambda: self._tell(job)),
             person=person,
+            stoppable=stoppable,
         )
         self._jobs[job.id] = job
         job.task = asyncio.create_task(self._run(job, work), name=job.id)

@@ -105,6 +105,9 @@ class Monitor:
     async def refresh(self) -> Snapshot:
         """Read the state now. A failure becomes a snapshot that says so, with the old values."""
         before = self.snapshot
+        if await self.axis.repeat_stop():
+            text = f"{self.axis.drive.name}: the stop that had not reached it was sent again"
+            self._journal.add(text, level="warning", drive=self.axis.drive.id)
         try:
             snapshot = await self._read()
         except DriveError as error:

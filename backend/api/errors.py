@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 
 from fastapi import FastAPI, Request
 from fastapi.encoders import jsonable_encoder
@@ -68,7 +69,7 @@ def problem_of(error: Exception) -> Problem:
             remedy="this is a defect of servodeck; report it with the log",
         )
     status = 404 if isinstance(error, NotFound) else _status(error)
-    value = error.value if isinstance(error.value, (int, float, str)) else None
+    value = _scalar(error.value)
     return Problem(
         type=f"urn:servodeck:{error.kind}",
         title=_TITLES.get(error.kind, "Drive error"),
@@ -137,4 +138,6 @@ def install(app: FastAPI) -> None:
 
 
 def _scalar(value: object) -> int | float | str | None:
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)  # JSON has no such number
     return value if isinstance(value, (int, float, str)) else None

@@ -143,6 +143,8 @@ class Connection:
         self._scope_tasks: dict[int, list[asyncio.Task[None]]] = {}
         self._polls: dict[str, asyncio.Task[None]] = {}
         self._overflow = False
+        #: Ending a poll may take as long as a mute drive; STOP and jog never wait for that.
+        self._scope_requests: asyncio.Queue[ScopeStart | ScopeStop] = asyncio.Queue()
 
     async def run(self) -> None:
         """Until the page is gone."""
@@ -150,10 +152,14 @@ class Connection:
         self.later("drives", "", self.drive_list)
         sender = asyncio.create_task(self._sender(), name=f"live-{self.id}")
         receiver = asyncio.create_task(self._receiver(), name=f"hear-{self.id}")
-        done, pending = await asyncio.wait((sender, receiver), return_when=asyncio.FIRST_COMPLETED)
+        scoper = asyncio.create_task(self._scoper(), name=f"scopes-{self.id}")
+        tasks = (sender, receiver, scoper)
+        done, pending = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        # Before anything is waited for: nobody holds a button here any more.
+        self._release_holds()
         for task in pending:
             task.cancel()
-        await asyncio.wait((sender, receiver))
+        await asyncio.wait(tasks)
         for task in done:
             error = None if task.cancelled() else task.exception()
             # A page may go in the middle of a message; that is its ordinary end.
@@ -162,8 +168,7 @@ class Connection:
 
     async def close(self) -> None:
         """Release everything that lived by this connection; a jog ends at once."""
-        for hold in self._holds.values():
-            hold.release("the page's connection closed")
+        self._release_holds()
         for drive in self.watched:
             if (member := self._bench.members.get(drive)) is not None:
                 member.monitor.watchers -= 1
@@ -173,6 +178,10 @@ class Connection:
         for subscription in list(self._scopes):
             await self._scope_stop(subscription)
         self._bench.leases.drop(self.id)
+
+    def _release_holds(self) -> None:
+        for hold in self._holds.values():
+            hold.release("the page's connection closed")
 
     # --- out --------------------------------------------------------------------------
 
@@ -245,6 +254,18 @@ class Connection:
             problem = DriveError(f"not a message of this interface: {first['msg']}")
             self.send(Refused(request="?", problem=problem_of(problem)))
             return
+        if isinstance(request, (ScopeStart, ScopeStop)):
+            self._scope_requests.put_nowait(request)
+            return
+        await self._answered(request)
+
+    async def _scoper(self) -> None:
+        """Begin and end subscriptions, in the order asked for."""
+        while True:
+            await self._answered(await self._scope_requests.get())
+
+    async def _answered(self, request: FromPage) -> None:
+        """Carry a message out; what speaks against it goes back to the page."""
         try:
             await self._act(request)
         except DriveError as error:

@@ -23,6 +23,7 @@ from backend.api.models import (
     LogEntry,
     Message,
     ParameterValue,
+    Positive,
     Problem,
 )
 
@@ -54,9 +55,9 @@ class JogStart(Message):
     type: Literal["jog_start"] = "jog_start"
     drive: str
     direction: Literal[-1, 1]
-    speed: float = Field(gt=0, description="in the axis' velocity unit")
-    acceleration: float = Field(gt=0, description="in the axis' acceleration unit")
-    travel_limit: float = Field(gt=0, description="greatest distance from where the jog began")
+    speed: Positive = Field(description="in the axis' velocity unit")
+    acceleration: Positive = Field(description="in the axis' acceleration unit")
+    travel_limit: Positive = Field(description="greatest distance from where the jog began")
     torque_limit: float = Field(gt=0, le=400, description="% of rated")
 
 

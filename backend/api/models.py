@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -14,6 +14,13 @@ class Message(BaseModel):
     """Base: unknown fields are refused, so that a misspelt limit is an error."""
 
     model_config = ConfigDict(extra="forbid")
+
+
+#: Beyond every axis in any unit, and far from where floating point overflows.
+_MOST = 1e12
+#: A number that a person gives; NaN would pass comparisons with a limit.
+Finite = Annotated[float, Field(ge=-_MOST, le=_MOST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=1e-9, le=_MOST, allow_inf_nan=False)]
 
 
 class Problem(BaseModel):
@@ -328,6 +335,8 @@ class ParameterRow(ParameterInfo):
 class ParameterWrite(Message):
     """A new value: exactly one of ``raw`` and ``value``."""
 
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
     raw: Raw | None = None
     value: Raw | None = None
 
@@ -421,13 +430,13 @@ class MoveRequest(Message):
     """One move in a profile mode. Engineering units of the axis (see AxisState.units)."""
 
     mode: Literal["PP", "PV", "PT"]
-    target: float
+    target: Finite
     relative: bool = False
     immediate: bool = True
-    speed: float | None = Field(default=None, gt=0)
-    acceleration: float | None = Field(default=None, gt=0)
-    deceleration: float | None = Field(default=None, gt=0)
-    travel_limit: float = Field(gt=0, description="greatest distance from the start point")
+    speed: Positive | None = None
+    acceleration: Positive | None = None
+    deceleration: Positive | None = None
+    travel_limit: Positive = Field(description="greatest distance from the start point")
     torque_limit: float = Field(gt=0, le=400, description="% of rated")
     timeout_s: float = Field(default=30, gt=0, le=600)
     consent: bool = Field(
@@ -439,13 +448,13 @@ class MoveRequest(Message):
 class SequenceRequest(Message):
     """Back and forth between two positions."""
 
-    first: float
-    second: float
-    speed: float = Field(gt=0)
-    acceleration: float = Field(gt=0)
+    first: Finite
+    second: Finite
+    speed: Positive
+    acceleration: Positive
     dwell_s: float = Field(default=0.5, ge=0, le=60)
     count: int = Field(default=5, ge=1, le=100000)
-    travel_limit: float = Field(gt=0)
+    travel_limit: Positive
     torque_limit: float = Field(gt=0, le=400)
 
 
@@ -454,13 +463,13 @@ class GenerateRequest(Message):
 
     mode: Literal["CSP", "CSV", "CST"]
     shape: Literal["step", "ramp", "trapezoid", "sine", "chirp"]
-    amplitude: float
+    amplitude: Finite
     duration_s: float = Field(gt=0, le=120)
     frequency_hz: float = Field(default=1.0, gt=0, le=2000)
     frequency_end_hz: float = Field(default=10.0, gt=0, le=2000)
-    acceleration: float = Field(default=10.0, gt=0)
-    travel_limit: float = Field(gt=0)
-    speed_limit: float = Field(gt=0)
+    acceleration: Positive = 10.0
+    travel_limit: Positive
+    speed_limit: Positive
     torque_limit: float = Field(gt=0, le=400)
 
 
@@ -468,11 +477,11 @@ class HomeRequest(Message):
     """Homing."""
 
     method: int
-    speed_switch: float | None = Field(default=None, gt=0)
-    speed_zero: float | None = Field(default=None, gt=0)
-    acceleration: float | None = Field(default=None, gt=0)
-    offset: float | None = None
-    travel_limit: float = Field(gt=0)
+    speed_switch: Positive | None = None
+    speed_zero: Positive | None = None
+    acceleration: Positive | None = None
+    offset: Finite | None = None
+    travel_limit: Positive
     torque_limit: float = Field(gt=0, le=400)
     timeout_s: float = Field(default=60, gt=0, le=600)
 

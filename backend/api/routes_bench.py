@@ -219,15 +219,16 @@ async def job(bench: TheBench, job_id: str) -> JobInfo:
 async def cancel_job(bench: TheBench, job_id: str, connection: Connection = None) -> JobInfo:
     """Cancel a job and wait for its cleanup."""
     found = _job(bench, job_id)
-    if found.drive is not None and not found.motion:
+    if found.drive is not None and not (found.motion and found.stoppable):
         bench.leases.require(found.drive, connection)
     await bench.jobs.cancel(found)
     return convert.job(found)
 
 
 @router.post("/stop")
-async def stop(bench: TheBench, request: StopRequest) -> StopResult:
-    """STOP: always allowed, for everyone."""
+async def stop(bench: TheBench, request: StopRequest | None = None) -> StopResult:
+    """STOP: always allowed, for everyone; without a body, of every axis."""
+    request = request or StopRequest()
     wanted = [request.drive] if request.drive is not None else list(bench.members)
     known = [drive_id for drive_id in wanted if drive_id in bench.members]
     problems = await bench.stop(known)

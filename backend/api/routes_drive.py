@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
+
 from fastapi import APIRouter
 
 from backend.api import convert
@@ -28,8 +30,9 @@ from backend.api.models import (
     WriteResult,
 )
 from backend.axis import Envelope
-from backend.bench import Member
+from backend.bench import Bench, Member
 from backend.drive import Reading
+from backend.jobs import JobResult, Progress
 from backend.tools import cyclic_motion, homing, move, parameters, procedures
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
@@ -55,17 +58,39 @@ async def faults(member: TheMember) -> list[ActiveFault]:
 @router.post("/transition")
 async def transition(bench: TheBench, member: Controlled, request: TransitionRequest) -> AxisState:
     """Drive the power state machine. Enabling aims the set-point at where the axis stands."""
-    bench.require_idle(member)
     goal = State(request.goal)
-    axis = member.axis
-    axis.stopped = False
-    if request.mode is not None:
-        await axis.set_mode(_mode(member, request.mode))
-    if goal is State.OPERATION_ENABLED:
-        await axis.aim_here()
-    await axis.go_to(goal)
+    mode = None if request.mode is None else _mode(member, request.mode)
+    await _alone(bench, member, goal.value, lambda: member.axis.transition(goal, mode))
     bench.journal.add(f"{member.drive.name}: {goal.value}", drive=member.drive.id)
     return convert.axis_state(bench, member, await member.monitor.refresh())
+
+
+async def _alone(
+    bench: Bench, member: Member, title: str, work: Callable[[], Awaitable[object]]
+) -> None:
+    """Change the power state as a motion job: no other motion begins meanwhile, STOP ends it.
+
+    Raises:
+        Busy: the axis is moved by a job.
+        NotAllowed: STOP was pressed.
+        DriveError: what the work says.
+    """
+
+    async def run(_progress: Progress) -> JobResult | None:
+        await work()
+        return None
+
+    drive = member.drive
+    job = bench.jobs.start("power", f"{title}: {drive.name}", run, drive=drive.id, motion=True)
+    await job.wait()
+    if job.state == "cancelled":
+        raise NotAllowed(
+            f"{drive.name}: STOP was pressed during “{title}”",
+            drive=drive.name,
+            remedy="try again when it is safe",
+        )
+    if job.error is not None:
+        raise job.error
 
 
 def _mode(member: Member, number: int) -> Mode:
@@ -84,7 +109,7 @@ def _mode(member: Member, number: int) -> Mode:
 @router.post("/fault-reset")
 async def fault_reset(bench: TheBench, member: Controlled) -> AxisState:
     """Reset faults whose cause is gone."""
-    await member.axis.reset_fault()
+    await _alone(bench, member, "Fault reset", member.axis.reset_fault)
     bench.journal.add(f"{member.drive.name}: fault reset", drive=member.drive.id)
     return convert.axis_state(bench, member, await member.monitor.refresh())
 
@@ -159,7 +184,7 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
             remedy="send exactly one of the two",
         )
     parameter = drive.parameter(key)
-    if bench.jobs.moving(drive.id) is not None and drive.commands_motion(parameter.key):
+    if drive.matters_to_motion(parameter.key):
         bench.require_idle(member)
     old = drive.readings.get(parameter.key)
     if request.raw is not None:
@@ -228,7 +253,6 @@ async def read_all(bench: TheBench, member: TheMember, request: ReadAllRequest) 
 @router.post("/jobs/load_set", status_code=202)
 async def load_set(bench: TheBench, member: Controlled, request: LoadSetRequest) -> JobInfo:
     """Write chosen rows of a parameter set, each read back."""
-    bench.require_idle(member)
     content = bench.sets.load(request.file)
     job = bench.jobs.start(
         "load_set",
@@ -242,6 +266,9 @@ async def load_set(bench: TheBench, member: Controlled, request: LoadSetRequest)
             accept_other_identity=request.accept_other_identity,
         ),
         drive=member.drive.id,
+        # Nothing may move while its settings change; and a set is not left half written.
+        motion=True,
+        stoppable=False,
     )
     bench.journal.add(f"{member.drive.name}: load {request.file}", drive=member.drive.id)
     return convert.job(job)

@@ -19,9 +19,9 @@ import numpy.typing as npt
 
 from backend.axis import Axis, Envelope, shielded
 from backend.cyclic import CyclicSession
-from backend.drive import address_of
+from backend.drive import Drive, address_of
 from backend.jobs import JobResult, Progress
-from backend.tools.jog import Hold, JogSettings
+from backend.tools.jog import Hold, JogSettings, require_scale
 from drivers import link as bus
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
@@ -136,6 +136,7 @@ async def generate(
     cycle_s = _cycle(session)
     values = signal(settings, cycle_s)
     mode = Mode[settings.mode]
+    _require_inside(drive, settings)
     async with _enabled(axis, session, mode):
         start = await axis.position_raw()
         if settings.mode == "CSP":
@@ -156,6 +157,24 @@ async def generate(
     return {"cycles": len(raw), "moved_rev": units.position(end - start)}
 
 
+def _require_inside(drive: Drive, settings: GeneratorSettings) -> None:
+    envelope = settings.envelope
+    limit, unit = {
+        "CSP": (envelope.travel_rev, "rev"),
+        "CSV": (envelope.speed_rpm, "rpm"),
+        "CST": (envelope.torque_percent, "%"),
+    }[settings.mode]
+    if abs(settings.amplitude) > limit:
+        raise OutOfRange(
+            f"{drive.name}: an amplitude of {settings.amplitude:g} {unit} leaves the envelope of "
+            f"{limit:g} {unit}",
+            drive=drive.name,
+            value=settings.amplitude,
+            limit=f"{limit:g} {unit}",
+            remedy="lower the amplitude or widen the envelope",
+        )
+
+
 async def jog_cyclic(
     axis: Axis, session: CyclicSession, settings: JogSettings, hold: Hold, progress: Progress
 ) -> JobResult:
@@ -166,10 +185,11 @@ async def jog_cyclic(
     """
     units, drive = await axis.units(), axis.drive
     cycle_s = _cycle(session)
+    require_scale(axis, units, settings)
     progress(0.0, "enabling")
     async with _enabled(axis, session, Mode.CSP):
         start = await axis.position_raw()
-        speed = units.velocity(units.velocity_raw(settings.speed_rpm)) / 60.0
+        speed = settings.speed_rpm / 60.0
         slope = settings.acceleration_rpm_s / 60.0
         travel = run_up(settings.travel_rev, speed, slope, cycle_s)
         raw = start + np.round(settings.direction * travel * units.position_raw(1.0)).astype(
@@ -179,16 +199,12 @@ async def jog_cyclic(
             settings.travel_rev, settings.speed_rpm, settings.torque_percent, _MAX_S
         )
         station = session.station(drive)
-        await session.cyclic.play(
-            [
-                bus.Trajectory(
-                    station,
-                    address_of(drive.profile.by_role["position_target"]),
-                    raw,
-                    await _limits(axis, envelope, start),
-                )
-            ]
-        )
+        target = address_of(drive.profile.by_role["position_target"])
+        limits = await _limits(axis, envelope, start)
+        # Enabling takes longer than a button may be held: released meanwhile, nothing moves.
+        if reason := hold.ended():
+            return {"reason": reason, "moved_rev": 0.0}
+        await session.cyclic.play([bus.Trajectory(station, target, raw, limits)])
         progress(0.0, "moving")
         reason = await _while_held(session, station, hold)
         await session.cyclic.halt(station)
@@ -269,7 +285,6 @@ def _raise_if_ended(session: CyclicSession, station: int) -> None:
 @asynccontextmanager
 async def _enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterator[None]:
     """Operation enabled through the loop; disabled again on every way out."""
-    axis.stopped = False
     try:
         await axis.go_to_cyclic(session, State.OPERATION_ENABLED, mode, _STATE_TIMEOUT_S)
         yield

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
+from backend.units import AxisUnits
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
@@ -80,6 +81,7 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
     drive, units = axis.drive, await axis.units()
     if settings.direction not in (-1, 1):
         raise OutOfRange(f"direction {settings.direction} is neither 1 nor -1")
+    require_scale(axis, units, settings)
     envelope = Envelope(settings.travel_rev, settings.speed_rpm, settings.torque_percent, 3600.0)
     ramps = {
         drive.require("profile_velocity"): units.velocity_raw(settings.speed_rpm),
@@ -92,6 +94,8 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
     async with axis.restoring(*ramps):
         for key, raw in ramps.items():
             await drive.write(key, raw)
+        if reason := hold.ended():
+            return {"reason": reason, "moved_rev": 0.0}
         async with axis.enabled(Mode.PP, envelope):
             start = await axis.position_raw()
             # Enabling takes longer than the renewal time-out; the page has renewed meanwhile.
@@ -103,12 +107,37 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
     return {"reason": reason, "moved_rev": moved}
 
 
+def require_scale(axis: Axis, units: AxisUnits, settings: JogSettings) -> None:
+    """A jog must know how far a revolution is, and its speed must be one the drive can have.
+
+    Raises:
+        NotAllowed: the resolution is unknown, so no stopping distance can be computed.
+        OutOfRange: the speed is below the drive's resolution.
+    """
+    drive = axis.drive
+    if units.counts_per_rev is None:
+        raise NotAllowed(
+            f"{drive.name}: increments per revolution are unknown, so the stopping distance of a "
+            "jog cannot be computed",
+            drive=drive.name,
+            remedy="set feed constant and gear ratio on the Parameters page",
+        )
+    if units.velocity_raw(settings.speed_rpm) <= 0:
+        raise OutOfRange(
+            f"{drive.name}: {settings.speed_rpm:g} rpm is below the resolution of its speed",
+            drive=drive.name,
+            value=settings.speed_rpm,
+            remedy="choose a higher speed",
+        )
+
+
 async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> str:
     drive, units = axis.drive, await axis.units()
     target_key = drive.require("position_target")
     lead = units.position_raw(settings.lead_rev)
     travel = units.position_raw(settings.travel_rev)
     toggle = cia402.ENABLE_OPERATION | cia402.CHANGE_IMMEDIATELY
+    low, high = drive.parameter(target_key).raw_limits
     due = time.monotonic()
     last_target: int | None = None
     while not (reason := hold.ended()):
@@ -124,6 +153,10 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
         ahead = start + settings.direction * travel
         target = position + settings.direction * lead
         target = min(target, ahead) if settings.direction > 0 else max(target, ahead)
+        # At the end of the drive's number range the axis stops like at a travel limit.
+        target = int(
+            min(max(target, target if low is None else low), target if high is None else high)
+        )
         if hold.ended():
             continue
         if target != last_target:

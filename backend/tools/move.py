@@ -9,6 +9,7 @@ from typing import Literal
 
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
+from backend.units import AxisUnits
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
@@ -64,11 +65,17 @@ async def move(axis: Axis, settings: MoveSettings, progress: Progress) -> JobRes
     async with axis.restoring(*(ramps := await _ramps(axis, settings))):
         for key, raw in ramps.items():
             await axis.drive.write(key, raw)
+        start = await axis.position_raw()
+        if settings.mode == "PP":
+            _require_reachable(
+                axis, units, _target(units, settings, start), start, settings.envelope
+            )
+        else:
+            _require_inside(axis, units, settings)
         async with axis.enabled(Mode[settings.mode], settings.envelope):
             start = await axis.position_raw()
             if settings.mode == "PP":
-                target = units.position_raw(settings.target)
-                target += start if settings.relative else 0
+                target = _target(units, settings, start)
                 await _to(axis, target, start, settings.envelope, progress)
             else:
                 await _hold(axis, settings, start, progress)
@@ -95,6 +102,9 @@ async def sequence(axis: Axis, settings: SequenceSettings, progress: Progress) -
     async with axis.restoring(*(ramps := await _ramps(axis, first))):
         for key, raw in ramps.items():
             await axis.drive.write(key, raw)
+        start = await axis.position_raw()
+        for place in (settings.first, settings.second):
+            _require_reachable(axis, units, units.position_raw(place), start, settings.envelope)
         async with axis.enabled(Mode.PP, settings.envelope):
             start = await axis.position_raw()
             for number in range(settings.count):
@@ -104,7 +114,7 @@ async def sequence(axis: Axis, settings: SequenceSettings, progress: Progress) -
                     target = units.position_raw(place)
                     await _to(axis, target, start, settings.envelope, None)
                     times.append(time.monotonic() - began)
-                    await asyncio.sleep(settings.dwell_s)
+                    await _dwell(axis, settings.dwell_s, start, settings.envelope)
     return {"cycles": settings.count, "mean_move_s": sum(times) / len(times)}
 
 
@@ -145,11 +155,15 @@ async def _ramps(axis: Axis, settings: MoveSettings) -> dict[str, int]:
     return values
 
 
-async def _to(
-    axis: Axis, target: int, start: int, envelope: Envelope, progress: Progress | None
+def _target(units: AxisUnits, settings: MoveSettings, start: int) -> int:
+    return units.position_raw(settings.target) + (start if settings.relative else 0)
+
+
+def _require_reachable(
+    axis: Axis, units: AxisUnits, target: int, start: int, envelope: Envelope
 ) -> None:
-    """Set-point handshake (CiA 402-2 clause 10.3.3), then wait for target reached."""
-    drive, units = axis.drive, await axis.units()
+    """The target is inside the travel limit and the drive's number range, before enabling."""
+    drive = axis.drive
     if abs(target - start) > units.position_raw(envelope.travel_rev):
         raise OutOfRange(
             f"{drive.name}: a target {units.position(target - start):+.4g} rev from the start "
@@ -159,6 +173,25 @@ async def _to(
             limit=f"{envelope.travel_rev:g} rev from the start",
             remedy="choose a nearer target or a wider travel limit",
         )
+    drive.check(drive.parameter(drive.require("position_target")), target)
+
+
+async def _dwell(axis: Axis, dwell_s: float, start: int, envelope: Envelope) -> None:
+    """Wait, and notice when the axis is pushed away or leaves Operation enabled meanwhile."""
+    end = time.monotonic() + dwell_s
+    while (left := end - time.monotonic()) > 0:
+        await asyncio.sleep(min(left, 5 * _POLL_S))
+        await _still_inside(axis, start, envelope)
+
+
+async def _to(
+    axis: Axis, target: int, start: int, envelope: Envelope, progress: Progress | None
+) -> None:
+    """Set-point handshake (CiA 402-2 clause 10.3.3), then wait for target reached."""
+    drive, units = axis.drive, await axis.units()
+    _require_reachable(axis, units, target, start, envelope)
+    # A word that enables must not bring back an axis that somebody or a fault took out.
+    await _still_inside(axis, start, envelope)
     word = cia402.ENABLE_OPERATION | cia402.CHANGE_IMMEDIATELY
     await axis.control(word)
     await drive.command(drive.require("position_target"), target)
@@ -198,9 +231,9 @@ async def _acknowledged(axis: Axis) -> None:
         await asyncio.sleep(_POLL_S / 2)
 
 
-async def _hold(axis: Axis, settings: MoveSettings, start: int, progress: Progress) -> None:
-    """Velocity or torque for the envelope's time, inside its travel and speed."""
-    drive, units, envelope = axis.drive, await axis.units(), settings.envelope
+def _require_inside(axis: Axis, units: AxisUnits, settings: MoveSettings) -> tuple[str, int]:
+    """Role and raw value of a velocity or torque target that is inside the envelope."""
+    drive, envelope = axis.drive, settings.envelope
     velocity = settings.mode == "PV"
     limit = envelope.speed_rpm if velocity else envelope.torque_percent
     if abs(settings.target) > limit:
@@ -212,8 +245,16 @@ async def _hold(axis: Axis, settings: MoveSettings, start: int, progress: Progre
             remedy="lower the target or widen the envelope",
         )
     role = "velocity_target" if velocity else "torque_target"
-    to_raw = units.velocity_raw if velocity else units.torque_raw
-    await drive.command(drive.require(role), to_raw(settings.target))
+    raw = (units.velocity_raw if velocity else units.torque_raw)(settings.target)
+    drive.check(drive.parameter(drive.require(role)), raw)
+    return role, raw
+
+
+async def _hold(axis: Axis, settings: MoveSettings, start: int, progress: Progress) -> None:
+    """Velocity or torque for the envelope's time, inside its travel and speed."""
+    drive, units, envelope = axis.drive, await axis.units(), settings.envelope
+    role, raw = _require_inside(axis, units, settings)
+    await drive.command(drive.require(role), raw)
     began = time.monotonic()
     while (elapsed := time.monotonic() - began) < envelope.time_s:
         progress(elapsed / envelope.time_s, "running")

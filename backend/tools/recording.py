@@ -146,7 +146,6 @@ async def enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterat
 
     On every way out the axis is braked and disabled.
     """
-    axis.stopped = False
     try:
         await axis.go_to_cyclic(session, State.OPERATION_ENABLED, mode, _STATE_TIMEOUT_S)
         await _forgotten(axis, session)

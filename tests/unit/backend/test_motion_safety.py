@@ -1,0 +1,471 @@
+"""STOP, restoring and enabling against a servo in memory: each test is a way to be hurt."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from backend.api.app import make_app
+from backend.axis import Envelope
+from backend.bench import Bench, Member
+from backend.drive import Port
+from backend.jobs import Progress
+from backend.tools import jog as jogging
+from backend.tools import move as moving
+from backend.tools.jog import Hold, JogSettings, jog
+from drivers.cia402 import Mode, State
+from drivers.errors import DriveError, NotAllowed, OutOfRange
+from tests.support.servo import (
+    CONTROL,
+    MODE,
+    POSITION,
+    STATUS,
+    TARGET,
+    VELOCITY_TARGET,
+    Servo,
+    bench_with,
+)
+
+ENVELOPE = Envelope(5.0, 100.0, 50.0, 10.0)
+JOG = JogSettings(1, 60.0, 600.0, 5.0, 50.0)
+ENABLES = 0x0F
+
+
+@pytest.fixture
+async def servo() -> Servo:
+    return Servo()
+
+
+@pytest.fixture
+async def bench(servo: Servo, tmp_path: Path) -> AsyncIterator[Bench]:
+    bench, _ = await bench_with(servo, tmp_path)
+    yield bench
+    servo.mute = False
+    await bench.close()
+
+
+@pytest.fixture
+def x(bench: Bench) -> Member:
+    return bench.member("x")
+
+
+@pytest.fixture
+async def http(bench: Bench) -> AsyncIterator[httpx.AsyncClient]:
+    transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
+    async with httpx.AsyncClient(transport=transport, base_url="http://test/api/v1") as client:
+        yield client
+
+
+def enabling(servo: Servo) -> int:
+    return sum(word & ENABLES == ENABLES for word in servo.words())
+
+
+async def eventually(condition: object) -> None:
+    async with asyncio.timeout(5):
+        while not condition():  # type: ignore[operator]  # noqa: ASYNC110
+            await asyncio.sleep(0.005)
+
+
+# --- STOP -----------------------------------------------------------------------------
+
+
+async def test_stop_is_sent_even_when_its_asker_is_gone(
+    bench: Bench, x: Member, servo: Servo
+) -> None:
+    servo.enable()
+    servo.gate.clear()
+    asking = asyncio.create_task(bench.stop(["x"]))
+    await asyncio.sleep(0)
+    asking.cancel()  # the page closed right after Esc
+    servo.gate.set()
+    await eventually(lambda: servo.words() == [2])
+
+
+async def test_a_command_begun_before_stop_never_enables_even_after_a_new_one(
+    bench: Bench, servo: Servo, http: httpx.AsyncClient
+) -> None:
+    servo.gate.clear()
+    enable = asyncio.create_task(
+        http.post("/drives/x/transition", json={"goal": "Operation enabled"})
+    )
+    await asyncio.sleep(0.05)
+    stop = asyncio.create_task(http.post("/stop", json={}))
+    await asyncio.sleep(0.05)
+    other = asyncio.create_task(
+        http.post("/drives/x/transition", json={"goal": "Switch on disabled"})
+    )
+    await asyncio.sleep(0.05)
+    servo.gate.set()
+    assert (await stop).json()["stopped"] == ["x"]
+    assert (await enable).status_code == 409
+    await other
+    assert enabling(servo) == 0
+    assert servo.number(STATUS) == 0x250
+
+
+async def test_no_job_begins_while_the_power_state_is_changed(
+    bench: Bench, x: Member, servo: Servo, http: httpx.AsyncClient
+) -> None:
+    servo.gate.clear()
+    first = asyncio.create_task(
+        http.post("/drives/x/transition", json={"goal": "Operation enabled"})
+    )
+    await asyncio.sleep(0.05)
+    body = {"mode": "PP", "target": 1, "travel_limit": 2, "torque_limit": 10}
+    assert (await http.post("/drives/x/jobs/move", json=body)).status_code == 409
+    assert (await http.post("/drives/x/fault-reset", json={})).status_code == 409
+    servo.gate.set()
+    assert (await first).json()["state"] == "Operation enabled"
+
+
+async def test_work_that_swallows_its_cancellation_cannot_enable_again(
+    bench: Bench, x: Member, servo: Servo
+) -> None:
+    async def stubborn(_progress: Progress) -> None:
+        for _ in range(2):
+            try:
+                async with x.axis.enabled(Mode.PP, ENVELOPE):
+                    await asyncio.Event().wait()
+            except asyncio.CancelledError:
+                servo.written.clear()
+
+    job = bench.jobs.start("move", "Move", stubborn, drive="x", motion=True)
+    await eventually(lambda: servo.number(STATUS) == 0x237)
+    await bench.stop(["x"])
+    await job.wait()
+    assert enabling(servo) == 0
+    assert isinstance(job.error, NotAllowed)
+
+
+async def test_stop_that_did_not_reach_the_drive_is_sent_when_it_answers(
+    bench: Bench, x: Member, servo: Servo
+) -> None:
+    servo.enable()
+    servo.mute = True
+    assert "no answer" in (await bench.stop(["x"]))["x"]
+    await x.monitor.refresh()
+    assert servo.words() == []
+    servo.mute = False
+    await x.monitor.refresh()
+    assert servo.words() == [2]
+    await x.monitor.refresh()
+    assert servo.words() == [2], "once is enough"
+
+
+async def test_motion_whose_end_was_lost_is_stopped_when_the_drive_answers(
+    x: Member, servo: Servo
+) -> None:
+    with pytest.raises(DriveError):
+        async with x.axis.enabled(Mode.PV, ENVELOPE):
+            servo.mute = True
+    servo.mute = False
+    servo.written.clear()
+    await x.monitor.refresh()
+    assert servo.words() == [2]
+
+
+async def test_stop_goes_over_the_second_port_when_the_first_is_dead(
+    x: Member, servo: Servo
+) -> None:
+    second = Servo()
+    second.enable()
+    x.drive.ports = (*x.drive.ports, Port(second, 1, x.drive.ports[0].spec))
+    servo.mute = True
+    await x.axis.stop()
+    assert second.words() == [2]
+
+
+async def test_after_stop_power_is_not_cut_while_the_axis_still_moves(
+    bench: Bench, x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("backend.axis.CLEANUP_TIMEOUT_S", 0.4)
+
+    async def turn(_progress: Progress) -> None:
+        async with x.axis.enabled(Mode.PV, ENVELOPE):
+            await asyncio.Event().wait()
+
+    job = bench.jobs.start("move", "Move", turn, drive="x", motion=True)
+    await eventually(lambda: servo.number(STATUS) == 0x237)
+    servo.on_write = lambda _place, _value: setattr(servo, "speed_inc", 500)
+    servo.written.clear()
+    await bench.stop(["x"])
+    await job.wait()
+    assert 0 not in servo.words(), "Disable voltage lets a moving axis coast"
+    assert isinstance(job.error, DriveError)
+    assert "emergency stop" in job.error.remedy
+
+
+# --- enabling -------------------------------------------------------------------------
+
+
+async def test_enabling_does_not_reset_a_fault(x: Member, servo: Servo) -> None:
+    servo.trip()
+    with pytest.raises(NotAllowed, match="Fault"):
+        await x.axis.go_to(State.OPERATION_ENABLED)
+    assert servo.words() == []
+
+
+async def test_a_drive_that_trips_on_enabling_is_not_enabled_again(x: Member, servo: Servo) -> None:
+    servo.trips = True
+    with pytest.raises(NotAllowed):
+        async with asyncio.timeout(5):
+            await x.axis.go_to(State.OPERATION_ENABLED)
+    assert enabling(servo) == 1
+
+
+async def test_fault_reset_does_not_cut_the_power_of_a_healthy_axis(
+    x: Member, servo: Servo
+) -> None:
+    servo.enable()
+    await x.axis.reset_fault()
+    assert servo.words() == []
+
+
+async def test_mode_change_of_an_enabled_axis_takes_no_stale_speed(
+    servo: Servo, http: httpx.AsyncClient, bench: Bench
+) -> None:
+    servo.enable()
+    servo.set(VELOCITY_TARGET, 100_000)
+    seen: list[int] = []
+
+    def note(place: tuple[int, int], _value: int) -> None:
+        if place == MODE:
+            seen.append(servo.number(VELOCITY_TARGET))
+
+    servo.on_write = note
+    answer = await http.post(
+        "/drives/x/transition", json={"goal": "Operation enabled", "mode": int(Mode.PV)}
+    )
+    assert answer.status_code == 200, answer.text
+    assert seen == [0]
+
+
+async def test_motion_of_an_enabled_axis_takes_no_stale_speed(x: Member, servo: Servo) -> None:
+    servo.enable()
+    servo.set(VELOCITY_TARGET, 100_000)
+    seen: list[int] = []
+
+    def note(place: tuple[int, int], _value: int) -> None:
+        if place == MODE:
+            seen.append(servo.number(VELOCITY_TARGET))
+
+    servo.on_write = note
+    async with x.axis.enabled(Mode.PV, ENVELOPE):
+        pass
+    assert seen[0] == 0
+
+
+# --- restoring ------------------------------------------------------------------------
+
+
+async def test_everything_that_could_not_be_restored_is_named(x: Member, servo: Servo) -> None:
+    servo.set(MODE, 3)
+    with pytest.raises(DriveError) as caught:
+        async with x.axis.restoring("6081:00"), x.axis.enabled(Mode.PP, ENVELOPE):
+            servo.mute = True
+    for key in ("6060:00", "6072:00", "60E0:00", "60E1:00", "6081:00"):
+        assert key in str(caught.value)
+
+
+async def test_a_cleanup_that_takes_too_long_names_what_it_leaves(
+    x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("backend.axis.CLEANUP_TIMEOUT_S", 0.05)
+
+    async def work() -> None:
+        async with x.axis.restoring("6081:00"):
+            await x.drive.write("6081:00", 5)
+            servo.gate.clear()
+
+    with pytest.raises(DriveError, match="6081:00"):
+        await work()
+
+
+async def test_another_drive_at_the_place_gets_nothing_restored(x: Member, servo: Servo) -> None:
+    from drivers.link import Found
+
+    x.drive.found = Found(1, serial=7)
+
+    async def work() -> None:
+        async with x.axis.restoring("6081:00"):
+            await x.drive.write("6081:00", 5)
+            servo.set((0x1018, 4), 8)
+            servo.written.clear()
+
+    with pytest.raises(DriveError, match="serial number 7"):
+        await work()
+    assert servo.written == []
+
+
+# --- parameters during motion ---------------------------------------------------------
+
+
+async def forever(_progress: Progress) -> None:
+    await asyncio.Event().wait()
+
+
+@pytest.mark.parametrize(
+    "key", ["6091:01", "6092:01", "607E:00", "6060:00", "6040:00", "607A:00", "6081:00", "60E0:00"]
+)
+async def test_what_a_motion_relies_on_is_not_written_meanwhile(
+    bench: Bench, servo: Servo, http: httpx.AsyncClient, key: str
+) -> None:
+    job = bench.jobs.start("move", "Move X", forever, drive="x", motion=True)
+    answer = await http.put(f"/drives/x/parameters/{key}", json={"raw": 1})
+    assert answer.status_code == 409, answer.text
+    assert "Move X" in answer.json()["detail"]
+    assert servo.written == []
+    await bench.jobs.cancel(job)
+
+
+async def test_gains_may_be_written_while_the_axis_moves(
+    bench: Bench, http: httpx.AsyncClient
+) -> None:
+    job = bench.jobs.start("move", "Move X", forever, drive="x", motion=True)
+    answer = await http.put("/drives/x/parameters/2005:03", json={"raw": 300})
+    assert answer.status_code == 200, answer.text
+    await bench.jobs.cancel(job)
+
+
+async def test_units_are_read_anew_whoever_wrote_the_gearing(x: Member) -> None:
+    before = (await x.axis.units()).counts_per_rev
+    assert before is not None
+    revolutions = await x.drive.raw("6092:01")
+    await x.drive.write("6092:01", 2 * revolutions)  # as the loading of a set does
+    assert (await x.axis.units()).counts_per_rev == 2 * before
+
+
+# --- numbers --------------------------------------------------------------------------
+
+_MOVE = {"mode": "PP", "target": 1.0, "travel_limit": 2.0, "torque_limit": 10.0}
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e300"])
+@pytest.mark.parametrize("field", ["target", "speed", "acceleration", "travel_limit"])
+async def test_numbers_that_are_none_are_refused(
+    http: httpx.AsyncClient, servo: Servo, field: str, number: str
+) -> None:
+    import json
+
+    text = json.dumps(_MOVE | {field: "?"}).replace('"?"', number)
+    answer = await http.post(
+        "/drives/x/jobs/move", content=text, headers={"content-type": "application/json"}
+    )
+    assert answer.status_code == 422, answer.text
+    assert servo.written == []
+
+
+@pytest.mark.parametrize("body", ['{"raw": NaN}', '{"value": Infinity}', '{"value": 1e308}'])
+async def test_a_parameter_takes_no_number_that_is_none(
+    http: httpx.AsyncClient, servo: Servo, body: str
+) -> None:
+    answer = await http.put(
+        "/drives/x/parameters/2005:03", content=body, headers={"content-type": "application/json"}
+    )
+    assert answer.status_code == 422, answer.text
+    assert servo.written == []
+
+
+async def test_stop_without_a_body_stops_everything(
+    http: httpx.AsyncClient, servo: Servo, bench: Bench
+) -> None:
+    servo.enable()
+    answer = await http.post("/stop")
+    assert answer.status_code == 200, answer.text
+    assert servo.words() == [2]
+
+
+# --- jog and moves --------------------------------------------------------------------
+
+
+def quiet() -> Progress:
+    return Progress(lambda: None)
+
+
+async def test_jog_released_before_it_is_enabled_enables_nothing(x: Member, servo: Servo) -> None:
+    hold = Hold()
+    hold.release("released")
+    assert (await jog(x.axis, JOG, hold, quiet()))["reason"] == "released"
+    assert enabling(servo) == 0
+
+
+async def test_jog_released_while_enabling_aims_nowhere(x: Member, servo: Servo) -> None:
+    hold = Hold()
+    targets: list[int] = []
+
+    def note(place: tuple[int, int], value: int) -> None:
+        if place == CONTROL and value & ENABLES == ENABLES:
+            hold.release("released")
+        if place == TARGET:
+            targets.append(value)
+
+    servo.on_write = note
+    assert (await jog(x.axis, JOG, hold, quiet()))["reason"] == "released"
+    assert set(targets) == {servo.number(POSITION)}
+
+
+async def test_jog_ends_at_the_end_of_the_number_range(x: Member, servo: Servo) -> None:
+    servo.set(POSITION, 2**31 - 100)
+    hold = Hold()
+    targets: list[int] = []
+
+    def note(place: tuple[int, int], value: int) -> None:
+        if place == TARGET:
+            targets.append(value)
+            if len(targets) > 3:
+                hold.release("enough")
+        hold.last += 0.2
+
+    servo.on_write = note
+    task = asyncio.create_task(jog(x.axis, JOG, hold, quiet()))
+    await eventually(lambda: 2**31 - 1 in targets or task.done())
+    hold.release("enough")
+    assert (await task)["reason"] == "enough"
+
+
+async def test_jog_needs_a_known_resolution(
+    x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from dataclasses import replace
+
+    units = await x.axis.units()
+    monkeypatch.setattr(x.axis, "_units", replace(units, counts_per_rev=None))
+    with pytest.raises(NotAllowed, match="increments per revolution"):
+        await jog(x.axis, JOG, Hold(), quiet())
+    assert servo.written == []
+
+
+async def test_jog_slower_than_the_drive_can_count_is_refused(x: Member, servo: Servo) -> None:
+    from dataclasses import replace
+
+    with pytest.raises(OutOfRange, match="below the resolution"):
+        await jog(x.axis, replace(JOG, speed_rpm=1e-6), Hold(), quiet())
+    assert servo.written == []
+
+
+@pytest.mark.parametrize("target", [40_000.0, -40_000.0])
+async def test_target_outside_the_number_range_enables_nothing(
+    x: Member, servo: Servo, target: float
+) -> None:
+    wide = Envelope(1e9, 100.0, 50.0, 10.0)
+    settings = moving.MoveSettings("PP", target, wide, relative=True)
+    with pytest.raises(OutOfRange):
+        await moving.move(x.axis, settings, quiet())
+    assert enabling(servo) == 0
+
+
+async def test_back_and_forth_checks_both_places_before_it_moves(x: Member, servo: Servo) -> None:
+    settings = moving.SequenceSettings(0.5, 50.0, 60.0, 600.0, 0.0, 2, ENVELOPE)
+    with pytest.raises(OutOfRange):
+        await moving.sequence(x.axis, settings, quiet())
+    assert enabling(servo) == 0
+
+
+def test_lead_is_what_the_architecture_says() -> None:
+    # 60 rpm = 1 rev/s; T = 0.2 s; a = 10 rev/s²: 0.2 + 1/20
+    assert JOG.lead_rev == pytest.approx(0.25)
+    assert jogging.RENEWAL_TIMEOUT_S == 0.2
