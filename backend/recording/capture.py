@@ -63,7 +63,7 @@ class FaultCapture:
         self._bench = bench
         self._on_fault = on_fault
         self._taps: dict[str, _Tap] = {}
-        self._blocks: deque[tuple[_Tap, ScopeBlock]] = deque()
+        self._blocks: deque[tuple[float, _Tap, ScopeBlock]] = deque()
         self._block_bytes = 0
         self._values: deque[Value] = deque(maxlen=MAX_VALUES)
         self._faults: dict[str, frozenset[str]] = {}
@@ -115,13 +115,12 @@ class FaultCapture:
             tap.subscription.leave()
 
     def _take(self, tap: _Tap, block: ScopeBlock) -> None:
-        self._blocks.append((tap, block))
+        now = time.monotonic()
+        self._blocks.append((now, tap, block))
         self._block_bytes += block.samples.nbytes
-        oldest = time.monotonic() - BEFORE_S - AFTER_S
-        while self._blocks and (
-            self._blocks[0][1].t0_s < oldest or self._block_bytes > MAX_BLOCK_BYTES
-        ):
-            self._block_bytes -= self._blocks.popleft()[1].samples.nbytes
+        oldest = now - BEFORE_S - AFTER_S
+        while self._blocks and (self._blocks[0][0] < oldest or self._block_bytes > MAX_BLOCK_BYTES):
+            self._block_bytes -= self._blocks.popleft()[2].samples.nbytes
 
     def _readings(self, drive: str, readings: list[Reading]) -> None:
         now = time.time()
@@ -201,7 +200,7 @@ class FaultCapture:
 
     async def _evidence(self, reason: str, when: float) -> Evidence:
         # The rings go on; what matters is taken before the slow reading of parameters.
-        blocks, values = list(self._blocks), list(self._values)
+        blocks, values = [(tap, b) for _, tap, b in self._blocks], list(self._values)
         members = list(self._bench.members.values())
         states = [facts.state(member) for member in members]
         clock = {"sample_s": time.monotonic(), "epoch_s": time.time()}

@@ -7,7 +7,7 @@ import contextlib
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -95,7 +95,7 @@ class Recorder:
         self._make_writer = make_writer
         self._writer: RecordingWriter | None = None
         self._streams: list[_Stream] = []
-        self._held: deque[tuple[int, ScopeBlock]] = deque()
+        self._held: deque[tuple[float, int, ScopeBlock]] = deque()
         self._held_bytes = 0
         self._lost = 0
         self._timer: asyncio.TimerHandle | None = None
@@ -212,7 +212,10 @@ class Recorder:
         if stream.silent:
             stream.silent = False
             self.event("samples", f"{stream.channels[0][0]} delivers samples again")
-        if not stream.first and block.dropped:
+        if stream.first:
+            # What was lost before it began is no loss of the recording.
+            block = replace(block, dropped=0)
+        elif block.dropped:
             self._lost += block.dropped
             self.event("lost", f"{block.dropped} samples were lost before they came here", "error")
         stream.first = False
@@ -221,7 +224,7 @@ class Recorder:
             return
         if self.phase in ("preparing", "waiting"):
             self._forget_old()
-            self._held.append((stream.number, block))
+            self._held.append((stream.heard, stream.number, block))
             self._held_bytes += block.samples.nbytes
             if self.phase == "waiting" and self._fires(stream, block):
                 self._begin("triggered")
@@ -231,8 +234,8 @@ class Recorder:
         if self.settings.trigger is None:
             return
         oldest = time.monotonic() - self.settings.pre_s
-        while self._held and (_last(self._held[0][1]) < oldest or self._held_bytes > MAX_PRE_BYTES):
-            self._held_bytes -= self._held.popleft()[1].samples.nbytes
+        while self._held and (self._held[0][0] < oldest or self._held_bytes > MAX_PRE_BYTES):
+            self._held_bytes -= self._held.popleft()[2].samples.nbytes
 
     def _fires(self, stream: _Stream, block: ScopeBlock) -> bool:
         trigger = self.settings.trigger
@@ -282,7 +285,8 @@ class Recorder:
         self.event(why, f"recording {why}")
         writer = self._writer
         while self._held and writer is not None:
-            writer.put(*self._held.popleft())
+            _, number, block = self._held.popleft()
+            writer.put(number, block)
         self._held_bytes = 0
         if self.settings.duration_s is not None:
             loop = asyncio.get_running_loop()
@@ -407,12 +411,6 @@ def fires(trigger: Trigger, values: npt.NDArray[np.float64]) -> bool:
         case "change":
             return bool(np.any(before != after))
     return False
-
-
-def _last(block: ScopeBlock) -> float:
-    if block.times_s is not None and len(block.times_s):
-        return float(block.times_s[-1])
-    return block.t0_s + block.dt_s * max(0, len(block.samples) - 1)
 
 
 def _nowhere(_block: ScopeBlock) -> None:
