@@ -72,7 +72,7 @@ def extract(folder: Path) -> None:
         "rerun.exe" if os.name == "nt" else "rerun"
     )
     with tempfile.TemporaryDirectory() as home:
-        web, data = _free_port(), _free_port()
+        web, data = free_port(), free_port()
         # A home of its own: no settings are read or written and no usage data sent.
         env = os.environ | {"HOME": home, "XDG_CONFIG_HOME": home, "APPDATA": home}
         process = subprocess.Popen(
@@ -93,7 +93,8 @@ def extract(folder: Path) -> None:
         part.replace(folder / f"{name}.gz")
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A port of the loopback that nothing uses now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
