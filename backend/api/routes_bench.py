@@ -127,8 +127,9 @@ async def close_bus(bench: TheBench, url: Annotated[str, Query()]) -> Response:
 
 
 @router.post("/scan", status_code=202)
-async def scan(bench: TheBench, request: ScanRequest) -> JobInfo:
+async def scan(bench: TheBench, request: ScanRequest, connection: Connection = None) -> JobInfo:
     """Look for drives; the job's result is ``{"found": [FoundDrive]}``."""
+    _require_bus(bench, request.url, connection)
 
     async def work(progress: Progress) -> JobResult:
         seen: list[Found] = await bench.scan(
@@ -148,8 +149,11 @@ async def drives(bench: TheBench, connection: Connection = None) -> list[DriveSu
 
 
 @router.post("/drives", status_code=201)
-async def connect(bench: TheBench, request: ConnectRequest) -> DriveSummary:
+async def connect(
+    bench: TheBench, request: ConnectRequest, connection: Connection = None
+) -> DriveSummary:
     """Make a station a drive of the bench. Its identity is asked for first."""
+    _require_bus(bench, request.url, connection)
     seen = await bench.scan(request.url, [request.station], lambda _fraction, _step: None)
     found = next((f for f in seen if f.station == request.station), None)
     member = await bench.connect(

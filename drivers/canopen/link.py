@@ -66,6 +66,8 @@ class CanopenLink:
             node: SdoChannel(node, self._request_sender(node)) for node in range(1, 128)
         }
         self._turns = {node: asyncio.Lock() for node in range(1, 128)}
+        #: Writes that wait for their turn: one may be the stop, so batches of reads give way.
+        self._urgent = dict.fromkeys(range(1, 128), 0)
         self._port = CanPort(self._settings, self._frame, self._event, self._idle, opener)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._workers: ThreadPoolExecutor | None = None
@@ -159,10 +161,10 @@ class CanopenLink:
         """Read several one after the other; a time-out or loss ends the batch for the rest too."""
         cancelled = threading.Event()
 
-        def batch() -> list[bytes | DriveError]:
+        def batch(addresses: Sequence[Address]) -> list[bytes | DriveError]:
             results: list[bytes | DriveError] = []
             for address in addresses:
-                if cancelled.is_set():
+                if cancelled.is_set() or self._urgent[station]:
                     break
                 try:
                     results.append(self._read_now(station, address))
@@ -173,7 +175,11 @@ class CanopenLink:
                     results.append(error)
             return results
 
-        return await self._run(station, batch, cancelled)
+        answers: list[bytes | DriveError] = []
+        while len(answers) < len(addresses):
+            rest = addresses[len(answers) :]
+            answers += await self._run(station, partial(batch, rest), cancelled)
+        return answers
 
     async def write(self, station: int, address: Address, data: bytes) -> None:
         """Write one object. A LinkTimeout leaves the outcome unknown; it is never repeated here."""
@@ -182,7 +188,12 @@ class CanopenLink:
             # An SDO write would be overwritten by the next PDO.
             await self._in_worker(lambda: self._cyclic.put(station, index, subindex, data))
         else:
-            await self._run(station, lambda: self._sdo_write(station, index, subindex, data))
+            self._channel(station)
+            self._urgent[station] += 1
+            try:
+                await self._run(station, lambda: self._sdo_write(station, index, subindex, data))
+            finally:
+                self._urgent[station] -= 1
 
     async def nmt(self, command: int, station: int = 0) -> None:
         """Send an NMT command (`drivers.canopen.frames`) to one node, or to all with 0."""
@@ -266,7 +277,9 @@ class CanopenLink:
                 self._watch.record(station).in_use = True
             self._used.add(station)
 
-    async def _in_worker(self, work: Callable[[], T]) -> T:
+    async def _in_worker(
+        self, work: Callable[[], T], cancelled: threading.Event | None = None
+    ) -> T:
         if self._workers is None:
             raise LinkLost(f"{self.url} is not open", drive=self.url, remedy="open the bus first")
         future = asyncio.get_running_loop().run_in_executor(self._workers, work)
@@ -274,6 +287,8 @@ class CanopenLink:
             return await asyncio.shield(future)
         except asyncio.CancelledError:
             # The thread cannot be interrupted; whoever comes next must not overtake it.
+            if cancelled is not None:
+                cancelled.set()
             await asyncio.wait([future])
             raise
 
@@ -283,13 +298,10 @@ class CanopenLink:
         self._channel(station)
         async with self._turns[station]:
             try:
-                return await self._in_worker(work)
+                return await self._in_worker(work, cancelled)
             except DriveError as error:
                 error.at(drive=f"node {station} on {self.url}")
                 raise
-            finally:
-                if cancelled is not None:
-                    cancelled.set()
 
     # Beneath: what runs on the receiving thread.
 

@@ -5,7 +5,8 @@ Pure: `AxisLoop.step` gets the inputs of a cycle and leaves the outputs of the n
 
 Whatever ends a motion by force (expiry, envelope, halt, invalid data) brakes and then leaves
 Operation enabled. Position and velocity setpoints are ramped down in `STOP_S`; a torque setpoint
-becomes zero with a quick stop, because no torque does not stop an axis that moves.
+becomes zero with a quick stop, because no torque does not stop an axis that moves. An axis that
+could not follow the ramp is handed to the drive's quick stop too: without power it would coast.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ _OFFSETS = (0x60B0, 0x60B1, 0x60B2)
 _STATUS, _MODE_SHOWN = 0x6041, 0x6061
 _ACTUAL_POSITION, _ACTUAL_VELOCITY, _ACTUAL_TORQUE, _FOLLOWING = 0x6064, 0x606C, 0x6077, 0x60F4
 _MODE_OF = {_POSITION: cia402.Mode.CSP, _VELOCITY: cia402.Mode.CSV, _TORQUE: cia402.Mode.CST}
+_RESTLESS = 2
+"""Increments per cycle that encoder noise may make of an axis at rest."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 
 
@@ -101,6 +104,10 @@ class AxisLoop:
         self._after_brake = State.READY
         self._after_quick_stop = State.READY
         self._was_enabled = False
+        self._last_position: int | None = None
+        self._moved = 0
+        """Increments since the cycle before."""
+        self._moved_at_stop = 0
 
     # Commands ------------------------------------------------------------------------------
 
@@ -183,6 +190,7 @@ class AxisLoop:
             return
         self._brake_target = motion.target if motion is not None else _POSITION
         self.phase = Phase.BRAKING
+        self._moved_at_stop = self._moved
         self._brake_left = self._stop_cycles
         start = self._speed if self._brake_target == _POSITION else self._setpoint
         self._brake_step = start / self._stop_cycles
@@ -198,6 +206,11 @@ class AxisLoop:
         place = self._in.get(_STATUS)
         if place is not None:
             self.state = cia402.decode_state(values[place])
+        place = self._in.get(_ACTUAL_POSITION)
+        if place is not None:
+            position = values[place]
+            self._moved = 0 if self._last_position is None else abs(position - self._last_position)
+            self._last_position = position
         enabled = self.state is State.OPERATION_ENABLED
         if self._was_enabled and not enabled:
             self._fell_out()
@@ -308,6 +321,9 @@ class AxisLoop:
             self.phase = Phase.IDLE
             self._speed = 0.0
             self.goal = self._after_brake
+            if self._moved > max(0.1 * self._moved_at_stop, _RESTLESS):
+                self.goal = State.QUICK_STOP_ACTIVE
+                self._after_quick_stop = self._after_brake
 
     def _control(self) -> None:
         place = self._out[_CONTROL]

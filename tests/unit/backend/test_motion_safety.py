@@ -12,10 +12,12 @@ import pytest
 from backend.api.app import make_app
 from backend.axis import Envelope
 from backend.bench import Bench, Member
+from backend.cyclic import CyclicState
 from backend.drive import Port
 from backend.jobs import Progress
 from backend.tools import jog as jogging
 from backend.tools import move as moving
+from backend.tools.cyclic_motion import GeneratorSettings, generate, jog_cyclic
 from backend.tools.jog import Hold, JogSettings, jog
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
@@ -469,3 +471,55 @@ def test_lead_is_what_the_architecture_says() -> None:
     # 60 rpm = 1 rev/s; T = 0.2 s; a = 10 rev/s²: 0.2 + 1/20
     assert JOG.lead_rev == pytest.approx(0.25)
     assert jogging.RENEWAL_TIMEOUT_S == 0.2
+
+
+# --- the cyclic jog -------------------------------------------------------------------
+
+
+class Exchange:
+    """A cyclic exchange that takes its time to enable, and notes what is played."""
+
+    running = True
+
+    def __init__(self) -> None:
+        self.state = CyclicState(0.001, None, (), ())
+        self.played: list[object] = []
+        self.cyclic = self
+
+    def power(self) -> None:
+        return None
+
+    def station(self, _drive: object) -> int:
+        return 1
+
+    async def play(self, trajectories: list[object]) -> int:
+        self.played += trajectories
+        return 0
+
+    async def halt(self, _station: int) -> None: ...
+
+    async def renew(self, _station: int) -> None: ...
+
+
+async def test_cyclic_jog_released_while_enabling_plays_nothing(x: Member, servo: Servo) -> None:
+    exchange, hold = Exchange(), Hold()
+    enables = {"seen": False}
+
+    def note(place: tuple[int, int], value: int) -> None:
+        if place == CONTROL and value & ENABLES == ENABLES:
+            enables["seen"] = True
+            hold.release("released")
+
+    servo.on_write = note
+    result = await jog_cyclic(x.axis, exchange, JOG, hold, quiet())  # type: ignore[arg-type]
+    assert enables["seen"]
+    assert result["reason"] == "released"
+    assert exchange.played == []
+    assert servo.number(STATUS) == 0x250
+
+
+async def test_a_signal_outside_its_envelope_enables_nothing(x: Member, servo: Servo) -> None:
+    settings = GeneratorSettings("CSP", "sine", 6.0, 1.0, ENVELOPE)
+    with pytest.raises(OutOfRange, match="envelope"):
+        await generate(x.axis, Exchange(), settings, quiet())  # type: ignore[arg-type]
+    assert servo.written == []

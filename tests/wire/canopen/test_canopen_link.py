@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 
 import pytest
@@ -98,6 +99,44 @@ async def test_a_mute_node_times_out_and_others_go_on(bench: Bench, link: Canope
     bench.node.mute = False
     assert await link.read(5, STATUS) == b"\x50\x02"
     assert link.quality(5).timeouts == 1
+
+
+def slow_reads(link: CanopenLink, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Every read takes 20 ms; returns what was done, in order."""
+    done: list[str] = []
+
+    def read(_station: int, _address: Address) -> bytes:
+        done.append("read")
+        time.sleep(0.02)
+        return b""
+
+    monkeypatch.setattr(link, "_read_now", read)
+    monkeypatch.setattr(link, "_sdo_write", lambda *_: done.append("write"))
+    return done
+
+
+async def test_a_write_overtakes_batches_of_reads(
+    link: CanopenLink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may be the stop: at most the read under way goes before it."""
+    done = slow_reads(link, monkeypatch)
+    batches = [asyncio.create_task(link.read_many(5, [STATUS] * 16)) for _ in range(3)]
+    await until(lambda: done)
+    before = len(done)
+    await link.write(5, SMALL, b"\x02")
+    assert done.index("write") <= before + 1
+    assert [len(await batch) for batch in batches] == [16] * 3
+
+
+async def test_cancelling_a_batch_waits_for_one_read_only(
+    link: CanopenLink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = slow_reads(link, monkeypatch)
+    batch = asyncio.create_task(link.read_many(5, [STATUS] * 16))
+    await until(lambda: done)
+    batch.cancel()
+    await asyncio.wait([batch])
+    assert len(done) <= 3
 
 
 async def test_a_timed_out_write_is_sent_once(bench: Bench, link: CanopenLink) -> None:

@@ -213,6 +213,37 @@ def test_torque_ends_with_a_quick_stop_because_no_torque_does_not_stop_an_axis()
     assert bench.axis.outputs[0] == 0x02
 
 
+def test_an_axis_that_cannot_follow_the_brake_ramp_is_not_left_to_coast() -> None:
+    bench = Bench().enabled()
+    bench.play([500 + 100 * n for n in range(1, 300)])
+    for _ in range(50):
+        bench.step()
+        bench.position = bench.axis.outputs[1]
+    bench.axis.stop("released")
+    for _ in range(round(STOP_S / CYCLE_S) + 2):
+        bench.position += 80  # too much inertia for its torque
+        bench.step()
+    assert bench.axis.phase is Phase.IDLE
+    assert bench.axis.outputs[0] == 0x02, "Quick stop brakes on; Shutdown would cut the power"
+    bench.status = DISABLED
+    bench.obey()
+    assert bench.status == READY
+
+
+def test_an_axis_that_followed_the_brake_ramp_is_shut_down() -> None:
+    bench = Bench().enabled()
+    bench.play([500 + 100 * n for n in range(1, 300)])
+    for _ in range(50 + 1):
+        bench.step()
+        bench.position = bench.axis.outputs[1]
+    bench.axis.stop("released")
+    for _ in range(round(STOP_S / CYCLE_S) + 1):
+        bench.step()
+        bench.position = bench.axis.outputs[1]
+    bench.step()
+    assert bench.axis.outputs[0] == 0x06
+
+
 def test_a_fault_is_never_reset_by_enabling_nor_left_behind_enabled() -> None:
     bench = Bench().enabled()
     bench.play(list(range(500, 900)))
