@@ -27,7 +27,7 @@ def test_targets_and_width_on_a_phone(phone: Page, bench: Bench) -> None:
         phone.get_by_role("heading", level=1).wait_for()
         assert phone.evaluate(TOO_SMALL) == [], name
         assert phone.evaluate(SIDEWAYS) == 0, name
-    for name in ("connect", "scope", "files"):
+    for name in ("connect", "scope", "rerun", "files"):
         phone.evaluate(f"location.hash = '#/{name}'")
         phone.get_by_role("heading", level=1).wait_for()
         assert phone.evaluate(TOO_SMALL) == [], name

@@ -205,11 +205,11 @@ def _start_sequence(page: Page, bench: Bench) -> None:
     bench.wait_moving()
 
 
-@pytest.mark.parametrize("where", ["motion", "parameters", "scope", "connect", "files"])
+@pytest.mark.parametrize("where", ["motion", "parameters", "scope", "rerun", "connect", "files"])
 def test_stop_on_every_page(laptop: Page, bench: Bench, where: str) -> None:
     page = laptop
     _start_sequence(page, bench)
-    if where in ("scope", "connect", "files"):
+    if where in ("scope", "rerun", "connect", "files"):
         page.evaluate(f"location.hash = '#/{where}'")
     else:
         open_axis(page, bench.drive, where)
