@@ -6,6 +6,8 @@ import csv
 import io
 import json
 import os
+import resource
+import signal
 import time
 import zipfile
 from collections.abc import Iterator
@@ -120,6 +122,33 @@ def test_trigger_keeps_what_was_before_it(station: Station, x: str) -> None:
     assert 0.45 < crossing < 0.75, "half a second before the trigger is there"
     assert table[-1, 0] - crossing == pytest.approx(0.5, abs=0.25)
     assert abs(table[0, 2]) < 0.05 * RPM_100, "it stood before"
+
+
+def test_full_disk_ends_it_and_the_axis_goes_on(station: Station, x: str) -> None:
+    body = {"mode": "PV", "target": 200, "acceleration": 3000, "deceleration": 3000,
+            "travel_limit": 100, "torque_limit": 150, "timeout_s": 20, "consent": True}  # fmt: skip
+    job = station.ok(station.http.post(f"/drives/{x}/jobs/move", json=body))
+    name = start(station, x, name="full")["name"]
+    until(lambda: samples(station, name) > 20)
+    file = station.folder / "state" / "recordings" / name
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    # The kernel refuses to write beyond this, as it does on a full disk.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (file.stat().st_size + 3000, before[1]))
+    try:
+        until(lambda: listed(station)[0]["state"] in ("interrupted", "failed"), 15, "it ends")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    log = station.ok(station.http.get("/log"))
+    assert any(
+        e["level"] == "error" and "full.sdrec could not be written" in e["text"] for e in log
+    ), log[:5]
+    assert station.ok(station.http.get(f"/jobs/{job['id']}"))["state"] == "running"
+    turning = [float(station.state(x)["velocity"]) for _ in range(5)]
+    assert turning == pytest.approx([200] * 5, rel=0.1)
+    assert samples(station, name) > 20, "what was written is there"
+    station.ok(station.http.delete(f"/jobs/{job['id']}"))
 
 
 def test_a_trigger_that_never_came_keeps_nothing(station: Station, x: str) -> None:

@@ -129,3 +129,19 @@ def test_a_cut_recording_is_exported_as_far_as_it_goes(recording: Path, kind: st
     recording.write_bytes(recording.read_bytes()[:-700])
     export(recording, recording.with_name(f"a.{kind}"), kind, lambda _f: None)
     assert recording.with_name(f"a.{kind}").stat().st_size > 100
+
+
+def test_samples_of_one_stream_with_the_same_time_are_all_kept(tmp_path: Path) -> None:
+    """A bus that was late delivers runs whose times overlap."""
+    path = tmp_path / "a.sdrec"
+    writer = RecordingWriter(path, header(2, 1), fail)
+    late = ScopeBlock(9, 100.004, 0.001, ("a", "b"), np.arange(20.0).reshape(10, 2))
+    writer.put(0, block(0))
+    writer.put(0, late)
+    writer.close({"reason": "stopped"})
+    with run(path, "csv").open(newline="", encoding="utf-8") as file:
+        _, *rows = list(csv.reader(file))
+    assert len(rows) == 20
+    seen = {(float(row[1]), float(row[2])) for row in rows}
+    assert seen == {tuple(r) for r in np.concatenate([block(0).samples, late.samples]).tolist()}
+    assert [float(row[0]) for row in rows] == sorted(float(row[0]) for row in rows)
