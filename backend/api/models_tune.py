@@ -147,6 +147,7 @@ class GainInfo(Message):
     speed_nms: float | None
     integral_hz: float | None
     level: int | None
+    levels: list[int] = Field(description="stiffness levels that the drive has; empty: none")
     inertia_kgm2: float | None
     current_bandwidth_hz: float | None
     speed_filter_hz: float | None

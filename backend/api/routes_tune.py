@@ -243,9 +243,11 @@ async def read_gains(member: TheMember) -> GainInfo:
     """Loop gains, read now."""
     facts = await read_facts(member.axis)
     found = await gains.read_gains(member.axis, facts)
+    tables = member.drive.profile.stiffness
     return GainInfo(
         convention=found.convention, position_1_s=found.position_1_s, speed_hz=found.speed_hz,
         speed_nms=found.speed_nms, integral_hz=found.integral_hz, level=found.level,
+        levels=sorted(tables[0].rows) if tables else [],
         inertia_kgm2=facts.drive_inertia_kgm2, current_bandwidth_hz=facts.current_bandwidth_hz,
         speed_filter_hz=facts.speed_filter_hz,
         rated_torque_nm=facts.rated_torque_nm if facts.torque_known else None, raw=found.raw,

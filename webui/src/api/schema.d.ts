@@ -1898,6 +1898,11 @@ export interface components {
             integral_hz: number | null;
             /** Level */
             level: number | null;
+            /**
+             * Levels
+             * @description stiffness levels that the drive has; empty: none
+             */
+            levels: number[];
             /** Position 1 S */
             position_1_s: number | null;
             /** Rated Torque Nm */
