@@ -16,6 +16,7 @@ from backend.api import (
     routes_bench,
     routes_description,
     routes_drive,
+    routes_ethercat,
     routes_recordings,
     routes_rerun,
     routes_sets,
@@ -93,6 +94,7 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
     for part in (
         routes_bench,
         routes_drive,
+        routes_ethercat,
         routes_sets,
         routes_description,
         routes_recordings,

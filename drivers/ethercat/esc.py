@@ -5,12 +5,13 @@ Source: ETG.1000.4 clauses 6.1 (0x0110 DL status) and 6.2 (0x0300 error counters
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 DL_STATUS = 0x0110
 ERROR_COUNTERS = 0x0300
 ERROR_COUNTERS_SIZE = 20
+TIME_DIFFERENCE = 0x092C
 
 #: A frame goes through the open ports of a slave in this order.
 _PORT_ORDER = (0, 3, 1, 2)
@@ -36,6 +37,26 @@ class PortCounters:
     ports: tuple[Port, ...]
     processing_errors: int = 0
     pdi_errors: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What a counter accuses, in words; ``port`` is None for what belongs to no cable."""
+
+    station: int
+    port: int | None
+    text: str
+
+
+def decode_time_difference(register: bytes) -> int:
+    """How far [ns] the slave's clock is ahead of the reference clock; negative: behind.
+
+    Register 0x92C: magnitude in bits 0…30, bit 31 set when the local copy is smaller
+    (ETG.1000.4 clause 6.5, table 65).
+    """
+    raw = int.from_bytes(register[:4], "little")
+    magnitude = raw & 0x7FFFFFFF
+    return -magnitude if raw & 0x80000000 else magnitude
 
 
 def decode_ports(station: int, dl_status: bytes, counters: bytes | None) -> PortCounters:
@@ -72,40 +93,55 @@ def parents(stations: Sequence[PortCounters]) -> dict[int, tuple[int, int]]:
 
 
 def cable_findings(stations: Sequence[PortCounters]) -> list[str]:
+    """The sentences of `findings`."""
+    return [finding.text for finding in findings(stations, parents(stations))]
+
+
+def findings(
+    stations: Sequence[PortCounters], upstream: Mapping[int, tuple[int, int]]
+) -> list[Finding]:
     """Which cable or connector the counters accuse, in words; empty when nothing is wrong.
+
+    ``upstream`` is what `parents` told while every station answered: while a cable is cut its
+    ports no longer say what is behind them.
 
     Only ``rx_errors`` and ``invalid_frames`` that are not forwarded ones arise at the port
     itself. Port 0 of a station hears the one before it, so errors there and at the port of the
     station before are the same cable, each direction for itself.
     """
-    upstream = parents(stations)
     before = {(parent, port): station for station, (parent, port) in upstream.items()}
-    findings = []
+    found = []
     for here in stations:
         for number, port in enumerate(here.ports):
-            other = upstream[here.station][0] if number == 0 else before.get((here.station, number))
-            own = max(port.invalid_frames + port.rx_errors - port.forwarded_errors, 0)
-            if port.lost_links:
-                findings.append(
-                    f"{_cable(here.station, number, other)}: the link was lost"
-                    f" {_times(port.lost_links)}; check plug and cable"
-                )
-            if own:
-                findings.append(
-                    f"{_cable(here.station, number, other)}: damaged frames arrived"
-                    f" {_times(own)}; check cable, screen and earth"
-                )
+            parent = upstream.get(here.station, (0, 0))[0]
+            other = parent if number == 0 else before.get((here.station, number))
+            found += _port_findings(here.station, number, port, other)
         if here.processing_errors:
-            findings.append(
+            text = (
                 f"station {here.station}: {here.processing_errors} frames that are not EtherCAT;"
                 " something else sends on this segment"
             )
+            found.append(Finding(here.station, None, text))
         if here.pdi_errors:
-            findings.append(
+            text = (
                 f"station {here.station}: {here.pdi_errors} errors between its EtherCAT chip and"
                 " its processor; a fault inside the drive"
             )
-    return findings
+            found.append(Finding(here.station, None, text))
+    return found
+
+
+def _port_findings(station: int, number: int, port: Port, other: int | None) -> list[Finding]:
+    cable = _cable(station, number, other)
+    own = max(port.invalid_frames + port.rx_errors - port.forwarded_errors, 0)
+    found = []
+    if port.lost_links:
+        text = f"{cable}: the link was lost {_times(port.lost_links)}; check plug and cable"
+        found.append(Finding(station, number, text))
+    if own:
+        text = f"{cable}: damaged frames arrived {_times(own)}; check cable, screen and earth"
+        found.append(Finding(station, number, text))
+    return found
 
 
 def _times(count: int) -> str:

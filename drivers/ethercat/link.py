@@ -18,6 +18,7 @@ from drivers.ethercat.al_status import AlState
 from drivers.ethercat.hostprocess import HostProcess
 from drivers.ethercat.protocol import Message, error_from_wire
 from drivers.ethercat.segmentcyclic import EthercatCyclic
+from drivers.ethercat.survey import ExchangeFigures, Survey, exchange_from, survey_from
 from drivers.link import Address, Cyclic, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
 from profiles.schema import LinkKind, Profile
 
@@ -57,6 +58,7 @@ class EthercatLink:
         self._listeners: list[Callable[[LinkEvent], None]] = []
         self._status: Message = {}
         self._counts = {"transactions": 0, "timeouts": 0}
+        self._launched = bool(launcher)
         self._host = HostProcess(
             interface, launcher, self._received, self._restarted, _options(lockstep)
         )
@@ -204,6 +206,31 @@ class EthercatLink:
         """ESC error counters per port, and which cable they accuse, in words."""
         answer: Message = await self._call({"op": "counters"}, _ANSWER_S)
         return answer["ports"], answer["findings"]
+
+    async def survey(self) -> Survey:
+        """The segment as it is now: stations in the order of the cable, ports, findings.
+
+        Before the first search there are none. Reads some registers of every slave.
+
+        Raises:
+            LinkLost: the host or the interface is gone.
+        """
+        return survey_from(await self._call({"op": "counters"}, _ANSWER_S))
+
+    @property
+    def exchange(self) -> ExchangeFigures | None:
+        """Figures of the running exchange, at most 200 ms old; None while none runs."""
+        return exchange_from(self._status.get("cyclic", {}))
+
+    @property
+    def real_time(self) -> tuple[str, ...]:
+        """What the host process was granted and denied, in sentences."""
+        return self._host.granted
+
+    @property
+    def private_network(self) -> bool:
+        """The interface is of a private network in which everything is permitted."""
+        return self._launched
 
     async def clear_port_counters(self, station: int) -> None:
         """Set the ESC error counters of a slave to zero."""

@@ -125,8 +125,8 @@ class Operations:
             self.lanes.submit(number, "mailbox", steps, one(number) if number in left else _ignore)
 
     def _found(self, station: Station) -> Message:
-        known = [s.ports for s in self.roster.stations if s.ports is not None]
-        parent, port = esc.parents(known).get(station.number, (0, 0))
+        wiring = [s.wiring for s in self.roster.stations if s.wiring is not None]
+        parent, port = esc.parents(wiring).get(station.number, (0, 0))
         return {
             "station": station.number, "vendor_id": station.vendor_id,
             "product_code": station.product_code, "revision": station.revision,
@@ -202,23 +202,46 @@ class Operations:
         self.lanes.submit(station.number, "mailbox", steps, done)
 
     def _counters(self, _message: Message, done: Done) -> None:
-        waiting = {station.number for station in self.roster.stations}
+        stations = self.roster.stations
+        waiting = {station.number for station in stations}
+        answered: set[int] = set()
 
         def one(number: int) -> Done:
-            def read(_result: object, _error: DriveError | None) -> None:
+            def read(answers: bool | None, _error: DriveError | None) -> None:
                 waiting.discard(number)
+                if answers:
+                    answered.add(number)
                 if not waiting:
-                    known = [s.ports for s in self.roster.stations if s.ports is not None]
-                    findings = esc.cable_findings(known)
-                    done({"ports": [asdict(p) for p in known], "findings": findings}, None)
+                    if len(answered) == len(stations):
+                        for station in stations:
+                            station.wiring = station.ports
+                    done(self._survey(stations), None)
 
             return read
 
         if not waiting:
-            done({"ports": [], "findings": []}, None)
-        for station in self.roster.stations:
+            done(self._survey(stations), None)
+        for station in stations:
             steps = transactions.read_ports(station)
             self.lanes.submit(station.number, "register", steps, one(station.number))
+
+    def _survey(self, stations: list[Station]) -> Message:
+        known = [s.ports for s in stations if s.ports is not None]
+        upstream = esc.parents([s.wiring for s in stations if s.wiring is not None])
+        found = esc.findings(known, upstream)
+        return {
+            "ports": [asdict(p) for p in known],
+            "findings": [finding.text for finding in found],
+            "accused": [asdict(finding) for finding in found],
+            "stations": [
+                self._found(station)
+                | {
+                    "lost": station.lost, "al": station.al_state, "al_code": station.al_code,
+                    "clock_ahead_ns": station.clock_ahead_ns,
+                }
+                for station in stations
+            ],
+        }  # fmt: skip
 
     def _clear_counters(self, message: Message, done: Done) -> None:
         def clear() -> Steps[None]:
@@ -283,7 +306,9 @@ class Operations:
         self.roster.exchange.stop(done)
 
     def _play(self, message: Message, done: Done) -> None:
-        done(self.roster.exchange.play(message["trajectories"]), None)
+        first = self.roster.exchange.play(message["trajectories"])
+        self._tell_figures()
+        done(first, None)
 
     def _renew(self, message: Message, done: Done) -> None:
         self.roster.exchange.axis(message["station"]).renew()
@@ -300,7 +325,12 @@ class Operations:
             axis.reset_fault()
         else:
             axis.drive_to(State[message["goal"]], message["mode"])
+        self._tell_figures()
         done(None, None)
+
+    def _tell_figures(self) -> None:
+        """Before the reply, so that nobody takes the end of an earlier motion for this one's."""
+        self._send({"event": "status"} | self.status())
 
     def status(self) -> Message:
         """The state of everything, sent several times a second."""

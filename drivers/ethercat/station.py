@@ -50,6 +50,10 @@ class Station:
     """Layouts of whole objects that were found equal to single reads, with their lengths."""
     notes: list[str] = field(default_factory=list)
     ports: esc.PortCounters | None = None
+    wiring: esc.PortCounters | None = None
+    """Its ports when last every station answered: what is behind a cable that is cut now."""
+    clock_ahead_ns: int | None = None
+    """Of the reference clock; None without distributed clock."""
 
     @property
     def box(self) -> Mailbox:
@@ -148,7 +152,8 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
     station.alias = int.from_bytes(alias or b"\0\0", "little")
     features = yield Read(0x08, 2)
     station.distributed_clock = bool(features and features[0] & 0x04)
-    yield from read_ports(station)
+    if (yield from read_ports(station)):
+        station.wiring = station.ports
     if station.mailbox is None:
         yield from al_status(station)
         station.notes.append("no mailbox: only process data")
@@ -191,12 +196,22 @@ def _try_read(station: Station, index: int, subindex: int) -> Steps[bytes | None
         return None
 
 
-def read_ports(station: Station) -> Steps[None]:
-    """Read link state and error counters of the four ports."""
+def read_ports(station: Station) -> Steps[bool]:
+    """Read link state and error counters of the four ports, and the deviation of the clock.
+
+    Returns whether the station answered; its last figures stay where it did not.
+    """
     status = yield Read(esc.DL_STATUS, 2)
+    if status is None:
+        return False
     counters = yield Read(esc.ERROR_COUNTERS, esc.ERROR_COUNTERS_SIZE)
-    if status is not None:
+    if counters is not None:
         station.ports = esc.decode_ports(station.number, status, counters)
+    if station.distributed_clock:
+        difference = yield Read(esc.TIME_DIFFERENCE, 4)
+        if difference is not None:
+            station.clock_ahead_ns = esc.decode_time_difference(difference)
+    return counters is not None
 
 
 def read_items(

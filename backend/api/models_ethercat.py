@@ -1,0 +1,114 @@
+"""Messages of EtherCAT segments: stations, ports, punctuality, permissions."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from backend.api.models import Message
+
+
+class SegmentPort(Message):
+    """One port of a slave. Counters stop at 255 and count since they were last cleared."""
+
+    number: int
+    link: bool
+    communicating: bool
+    lost_links: int
+    rx_errors: int
+    invalid_frames: int
+    forwarded_errors: int
+    findings: list[str] = Field(description="which cable the counters accuse, in words")
+
+
+class SegmentStation(Message):
+    """One slave in the order of the cable."""
+
+    station: int
+    name: str
+    drive: str | None = Field(description="id of the connected drive")
+    vendor_id: int
+    product_code: int
+    revision: int
+    serial: int | None
+    alias: int
+    firmware: str
+    answers: bool
+    state: str = Field(description="AL state; empty while it does not answer")
+    error: str = Field(description="why it is in an error state, after its AL status code")
+    remedy: str
+    behind_station: int = Field(description="the station before it; 0 is the computer")
+    behind_port: int
+    distributed_clock: bool
+    clock_ahead_ns: int | None = Field(description="of the reference clock")
+    ports: list[SegmentPort]
+    findings: list[str] = Field(description="what its counters accuse that is no cable")
+    notes: list[str]
+    foe: bool = Field(description="its profile says that it takes firmware by FoE")
+
+
+class LateBin(Message):
+    """Cycles that woke up less than ``below_us`` late, and not less than the bin before."""
+
+    below_us: int | None = Field(description="None: everything above")
+    count: int
+
+
+class SegmentExchange(Message):
+    """Figures of the running exchange, since its start."""
+
+    cycles: int
+    overruns: int
+    lost_frames: int
+    wkc_errors: int
+    expected_wkc: int
+    last_wkc: int
+    late_p50_us: int
+    late_p99_us: int
+    late_max_us: int
+    late: list[LateBin]
+    dc: bool
+    dc_deviation_ns: int = Field(description="of the computer's grid from the reference clock")
+    dc_deviation_max_ns: int
+
+
+class EthercatPermissions(Message):
+    """What is missing to use an interface, and the commands that grant it."""
+
+    interface: str
+    ready: bool
+    text: str
+    missing: list[str] = Field(description="capabilities without which EtherCAT is impossible")
+    advised: list[str] = Field(description="capabilities that only make cycles more punctual")
+    commands: list[str]
+
+
+class EthercatSegment(Message):
+    """A segment as it is now."""
+
+    url: str
+    connected: bool
+    state: str
+    problem: str = Field(description="why the stations could not be asked; empty if they were")
+    stations: list[SegmentStation]
+    late_frames: int = Field(description="frames that came back after they were given up")
+    host_restarts: int
+    real_time: list[str]
+    private_network: bool
+    exchange: SegmentExchange | None
+    permissions: EthercatPermissions | None = Field(description="None in a private network")
+
+
+class CountersRequest(Message):
+    """Whose error counters to set to zero; None is all stations."""
+
+    url: str
+    station: int | None = Field(default=None, ge=1)
+
+
+class AliasRequest(Message):
+    """A station alias to write to the EEPROM of a slave."""
+
+    url: str
+    station: int = Field(ge=1)
+    alias: int = Field(ge=0, le=0xFFFF)
+    confirmed: bool = False

@@ -1,0 +1,330 @@
+"""Routes that only EtherCAT segments have: the segment, error counters, alias, firmware."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from backend.api import convert
+from backend.api.context import Connection, Controlled, TheBench
+from backend.api.errors import NotFound
+from backend.api.models import JobInfo
+from backend.api.models_ethercat import (
+    AliasRequest,
+    CountersRequest,
+    EthercatPermissions,
+    EthercatSegment,
+    LateBin,
+    SegmentExchange,
+    SegmentPort,
+    SegmentStation,
+)
+from backend.bench import Bench, Member
+from backend.jobs import JobResult, Progress
+from drivers.cia402 import State
+from drivers.errors import DriveError, NotAllowed, OutOfRange
+from drivers.ethercat import permissions
+from drivers.ethercat.link import EthercatLink
+from drivers.ethercat.survey import ExchangeFigures, Survey, SurveyedStation
+
+router = APIRouter()
+
+_SCHEME = "ethercat://"
+_MAX_FIRMWARE_BYTES = 32 << 20
+_FIRMWARE_WARNING = (
+    "An interrupted download can leave the drive without firmware. Have the right file for"
+    " exactly this drive, save its parameters to a file first, and do not switch anything off"
+)
+_ALIAS_WARNING = (
+    "The alias is written to the drive's EEPROM and is valid after its supply was switched off"
+    " and on. Machines whose controller addresses drives by alias must be told"
+)
+_FIRMWARE_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/octet-stream": {"schema": {"type": "string"}}},
+    }
+}
+
+
+@router.get("/ethercat/segment")
+async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> EthercatSegment:
+    """An opened segment: its stations in the order of the cable, ports, clocks, punctuality.
+
+    Answers as well while the segment cannot be asked; ``problem`` then says why.
+    """
+    link = _link(bench, url)
+    survey, problem = Survey((), ()), ""
+    try:
+        survey = await link.survey()
+    except DriveError as error:
+        problem = error.message
+    quality = link.quality()
+    figures = link.exchange
+    report = None if link.private_network else _permissions(link.permissions())
+    return EthercatSegment(
+        url=url,
+        connected=quality.connected,
+        state=quality.state,
+        problem=problem,
+        stations=[_station(bench, url, seen, survey) for seen in survey.stations],
+        late_frames=int(quality.details["late_frames"]),
+        host_restarts=int(quality.details["host_restarts"]),
+        real_time=list(link.real_time),
+        private_network=link.private_network,
+        exchange=None if figures is None else _exchange(figures),
+        permissions=report,
+    )
+
+
+@router.get("/ethercat/permissions")
+async def ethercat_permissions(url: Annotated[str, Query()]) -> EthercatPermissions:
+    """What is missing to use an interface that need not be opened yet."""
+    if not url.startswith(_SCHEME):
+        raise OutOfRange(f"{url} is no EtherCAT bus", value=url, limit=f"{_SCHEME}INTERFACE")
+    return _permissions(permissions.check(url.removeprefix(_SCHEME)))
+
+
+@router.post("/ethercat/counters/clear", status_code=204)
+async def clear_counters(
+    bench: TheBench, request: CountersRequest, connection: Connection = None
+) -> Response:
+    """Set the port error counters of one station or of all to zero."""
+    link = _link(bench, request.url)
+    for member in _members(bench, link):
+        if request.station in (None, _station_of(member, link)):
+            bench.leases.require(member.drive.id, connection)
+    seen = (await link.survey()).stations
+    chosen = [s.station for s in seen if request.station in (None, s.station) and not s.lost]
+    if request.station is not None and not chosen:
+        raise NotAllowed(
+            f"station {request.station} of {request.url} does not answer", value=request.station
+        )
+    for station in chosen:
+        await link.clear_port_counters(station)
+    bench.journal.add(f"{request.url}: error counters of {len(chosen)} stations cleared")
+    return Response(status_code=204)
+
+
+@router.post("/ethercat/alias", status_code=204)
+async def write_alias(
+    bench: TheBench, request: AliasRequest, connection: Connection = None
+) -> Response:
+    """Write a station alias; the EEPROM takes its time, so nothing may move on this bus."""
+    link = _link(bench, request.url)
+    _require_calm(bench, link, connection)
+    _require_confirmed(request.confirmed, _ALIAS_WARNING)
+    for member in _members(bench, link):
+        if _station_of(member, link) == request.station:
+            await member.drive.confirm_identity()
+    await link.set_alias(request.station, request.alias)
+    bench.journal.add(
+        f"{request.url}: alias {request.alias} written to station {request.station};"
+        " valid after a power cycle"
+    )
+    return Response(status_code=204)
+
+
+@router.post(
+    "/drives/{drive_id}/jobs/firmware", status_code=202, openapi_extra=_FIRMWARE_BODY
+)  # fmt: skip
+async def load_firmware(
+    bench: TheBench,
+    member: Controlled,
+    request: Request,
+    file: Annotated[str, Query(min_length=1, max_length=100, description="name for the drive")],
+    password: Annotated[int, Query(ge=0, le=0xFFFFFFFF)] = 0,
+    confirmed: Annotated[bool, Query()] = False,
+    connection: Connection = None,
+) -> JobInfo:
+    """Send firmware by FoE to a drive whose profile says that it takes it so.
+
+    The job cannot be cancelled: a download that breaks off may leave the drive without firmware.
+    """
+    link, station = _firmware_port(member)
+    _require_calm(bench, link, connection)
+    _require_confirmed(confirmed, _FIRMWARE_WARNING)
+    data = await _body(request, file)
+    await member.drive.confirm_identity()
+    if await member.axis.state() in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
+        raise NotAllowed(
+            f"{member.drive.name} is enabled", drive=member.drive.name, remedy="disable it first"
+        )
+
+    async def work(progress: Progress) -> JobResult:
+        await _to_the_end(link, station, file, data, password, progress)
+        bench.journal.add(f"{member.drive.name}: {file} loaded", drive=member.drive.id)
+        return {"bytes": len(data), "file": file}
+
+    title = f"Load firmware {file} into {member.drive.name}"
+    job = bench.jobs.start(
+        "firmware", title, work, drive=member.drive.id, motion=True, stoppable=False
+    )
+    bench.journal.add(title, level="warning", drive=member.drive.id)
+    return convert.job(job)
+
+
+async def _to_the_end(
+    link: EthercatLink, station: int, file: str, data: bytes, password: int, progress: Progress
+) -> None:
+    """Load, and do not let a cancellation leave the drive with half a file."""
+    words = ""
+
+    def tell(share: float, text: str) -> None:
+        progress(share, words + text)
+
+    loading = asyncio.ensure_future(
+        link.load_firmware(station, file, data, tell, password=password)
+    )
+    while not loading.done():
+        try:
+            await asyncio.shield(loading)
+        except asyncio.CancelledError:
+            if loading.cancelled():
+                raise
+            words = "not cancelled, the drive would be left without firmware: "
+            progress(progress.fraction, words + "wait for the end")
+    loading.result()
+
+
+async def _body(request: Request, file: str) -> bytes:
+    data = bytearray()
+    async for chunk in request.stream():
+        data += chunk
+        if len(data) > _MAX_FIRMWARE_BYTES:
+            raise OutOfRange(
+                f"{file} is larger than {_MAX_FIRMWARE_BYTES >> 20} MiB",
+                limit=f"{_MAX_FIRMWARE_BYTES} bytes",
+            )
+    if not data:
+        raise OutOfRange(f"{file} is empty", remedy="choose the maker's firmware file")
+    return bytes(data)
+
+
+def _link(bench: Bench, url: str) -> EthercatLink:
+    link = bench.links.get(url)
+    if not isinstance(link, EthercatLink):
+        raise NotFound(
+            f"{url} is no opened EtherCAT bus", value=url, remedy="scan it on the Connect page"
+        )
+    return link
+
+
+def _members(bench: Bench, link: EthercatLink) -> list[Member]:
+    return [m for m in bench.members.values() if _station_of(m, link) is not None]
+
+
+def _station_of(member: Member, link: EthercatLink) -> int | None:
+    return next((port.station for port in member.drive.ports if port.link is link), None)
+
+
+def _require_calm(bench: Bench, link: EthercatLink, connection: str | None) -> None:
+    """Control of every drive of the segment, and nothing moves on it.
+
+    What follows keeps the wire busy or resets a drive; neither may happen under a neighbour's
+    motion.
+    """
+    for member in _members(bench, link):
+        bench.leases.require(member.drive.id, connection)
+        bench.require_idle(member)
+
+
+def _require_confirmed(confirmed: bool, warning: str) -> None:
+    if not confirmed:
+        raise NotAllowed(warning, remedy="send it again with confirmed=true if all that is so")
+
+
+def _firmware_port(member: Member) -> tuple[EthercatLink, int]:
+    for port in member.drive.ports:
+        if isinstance(port.link, EthercatLink) and port.spec is not None and port.spec.foe:
+            return port.link, port.station
+    raise NotAllowed(
+        f"{member.drive.name}: its profile does not say that it takes firmware over EtherCAT",
+        drive=member.drive.name,
+        remedy="use the maker's own tool",
+    )
+
+
+def _station(bench: Bench, url: str, seen: SurveyedStation, survey: Survey) -> SegmentStation:
+    member = next(
+        (
+            m
+            for m in bench.members.values()
+            for port in m.drive.ports
+            if bench.url_of(port) == url and port.station == seen.station
+        ),
+        None,
+    )
+    spec = member.drive.profile.link("ethercat") if member else None
+    own = [f for f in survey.findings if f.station == seen.station]
+    why = seen.al_text
+    return SegmentStation(
+        station=seen.station,
+        name=seen.name,
+        drive=member.drive.id if member else None,
+        vendor_id=seen.vendor_id,
+        product_code=seen.product_code,
+        revision=seen.revision,
+        serial=seen.serial,
+        alias=seen.alias,
+        firmware=seen.firmware,
+        answers=not seen.lost,
+        state=seen.state,
+        error=why.text if why else "",
+        remedy=why.remedy if why else "",
+        behind_station=seen.parent,
+        behind_port=seen.parent_port,
+        distributed_clock=seen.distributed_clock,
+        clock_ahead_ns=seen.clock_ahead_ns,
+        ports=[
+            SegmentPort(
+                number=number,
+                link=port.link,
+                communicating=port.communicating,
+                lost_links=port.lost_links,
+                rx_errors=port.rx_errors,
+                invalid_frames=port.invalid_frames,
+                forwarded_errors=port.forwarded_errors,
+                findings=[f.text for f in own if f.port == number],
+            )
+            for number, port in enumerate(seen.ports)
+        ],
+        findings=[f.text for f in own if f.port is None],
+        notes=list(seen.notes),
+        foe=bool(spec and spec.foe),
+    )
+
+
+def _exchange(figures: ExchangeFigures) -> SegmentExchange:
+    last = len(figures.late) - 1
+    return SegmentExchange(
+        cycles=figures.cycles,
+        overruns=figures.overruns,
+        lost_frames=figures.lost_frames,
+        wkc_errors=figures.wkc_errors,
+        expected_wkc=figures.expected_wkc,
+        last_wkc=figures.last_wkc,
+        late_p50_us=figures.late_p50_us,
+        late_p99_us=figures.late_p99_us,
+        late_max_us=figures.late_max_us,
+        late=[
+            LateBin(below_us=None if place == last else 2**place, count=count)
+            for place, count in enumerate(figures.late)
+        ],
+        dc=figures.dc,
+        dc_deviation_ns=figures.dc_deviation_ns,
+        dc_deviation_max_ns=figures.dc_deviation_max_ns,
+    )
+
+
+def _permissions(report: permissions.Permissions) -> EthercatPermissions:
+    return EthercatPermissions(
+        interface=report.interface,
+        ready=report.ready,
+        text=report.words(),
+        missing=list(report.missing),
+        advised=list(report.advised),
+        commands=list(report.commands),
+    )

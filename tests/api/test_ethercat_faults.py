@@ -1,0 +1,352 @@
+"""Trouble on an EtherCAT segment, as a user of the interface sees it.
+
+Each fault: told in words, the server answers meanwhile, the axis stands, and all is well again
+without a restart once the cause is gone. Times of the drives follow the frames, so a busy test
+machine changes nothing but how long this takes.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import statistics
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.virtual.wires.ethercat.launch import VirtualSegment
+from drivers.virtual.wires.netns import unavailable
+from tests.api.test_ethercat import BENCH, JOG, URL, hold, undisturbed
+from tests.support.station import Live, Station, until
+
+B = 1
+"""Index of the second slave for the segment's commands; cable 1 leads to it."""
+VELOCITY = 0x606C
+LOST = re.compile("no longer answers|does not answer|no valid process data")
+"""How a motion ends whose drive vanished, by what is noticed first."""
+
+
+class Segment:
+    """A station with two axes on one segment, and what is done to the segment."""
+
+    def __init__(self, station: Station, options: list[str]) -> None:
+        self.station = station
+        self._options = options
+        self.a = station.add(1, URL, name="A")
+        self.b = station.add(2, URL, name="B")
+
+    def trouble(self, command: str, **arguments: object) -> Any:
+        return self.station.drives.segments[URL].command(command, **arguments)
+
+    def start_cyclic(self) -> None:
+        body = {"url": URL, "cycle_us": 1000}
+        bus = self.station.ok(self.station.http.post("/buses/cyclic", json=body))
+        assert bus["cyclic"]["running"]
+
+    def end_cyclic(self) -> None:
+        self.station.http.delete("/buses/cyclic", params={"url": URL})
+
+    def view(self) -> Any:
+        answer = self.station.http.get("/ethercat/segment", params={"url": URL})
+        return self.station.ok(answer)
+
+    def told(self, *words: str, after: int, within_s: float = 10.0) -> str:
+        """The line of the log with all these words that is newer than `lines`."""
+
+        def seen() -> str:
+            lines = self._log()
+            new = lines[: len(lines) - after] if len(lines) >= after else lines
+            return next((line for line in new if all(w in line for w in words)), "")
+
+        return str(until(seen, within_s, f"{words} in the log"))
+
+    def lines(self) -> int:
+        """How many lines the log has."""
+        return len(self._log())
+
+    def _log(self) -> list[str]:
+        return [entry["text"] for entry in self.station.ok(self.station.http.get("/log"))]
+
+    def stands(self, slave: int = B) -> None:
+        """By the drive's own word, past the wire: below 2 rpm (65536 increments to one turn)."""
+
+        def still() -> bool:
+            speed = bytes.fromhex(str(self.trouble("read", slave=slave, index=VELOCITY)))
+            return abs(int.from_bytes(speed, "little", signed=True)) < 65536 * 2 / 60
+
+        until(still, 10, "the axis stands")
+
+    def settled(self) -> None:
+        """Both drives were asked after now and answered; what their return began has ended."""
+        now = datetime.now(UTC)
+
+        def calm() -> bool:
+            jobs = self.station.ok(self.station.http.get("/jobs"))
+            states = [self.station.state(drive) for drive in (self.a, self.b)]
+            asked = all(datetime.fromisoformat(state["time"]) > now for state in states)
+            fresh = all(state["fresh"] for state in states)
+            return asked and fresh and all(job["state"] != "running" for job in jobs)
+
+        until(calm, 20, "both drives answer")
+
+    def responsive(self) -> None:
+        """The server answers at once while there is trouble.
+
+        A machine that stalls for a moment is no defect of the server; a server that waits for
+        the wire does so every time.
+        """
+        for _ in range(4):
+            times = []
+            for _ in range(20):
+                began = time.monotonic()
+                self.station.ok(self.station.http.get("/drives"))
+                times.append(time.monotonic() - began)
+                time.sleep(0.015)
+            if max(times) < 0.2 and statistics.median(times) < 0.05:
+                return
+        raise AssertionError(f"the server hangs: {sorted(times)[-3:]} s")
+
+    def jogs(self) -> None:
+        """Everything works: B can be moved, after a fault that it kept was reset by hand."""
+        if self.station.state(self.b)["state"] == "Fault":
+            self.station.ok(self.station.http.post(f"/drives/{self.b}/fault-reset", json={}))
+        with self.station.live() as page:
+
+            def jog() -> Any:
+                page.send(type="jog_start", drive=self.b, direction=1, **JOG)
+                hold(page, self.b, 0.8)
+                page.send(type="jog_stop", drive=self.b)
+                return page.wait("jog_ended", drive=self.b, timeout_s=20)
+
+            ended = undisturbed(jog)
+        assert ended["problem"] is None, ended
+
+    def stop(self) -> None:
+        self.station.http.post("/stop", json={})
+        self.end_cyclic()
+        for name in (self.a, self.b):
+            self.station.ok(self.station.http.delete(f"/drives/{name}"))
+
+    def peace(self) -> None:
+        self.trouble("peace")
+        self.trouble("heal")
+        self.trouble("mute", slave=B, on=False)
+        self.trouble("power_on", slave=B)
+
+    def start_again(self) -> None:
+        """The segment's process again, on the same cable, after it was killed."""
+        drives = self.station.drives
+        drives.segments[URL].close()
+        drives.segments[URL] = VirtualSegment.start("ec0s", self._options, drives._namespaces[0])
+
+
+@pytest.fixture(scope="module")
+def segment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Segment]:
+    if reason := unavailable():
+        pytest.skip(f"no private network here: {reason}")
+    folder = Path(tmp_path_factory.mktemp("faults"))
+    bench = folder / "bench.toml"
+    bench.write_text(BENCH)
+    station = Station(folder, bench, ["--lockstep"])
+    station.start()
+    made = Segment(station, ["--bench", str(bench), "--on", URL, "--lockstep"])
+    yield made
+    made.stop()
+    station.stop()
+
+
+@pytest.fixture
+def running(segment: Segment) -> Iterator[Segment]:
+    """Process data are exchanged; afterwards all trouble is taken back."""
+    segment.settled()
+    segment.start_cyclic()
+    yield segment
+    segment.peace()
+    segment.station.http.post("/stop", json={})
+    segment.end_cyclic()
+    segment.settled()
+
+
+def turning(page: Live, segment: Segment) -> None:
+    """Jog B and wait until it turns; the caller goes on holding. A stalled start is repeated."""
+    for _ in range(5):
+        page.send(type="jog_start", drive=segment.b, direction=1, **(JOG | {"travel_limit": 60.0}))
+        hold(page, segment.b, 0.7)
+        if abs(segment.station.state(segment.b)["velocity"] or 0.0) > 100:
+            return
+        page.wait("jog_ended", drive=segment.b, timeout_s=20)
+    raise AssertionError("this machine stalls too often")
+
+
+def reason(ended: Any) -> str:
+    """Why a jog ended, in words."""
+    return f"{ended['reason']} {(ended['problem'] or {}).get('detail', '')}"
+
+
+def test_cut_cable_stops_the_axis_behind_it_and_heals(running: Segment) -> None:
+    before = running.lines()
+    with running.station.live() as page:
+        turning(page, running)
+        running.trouble("cut", cable=1)
+        with page.holding(running.b):
+            ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
+    assert LOST.search(reason(ended)), ended
+    running.told("station 2", "no longer answers: supply off or cable cut", after=before)
+    running.responsive()
+    running.stands()
+    view = running.view()
+    assert [station["answers"] for station in view["stations"]] == [True, False]
+    first, second = view["stations"]
+    assert not first["ports"][1]["link"]
+    assert first["ports"][1]["lost_links"] >= 1
+    assert (
+        "cable between station 1 and station 2: the link was lost"
+        in (first["ports"][1]["findings"][0])
+    )
+    assert (second["behind_station"], second["behind_port"]) == (1, 1), "although it is cut"
+    running.trouble("heal", cable=1)
+    running.told("station 2 is in OP again", after=before)
+    assert running.station.state(running.b)["state"] != "Operation enabled"
+    running.settled()
+    running.jogs()
+
+
+def test_power_cycle_of_a_slave(running: Segment) -> None:
+    before = running.lines()
+    with running.station.live() as page:
+        turning(page, running)
+        running.trouble("power_cycle", slave=B, off_s=1.0)
+        with page.holding(running.b):
+            ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
+    assert LOST.search(reason(ended)), ended
+    running.told("station 2", "no longer answers", after=before)
+    running.responsive()
+    running.told("station 2 was switched on again", after=before)
+    running.told("station 2 is in OP again", after=before)
+    running.stands()
+    assert running.station.state(running.b)["state"] != "Operation enabled"
+    running.settled()
+    running.jogs()
+
+
+def test_mute_mailbox_ends_in_words_while_process_data_go_on(running: Segment) -> None:
+    running.trouble("mute", slave=B)
+    began = time.monotonic()
+    answer = running.station.http.get(f"/drives/{running.b}/parameters/2005:03")
+    assert time.monotonic() - began < 6
+    told = answer.json()
+    words = told.get("detail") or told.get("error")
+    assert "did not answer in time" in words, told
+    running.responsive()
+    assert running.view()["stations"][1]["state"] == "OP", "its process data still come"
+    answer = running.station.http.get(f"/drives/{running.a}/parameters/2005:03")
+    assert answer.json()["raw"] is not None, "the neighbour is served"
+    running.trouble("mute", slave=B, on=False)
+    running.settled()
+    until(
+        lambda: (
+            running.station.http.get(f"/drives/{running.b}/parameters/2005:03").json().get("raw")
+        ),
+        10,
+        "the parameter can be read again",
+    )
+    running.jogs()
+
+
+def test_single_lost_frames_are_counted_and_many_brake(running: Segment) -> None:
+    with running.station.live() as page:
+        turning(page, running)
+        running.trouble("lose", count=300, cyclic=True)
+        with page.holding(running.b):
+            ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
+        assert "no valid process data" in reason(ended)
+    running.responsive()
+    until(lambda: running.view()["exchange"]["lost_frames"] >= 30, 5)
+    running.trouble("peace")
+    running.stands()
+    running.settled()
+    running.trouble("lose", chance=0.01, cyclic=True)
+    lost = running.view()["exchange"]["lost_frames"]
+    running.jogs()
+    until(lambda: running.view()["exchange"]["lost_frames"] > lost, 10, "counted")
+    assert all(s["state"] == "OP" for s in running.view()["stations"])
+
+
+def test_damaged_frames_name_their_cable_until_cleared(running: Segment) -> None:
+    running.trouble("corrupt", slave=B, port=0, count=3)
+    sentence = until(lambda: running.view()["stations"][B]["ports"][0]["findings"], 10)[-1]
+    assert "cable between station 1 and station 2: damaged frames arrived" in sentence
+    with running.station.live() as other:
+        other.send(type="lease", drive=running.b, take=True)
+        until(lambda: running.station.ok(
+            running.station.http.get(f"/drives/{running.b}"))["lease"]["holder"], 5)  # fmt: skip
+        refused = running.station.http.post("/ethercat/counters/clear", json={"url": URL})
+        assert refused.status_code == 409
+        assert "has control" in refused.json()["detail"]
+    until(lambda: running.station.http.post(
+        "/ethercat/counters/clear", json={"url": URL}).status_code == 204, 5)  # fmt: skip
+    ports = [port for station in running.view()["stations"] for port in station["ports"]]
+    counters = ("rx_errors", "lost_links", "invalid_frames", "forwarded_errors")
+    assert [port[name] for port in ports for name in counters] == [0] * 32
+
+
+def host_process() -> int:
+    """The EtherCAT host process, a child of this one."""
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdigit():
+            continue
+        try:
+            command = (entry / "cmdline").read_bytes()
+            parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            continue
+        if parent == os.getpid() and b"drivers.ethercat.host" in command:
+            return int(entry.name)
+    raise AssertionError("there is no host process")
+
+
+def test_killed_host_ends_the_motion_and_is_replaced(running: Segment) -> None:
+    before = running.lines()
+    with running.station.live() as page:
+        turning(page, running)
+        first = host_process()
+        os.kill(first, signal.SIGKILL)
+        with page.holding(running.b):
+            ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
+    assert reason(ended).strip()
+    running.responsive()
+    running.told("the EtherCAT process died", after=before)
+    running.told("the EtherCAT process runs again", after=before)
+    assert not running.station.ok(running.station.http.get("/buses"))[0]["cyclic"]["running"]
+    running.settled()
+    running.stands()
+    assert host_process() != first
+    assert running.view()["host_restarts"] >= 1
+    running.start_cyclic()
+    running.jogs()
+
+
+def test_killed_segment_ends_the_motion_and_is_found_again(running: Segment) -> None:
+    before = running.lines()
+    with running.station.live() as page:
+        turning(page, running)
+        running.station.drives.segments[URL].kill()
+        with page.holding(running.b):
+            ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
+    assert reason(ended).strip()
+    running.told("station 1", "no longer answers", after=before)
+    running.told("station 2", "no longer answers", after=before)
+    running.responsive()
+    assert [s["answers"] for s in running.view()["stations"]] == [False, False]
+    running.start_again()
+    running.told("station 2 is in OP again", after=before, within_s=20)
+    running.settled()
+    running.stands()
+    running.end_cyclic()
+    running.start_cyclic()
+    running.jogs()
