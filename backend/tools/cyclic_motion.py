@@ -166,8 +166,8 @@ def _require_inside(drive: Drive, settings: GeneratorSettings) -> None:
     }[settings.mode]
     if abs(settings.amplitude) > limit:
         raise OutOfRange(
-            f"{drive.name}: an amplitude of {settings.amplitude:g} {unit} leaves the envelope of "
-            f"{limit:g} {unit}",
+            f"{drive.name}: an amplitude of {settings.amplitude:g} {unit} is more than the "
+            f"envelope allows ({limit:g} {unit})",
             drive=drive.name,
             value=settings.amplitude,
             limit=f"{limit:g} {unit}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Literal
 
 import httpx
 import pytest
@@ -94,9 +95,9 @@ async def test_a_command_begun_before_stop_never_enables_even_after_a_new_one(
     enable = asyncio.create_task(
         http.post("/drives/x/transition", json={"goal": "Operation enabled"})
     )
-    await asyncio.sleep(0.05)
+    await eventually(lambda: bench.jobs.moving("x"))
     stop = asyncio.create_task(http.post("/stop", json={}))
-    await asyncio.sleep(0.05)
+    await eventually(lambda: bench.member("x").axis.stopped)
     other = asyncio.create_task(
         http.post("/drives/x/transition", json={"goal": "Switch on disabled"})
     )
@@ -116,7 +117,7 @@ async def test_no_job_begins_while_the_power_state_is_changed(
     first = asyncio.create_task(
         http.post("/drives/x/transition", json={"goal": "Operation enabled"})
     )
-    await asyncio.sleep(0.05)
+    await eventually(lambda: bench.jobs.moving("x"))
     body = {"mode": "PP", "target": 1, "travel_limit": 2, "torque_limit": 10}
     assert (await http.post("/drives/x/jobs/move", json=body)).status_code == 409
     assert (await http.post("/drives/x/fault-reset", json={})).status_code == 409
@@ -465,6 +466,21 @@ async def test_back_and_forth_checks_both_places_before_it_moves(x: Member, serv
     with pytest.raises(OutOfRange):
         await moving.sequence(x.axis, settings, quiet())
     assert enabling(servo) == 0
+
+
+@pytest.mark.parametrize("mode", ["PV", "PT"])
+async def test_a_watchdog_that_watches_the_exchange_is_none_without_it(
+    x: Member, servo: Servo, mode: Literal["PV", "PT"]
+) -> None:
+    """004:4824: the watchdog is that of the process data; SDO commands do not feed it."""
+    spec = x.drive.profile.link("ethercat")
+    assert spec is not None
+    assert spec.watchdog.present
+    x.drive.ports = (Port(servo, 1, spec),)
+    settings = moving.MoveSettings(mode, 10.0, ENVELOPE)
+    with pytest.raises(NotAllowed, match="watchdog"):
+        await moving.move(x.axis, settings, quiet())
+    assert servo.written == []
 
 
 def test_lead_is_what_the_architecture_says() -> None:

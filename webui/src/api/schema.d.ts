@@ -358,6 +358,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/firmware": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Load Firmware
+         * @description Send firmware by FoE to a drive whose profile says that it takes it so.
+         *
+         *     The job cannot be cancelled: a download that breaks off may leave the drive without firmware.
+         */
+        post: operations["load_firmware"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/generate": {
         parameters: {
             query?: never;
@@ -846,6 +868,88 @@ export interface paths {
          * @description Put back what a change returned as `before`; returns what was there until now.
          */
         post: operations["undo_tuning"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/ethercat/alias": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Write Alias
+         * @description Write a station alias; the EEPROM takes its time, so nothing may move on this bus.
+         */
+        post: operations["write_alias"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/ethercat/counters/clear": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Clear Counters
+         * @description Set the port error counters of one station or of all to zero.
+         */
+        post: operations["clear_counters"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/ethercat/permissions": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Ethercat Permissions
+         * @description What is missing to use an interface that need not be opened yet.
+         */
+        get: operations["ethercat_permissions"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/ethercat/segment": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Ethercat Segment
+         * @description An opened segment: its stations in the order of the cable, ports, clocks, punctuality.
+         *
+         *     Answers as well while the segment cannot be asked; ``problem`` then says why.
+         */
+        get: operations["ethercat_segment"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -1359,7 +1463,7 @@ export interface paths {
         put?: never;
         /**
          * Stop
-         * @description STOP: always allowed, for everyone.
+         * @description STOP: always allowed, for everyone; without a body, of every axis.
          */
         post: operations["stop"];
         delete?: never;
@@ -1394,6 +1498,23 @@ export interface components {
             reset: string;
             /** Source */
             source: string;
+        };
+        /**
+         * AliasRequest
+         * @description A station alias to write to the EEPROM of a slave.
+         */
+        AliasRequest: {
+            /** Alias */
+            alias: number;
+            /**
+             * Confirmed
+             * @default false
+             */
+            confirmed: boolean;
+            /** Station */
+            station: number;
+            /** Url */
+            url: string;
         };
         /**
          * ArmRequest
@@ -1656,6 +1777,16 @@ export interface components {
             url: string;
         };
         /**
+         * CountersRequest
+         * @description Whose error counters to set to zero; None is all stations.
+         */
+        CountersRequest: {
+            /** Station */
+            station?: number | null;
+            /** Url */
+            url: string;
+        };
+        /**
          * CyclicInfo
          * @description The running cyclic exchange of a bus.
          */
@@ -1845,6 +1976,63 @@ export interface components {
              * @constant
              */
             type: "drives";
+        };
+        /**
+         * EthercatPermissions
+         * @description What is missing to use an interface, and the commands that grant it.
+         */
+        EthercatPermissions: {
+            /**
+             * Advised
+             * @description capabilities that only make cycles more punctual
+             */
+            advised: string[];
+            /** Commands */
+            commands: string[];
+            /** Interface */
+            interface: string;
+            /**
+             * Missing
+             * @description capabilities without which EtherCAT is impossible
+             */
+            missing: string[];
+            /** Ready */
+            ready: boolean;
+            /** Text */
+            text: string;
+        };
+        /**
+         * EthercatSegment
+         * @description A segment as it is now.
+         */
+        EthercatSegment: {
+            /** Connected */
+            connected: boolean;
+            exchange: components["schemas"]["SegmentExchange"] | null;
+            /** Host Restarts */
+            host_restarts: number;
+            /**
+             * Late Frames
+             * @description frames that came back after they were given up
+             */
+            late_frames: number;
+            /** @description None in a private network */
+            permissions: components["schemas"]["EthercatPermissions"] | null;
+            /** Private Network */
+            private_network: boolean;
+            /**
+             * Problem
+             * @description why the stations could not be asked; empty if they were
+             */
+            problem: string;
+            /** Real Time */
+            real_time: string[];
+            /** State */
+            state: string;
+            /** Stations */
+            stations: components["schemas"]["SegmentStation"][];
+            /** Url */
+            url: string;
         };
         /**
          * FoundDrive
@@ -2328,6 +2516,19 @@ export interface components {
              * @constant
              */
             type: "jog_stop";
+        };
+        /**
+         * LateBin
+         * @description Cycles that woke up less than ``below_us`` late, and not less than the bin before.
+         */
+        LateBin: {
+            /**
+             * Below Us
+             * @description None: everything above
+             */
+            below_us: number | null;
+            /** Count */
+            count: number;
         };
         /**
          * Lease
@@ -3388,6 +3589,135 @@ export interface components {
             type: "scope_stop";
         };
         /**
+         * SegmentExchange
+         * @description Figures of the running exchange, since its start.
+         */
+        SegmentExchange: {
+            /** Cycles */
+            cycles: number;
+            /** Dc */
+            dc: boolean;
+            /** Dc Deviation Max Ns */
+            dc_deviation_max_ns: number;
+            /**
+             * Dc Deviation Ns
+             * @description of the computer's grid from the reference clock
+             */
+            dc_deviation_ns: number;
+            /** Expected Wkc */
+            expected_wkc: number;
+            /** Last Wkc */
+            last_wkc: number;
+            /** Late */
+            late: components["schemas"]["LateBin"][];
+            /** Late Max Us */
+            late_max_us: number;
+            /** Late P50 Us */
+            late_p50_us: number;
+            /** Late P99 Us */
+            late_p99_us: number;
+            /** Lost Frames */
+            lost_frames: number;
+            /** Overruns */
+            overruns: number;
+            /** Wkc Errors */
+            wkc_errors: number;
+        };
+        /**
+         * SegmentPort
+         * @description One port of a slave. Counters stop at 255 and count since they were last cleared.
+         */
+        SegmentPort: {
+            /** Communicating */
+            communicating: boolean;
+            /**
+             * Findings
+             * @description which cable the counters accuse, in words
+             */
+            findings: string[];
+            /** Forwarded Errors */
+            forwarded_errors: number;
+            /** Invalid Frames */
+            invalid_frames: number;
+            /** Link */
+            link: boolean;
+            /** Lost Links */
+            lost_links: number;
+            /** Number */
+            number: number;
+            /** Rx Errors */
+            rx_errors: number;
+        };
+        /**
+         * SegmentStation
+         * @description One slave in the order of the cable.
+         */
+        SegmentStation: {
+            /** Alias */
+            alias: number;
+            /** Answers */
+            answers: boolean;
+            /** Behind Port */
+            behind_port: number;
+            /**
+             * Behind Station
+             * @description the station before it; 0 is the computer
+             */
+            behind_station: number;
+            /**
+             * Clock Ahead Ns
+             * @description of the reference clock
+             */
+            clock_ahead_ns: number | null;
+            /** Distributed Clock */
+            distributed_clock: boolean;
+            /**
+             * Drive
+             * @description id of the connected drive
+             */
+            drive: string | null;
+            /**
+             * Error
+             * @description why it is in an error state, after its AL status code
+             */
+            error: string;
+            /**
+             * Findings
+             * @description what its counters accuse that is no cable
+             */
+            findings: string[];
+            /** Firmware */
+            firmware: string;
+            /**
+             * Foe
+             * @description its profile says that it takes firmware by FoE
+             */
+            foe: boolean;
+            /** Name */
+            name: string;
+            /** Notes */
+            notes: string[];
+            /** Ports */
+            ports: components["schemas"]["SegmentPort"][];
+            /** Product Code */
+            product_code: number;
+            /** Remedy */
+            remedy: string;
+            /** Revision */
+            revision: number;
+            /** Serial */
+            serial: number | null;
+            /**
+             * State
+             * @description AL state; empty while it does not answer
+             */
+            state: string;
+            /** Station */
+            station: number;
+            /** Vendor Id */
+            vendor_id: number;
+        };
+        /**
          * SequenceRequest
          * @description Back and forth between two positions.
          */
@@ -3790,6 +4120,7 @@ export interface components {
     pathItems: never;
 }
 export type ActiveFault = components['schemas']['ActiveFault'];
+export type AliasRequest = components['schemas']['AliasRequest'];
 export type ArmRequest = components['schemas']['ArmRequest'];
 export type AutotuneRequest = components['schemas']['AutotuneRequest'];
 export type AxisState = components['schemas']['AxisState'];
@@ -3801,6 +4132,7 @@ export type CandidatesInfo = components['schemas']['CandidatesInfo'];
 export type CandidatesRequest = components['schemas']['CandidatesRequest'];
 export type ChangeRecording = components['schemas']['ChangeRecording'];
 export type ConnectRequest = components['schemas']['ConnectRequest'];
+export type CountersRequest = components['schemas']['CountersRequest'];
 export type CyclicInfo = components['schemas']['CyclicInfo'];
 export type CyclicRequest = components['schemas']['CyclicRequest'];
 export type DescribedDevice = components['schemas']['DescribedDevice'];
@@ -3809,6 +4141,8 @@ export type DiffRow = components['schemas']['DiffRow'];
 export type DriveSummary = components['schemas']['DriveSummary'];
 export type DriveUpdate = components['schemas']['DriveUpdate'];
 export type DrivesChanged = components['schemas']['DrivesChanged'];
+export type EthercatPermissions = components['schemas']['EthercatPermissions'];
+export type EthercatSegment = components['schemas']['EthercatSegment'];
 export type FoundDrive = components['schemas']['FoundDrive'];
 export type GainInfo = components['schemas']['GainInfo'];
 export type GainValues = components['schemas']['GainValues'];
@@ -3828,6 +4162,7 @@ export type JogEnded = components['schemas']['JogEnded'];
 export type JogRenew = components['schemas']['JogRenew'];
 export type JogStart = components['schemas']['JogStart'];
 export type JogStop = components['schemas']['JogStop'];
+export type LateBin = components['schemas']['LateBin'];
 export type Lease = components['schemas']['Lease'];
 export type LeaseChanged = components['schemas']['LeaseChanged'];
 export type LeaseTake = components['schemas']['LeaseTake'];
@@ -3883,6 +4218,9 @@ export type ScopeChannelInfo = components['schemas']['ScopeChannelInfo'];
 export type ScopeInfo = components['schemas']['ScopeInfo'];
 export type ScopeStart = components['schemas']['ScopeStart'];
 export type ScopeStop = components['schemas']['ScopeStop'];
+export type SegmentExchange = components['schemas']['SegmentExchange'];
+export type SegmentPort = components['schemas']['SegmentPort'];
+export type SegmentStation = components['schemas']['SegmentStation'];
 export type SequenceRequest = components['schemas']['SequenceRequest'];
 export type SerialPort = components['schemas']['SerialPort'];
 export type Session = components['schemas']['Session'];
@@ -4906,7 +5244,9 @@ export interface operations {
     connect: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -5698,6 +6038,93 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["AutotuneRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    load_firmware: {
+        parameters: {
+            query: {
+                /** @description name for the drive */
+                file: string;
+                password?: number;
+                confirmed?: boolean;
+            };
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
             };
         };
         responses: {
@@ -7933,6 +8360,314 @@ export interface operations {
             };
         };
     };
+    write_alias: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["AliasRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    clear_counters: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CountersRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    ethercat_permissions: {
+        parameters: {
+            query: {
+                url: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EthercatPermissions"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    ethercat_segment: {
+        parameters: {
+            query: {
+                url: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["EthercatSegment"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     health: {
         parameters: {
             query?: never;
@@ -9829,7 +10564,9 @@ export interface operations {
     scan: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
             path?: never;
             cookie?: never;
         };
@@ -10363,9 +11100,9 @@ export interface operations {
             path?: never;
             cookie?: never;
         };
-        requestBody: {
+        requestBody?: {
             content: {
-                "application/json": components["schemas"]["StopRequest"];
+                "application/json": components["schemas"]["StopRequest"] | null;
             };
         };
         responses: {

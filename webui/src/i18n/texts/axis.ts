@@ -99,8 +99,8 @@ export const axis = {
   'move.time': ['Run for', '运行时间'],
   'move.start': ['Start the move', '开始移动'],
   'move.consentText': [
-    'This drive has no watchdog on this link: if the cable is pulled or this program dies, it keeps the commanded speed or torque until its own travel limit or its emergency stop.',
-    '此链路上驱动器没有看门狗：如果拔掉电缆或程序终止，它会保持指令速度或转矩，直到其行程限位或急停。',
+    'No watchdog of the drive is active on this link: if the cable is pulled or this program dies, it keeps the commanded speed or torque until its own travel limit or its emergency stop.',
+    '此链路上没有驱动器看门狗在起作用：如果拔掉电缆或程序终止，它会保持指令速度或转矩，直到其行程限位或急停。',
   ],
   'move.consent': [
     'I agree for this one move. The drive’s travel limits are active and a hand is on the emergency stop.',

@@ -45,7 +45,8 @@ export function MovePanel({
     setTarget(null)
     setConsent(false)
   }, [key])
-  const unwatched = mode !== 'PP' && !(drive.ports[0]?.watchdog ?? false)
+  // A drive's watchdog guards the cyclic exchange only, and profile modes run without it.
+  const unwatched = mode !== 'PP'
   const unit = { PP: units.position, PV: units.velocity, PT: units.torque }[mode] ?? ''
   const complete =
     target !== null &&
