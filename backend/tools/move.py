@@ -18,8 +18,8 @@ _POLL_S = 0.02
 _ACKNOWLEDGE_S = 0.1
 
 CONSENT = (
-    "No watchdog of the drive is active on this link: if the cable is pulled or this program dies, it "
-    "keeps the commanded speed or torque until its own travel limit or its emergency stop. "
+    "No watchdog of the drive is active on this link: if the cable is pulled or this program dies, "
+    "it keeps the commanded speed or torque until its own travel limit or its emergency stop. "
     "Go on only with the drive's travel limits active and a hand on the emergency stop."
 )
 
