@@ -4,7 +4,16 @@ import { frame } from './texts/frame'
 import { notListed } from './texts/notlisted'
 import { parameters } from './texts/parameters'
 import { recordings } from './texts/recordings'
+import { segment } from './texts/segment'
 
 /** Every text of the page, in every language. A key that is not here does not compile. */
-export const catalogue = { ...frame, ...bench, ...axis, ...parameters, ...recordings, ...notListed }
+export const catalogue = {
+  ...frame,
+  ...bench,
+  ...axis,
+  ...parameters,
+  ...recordings,
+  ...notListed,
+  ...segment,
+}
 export type Key = keyof typeof catalogue

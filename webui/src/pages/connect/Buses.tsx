@@ -7,6 +7,7 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { CyclicExchange } from './CyclicExchange'
 import { QualityTable } from './QualityTable'
+import { SegmentPanel } from './segment/SegmentPanel'
 import { useBuses } from './useBuses'
 
 /** Opened buses and how well they work. */
@@ -39,6 +40,7 @@ export function Buses() {
             )}
           </div>
           <QualityTable quality={bus.quality} />
+          {bus.kind === 'ethercat' && <SegmentPanel url={bus.url} />}
           {bus.cyclic_possible && <CyclicExchange bus={bus} onChange={refresh} />}
         </div>
       ))}

@@ -12,6 +12,7 @@ import { Buses } from './Buses'
 import { ConnectHelp } from './ConnectHelp'
 import { NotListedPanel } from './NotListed'
 import { Scan } from './Scan'
+import { InterfacePermissions } from './segment/Permissions'
 
 /** One way to a bus: what it is, whether it can be used, and the URL to start from. */
 interface Way {
@@ -101,6 +102,7 @@ export function ConnectPage() {
             className="mono-input"
             onChange={(event) => setUrl(event.currentTarget.value)}
           />
+          <InterfacePermissions url={url.trim()} />
           <Scan url={url.trim()} onUrl={setUrl} />
         </Panel>
         <Panel title={t('connect.bench')}>

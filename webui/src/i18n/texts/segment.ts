@@ -1,0 +1,87 @@
+import type { Texts } from '../types'
+
+/** Connect page: the picture and the link quality of an EtherCAT segment. */
+export const segment = {
+  'segment.title': ['Segment', '网段'],
+  'segment.picture': [
+    'The segment: computer, drives and cables in the order of the frames',
+    '网段：按报文顺序显示计算机、驱动器和电缆',
+  ],
+  'segment.computer': ['Computer', '计算机'],
+  'segment.noAnswer': ['no answer', '无应答'],
+  'segment.empty': ['Not searched yet: scan this bus.', '尚未搜索：请扫描此总线。'],
+  'segment.choose': [
+    'Choose a drive in the picture for its ports, alias and state.',
+    '在图中选择驱动器以查看端口、别名和状态。',
+  ],
+  'segment.cable.errors': ['errors', '有错误'],
+  'segment.cable.broken': ['no link', '无连接'],
+  'segment.brokenBetween': [
+    'Nothing comes through between station {before} and station {station}: cable cut, or the supply of station {station} is off. It is taken up again by itself.',
+    '站 {before} 与站 {station} 之间无通信：电缆断开，或站 {station} 断电。恢复后自动重新连接。',
+  ],
+  'segment.brokenFirst': [
+    'Nothing comes through between the computer and station {station}: cable cut, or its supply is off. It is taken up again by itself.',
+    '计算机与站 {station} 之间无通信：电缆断开，或该站断电。恢复后自动重新连接。',
+  ],
+  'segment.clear': ['Clear error counters', '清除错误计数'],
+  'segment.cycles': ['Cycles', '周期数'],
+  'segment.overruns': ['Skipped cycles', '跳过的周期'],
+  'segment.wkc': ['Working counter, expected', '工作计数器/期望值'],
+  'segment.late50': ['Late, half of all', '延迟，中位数'],
+  'segment.late99': ['Late, 99 %', '延迟，99 %'],
+  'segment.lateMax': ['Latest', '最大延迟'],
+  'segment.dcNow': ['Off the reference clock', '与参考时钟偏差'],
+  'segment.dcMax': ['Largest deviation', '最大偏差'],
+  'segment.histogram': [
+    'How late cycles began: number of cycles per lateness (logarithmic)',
+    '周期启动延迟：各延迟区间的周期数（对数）',
+  ],
+  'segment.realTime': ['Real-time scheduling', '实时调度'],
+  'segment.vendor': ['Vendor', '厂商'],
+  'segment.product': ['Product, revision', '产品/版本'],
+  'segment.serial': ['Serial number', '序列号'],
+  'segment.alias': ['Alias', '别名'],
+  'segment.firmware': ['Firmware', '固件'],
+  'segment.clock': ['Clock ahead', '时钟超前'],
+  'segment.noClock': ['no distributed clock', '无分布式时钟'],
+  'segment.port': ['Port', '端口'],
+  'segment.link': ['Link', '连接'],
+  'segment.linkUp': ['connected', '已连接'],
+  'segment.linkDown': ['open', '未连接'],
+  'segment.lostLinks': ['Link lost', '断开次数'],
+  'segment.rxErrors': ['RX errors', '接收错误'],
+  'segment.invalidFrames': ['Damaged frames', '损坏帧'],
+  'segment.forwarded': ['Damaged before', '上游损坏'],
+  'segment.writeAlias': ['Write alias', '写入别名'],
+  'segment.aliasWarning': [
+    'Written to the drive’s EEPROM, valid after its supply was switched off and on. Machines whose controller addresses drives by alias must be told. Nothing may move on this bus meanwhile.',
+    '写入驱动器 EEPROM，断电重启后生效。若控制器按别名寻址，需同步修改。写入期间此总线上不得有运动。',
+  ],
+  'segment.aliasSure': ['I want to change the EEPROM', '我确认修改 EEPROM'],
+  'segment.aliasWritten': [
+    'Written. Switch the drive off and on, then scan.',
+    '已写入。请断电重启驱动器后重新扫描。',
+  ],
+  'segment.loadFirmware': ['Load firmware', '下载固件'],
+  'segment.chooseFirmware': ['Choose a file…', '选择文件…'],
+  'segment.firmwareWarning': [
+    'An interrupted download can leave the drive without firmware, and it cannot be cancelled. Save the parameters to a file first, have the right file for exactly this drive, and switch nothing off.',
+    '下载中断可能导致驱动器无固件，且无法取消。请先将参数保存到文件，确认文件适用于该驱动器，期间不得断电。',
+  ],
+  'segment.firmwareSure': [
+    'This is the right file, and nothing will be switched off',
+    '文件正确，且不会断电',
+  ],
+  'segment.permitted': ['everything needed is granted', '所需权限齐全'],
+  'segment.advised': ['More punctual cycles with: {names}', '以下权限可提高周期准时性：{names}'],
+  'segment.eitherCommand': [
+    'In a terminal, once (the first), or to start servodeck this time (the second):',
+    '在终端执行：第一条为一次性授权，第二条为本次启动 servodeck：',
+  ],
+  'segment.command': ['In a terminal:', '在终端执行：'],
+  'segment.commandsWhy': [
+    'EtherCAT needs raw frames. Restart servodeck afterwards. The virtual bench needs none of this.',
+    'EtherCAT 需要原始帧权限。执行后请重启 servodeck。虚拟台架无需这些权限。',
+  ],
+} satisfies Texts
