@@ -268,7 +268,8 @@ def _sequences(setup: _Setup, settings: SweepSettings) -> tuple[excite.Sequence,
 def _reference_size(setup: _Setup, position: bool) -> tuple[float, float]:
     """Amplitude of a loop's reference (rad/s or rad), and 1e-4 of it as its rounding."""
     speed = 0.15 * setup.room.speed_rad_s
-    # Torque to follow the fall-off corner's acceleration must stay far from the limit, since lines and resonances add up.
+    # Torque to follow the fall-off corner's acceleration must stay far from the limit, since
+    # lines and resonances add up.
     corner = _TURN * (20.0 if position else 40.0)
     speed = min(speed, setup.room.torque_nm / 8.0 / setup.rigid.inertia_kgm2 / corner, 8.0)
     size = speed / corner if position else speed
