@@ -39,7 +39,10 @@ class SegmentStation(Message):
     behind_station: int = Field(description="the station before it; 0 is the computer")
     behind_port: int
     distributed_clock: bool
-    clock_ahead_ns: int | None = Field(description="of the reference clock")
+    reference_clock: bool = Field(description="the others follow its clock")
+    clock_ahead_ns: int | None = Field(
+        description="of the reference clock; None where no exchange with clocks keeps it current"
+    )
     ports: list[SegmentPort]
     findings: list[str] = Field(description="what its counters accuse that is no cable")
     notes: list[str]

@@ -69,7 +69,10 @@ async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> Eth
         connected=quality.connected,
         state=quality.state,
         problem=problem,
-        stations=[_station(bench, url, seen, survey) for seen in survey.stations],
+        stations=[
+            _station(bench, url, seen, survey, clocks=figures is not None and figures.dc)
+            for seen in survey.stations
+        ],
         late_frames=int(quality.details["late_frames"]),
         host_restarts=int(quality.details["host_restarts"]),
         real_time=list(link.real_time),
@@ -247,7 +250,9 @@ def _firmware_port(member: Member) -> tuple[EthercatLink, int]:
     )
 
 
-def _station(bench: Bench, url: str, seen: SurveyedStation, survey: Survey) -> SegmentStation:
+def _station(
+    bench: Bench, url: str, seen: SurveyedStation, survey: Survey, *, clocks: bool
+) -> SegmentStation:
     member = next(
         (
             m
@@ -260,6 +265,10 @@ def _station(bench: Bench, url: str, seen: SurveyedStation, survey: Survey) -> S
     spec = member.drive.profile.link("ethercat") if member else None
     own = [f for f in survey.findings if f.station == seen.station]
     why = seen.al_text
+    # SOEM takes the first slave with a distributed clock; nobody writes its own deviation.
+    reference = seen.station == next(
+        (s.station for s in survey.stations if s.distributed_clock), None
+    )
     return SegmentStation(
         station=seen.station,
         name=seen.name,
@@ -277,7 +286,8 @@ def _station(bench: Bench, url: str, seen: SurveyedStation, survey: Survey) -> S
         behind_station=seen.parent,
         behind_port=seen.parent_port,
         distributed_clock=seen.distributed_clock,
-        clock_ahead_ns=seen.clock_ahead_ns,
+        reference_clock=reference,
+        clock_ahead_ns=seen.clock_ahead_ns if clocks and not reference and not seen.lost else None,
         ports=[
             SegmentPort(
                 number=number,

@@ -3666,7 +3666,7 @@ export interface components {
             behind_station: number;
             /**
              * Clock Ahead Ns
-             * @description of the reference clock
+             * @description of the reference clock; None where no exchange with clocks keeps it current
              */
             clock_ahead_ns: number | null;
             /** Distributed Clock */
@@ -3701,6 +3701,11 @@ export interface components {
             ports: components["schemas"]["SegmentPort"][];
             /** Product Code */
             product_code: number;
+            /**
+             * Reference Clock
+             * @description the others follow its clock
+             */
+            reference_clock: boolean;
             /** Remedy */
             remedy: string;
             /** Revision */

@@ -45,6 +45,7 @@ export const segment = {
   'segment.firmware': ['Firmware', '固件'],
   'segment.clock': ['Clock ahead', '时钟超前'],
   'segment.noClock': ['no distributed clock', '无分布式时钟'],
+  'segment.referenceClock': ['reference clock', '参考时钟'],
   'segment.port': ['Port', '端口'],
   'segment.link': ['Link', '连接'],
   'segment.linkUp': ['connected', '已连接'],

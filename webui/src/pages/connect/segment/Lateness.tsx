@@ -2,7 +2,7 @@ import type { SegmentExchange } from '../../../api/schema'
 import { useT } from '../../../i18n'
 import { barHeight, shownBins } from './layout'
 
-const BAR = 34
+const BAR = 46
 const HEIGHT = 90
 const FOOT = 18
 const HEAD = 16
@@ -78,5 +78,5 @@ function amount(count: number): string {
 }
 
 function time(microseconds: number): string {
-  return microseconds < 1000 ? `${microseconds}µ` : `${Math.round(microseconds / 1000)}m`
+  return microseconds < 1000 ? `${microseconds}µs` : `${Math.round(microseconds / 1000)}ms`
 }

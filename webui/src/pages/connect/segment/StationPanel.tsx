@@ -23,9 +23,11 @@ export function StationPanel({ url, station }: { url: string; station: SegmentSt
       t('segment.clock'),
       !station.distributed_clock
         ? t('segment.noClock')
-        : station.clock_ahead_ns === null
-          ? '—'
-          : `${station.clock_ahead_ns} ns`,
+        : station.reference_clock
+          ? t('segment.referenceClock')
+          : station.clock_ahead_ns === null
+            ? '—'
+            : `${station.clock_ahead_ns} ns`,
     ],
   ]
   return (

@@ -34,6 +34,7 @@ const station = (
   behind_station: behind,
   behind_port: behind === 0 ? 0 : 1,
   distributed_clock: true,
+  reference_clock: false,
   clock_ahead_ns: 0,
   ports: [0, 1, 2, 3].map((each) => port(each)),
   findings: [],

@@ -1,0 +1,137 @@
+"""Segment view, alias, firmware and permissions through the interface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.virtual.wires.netns import unavailable
+from tests.support import firmware_drive
+from tests.support.station import Station, until
+
+URL = "ethercat://virtual0"
+AXIS = '[[axis]]\nname = "{name}"\ndrive = "{drive}"\non = "ethercat://virtual0"\nstation = {at}\n'
+
+
+@pytest.fixture(scope="module")
+def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+    """Two drives, of which the profile of the first says that it takes firmware."""
+    if reason := unavailable():
+        pytest.skip(f"no private network here: {reason}")
+    folder = Path(tmp_path_factory.mktemp("segment"))
+    firmware_drive.write_profile(folder / "profiles")
+    bench = folder / "bench.toml"
+    names = [("A", 1), ("B", 2)]
+    bench.write_text(
+        "".join(AXIS.format(name=n, drive=firmware_drive.NAME, at=at) for n, at in names)
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SERVODECK_PROFILES", str(folder / "profiles"))
+        running = Station(folder, bench, ["--factory", firmware_drive.FACTORY])
+        running.start()
+        running.add(1, URL, profile=firmware_drive.NAME, name="A")
+        running.add(2, URL, profile="mms7", name="B")
+        yield running
+        running.stop()
+
+
+def view(station: Station) -> Any:
+    return station.ok(station.http.get("/ethercat/segment", params={"url": URL}))
+
+
+def test_stations_in_the_order_of_the_cable(station: Station) -> None:
+    seen = view(station)
+    assert (seen["connected"], seen["problem"], seen["private_network"]) == (True, "", True)
+    assert seen["permissions"] is None, "a private network needs none"
+    first, second = seen["stations"]
+    assert [(s["station"], s["drive"], s["state"]) for s in (first, second)] == [
+        (1, "a", "PREOP"), (2, "b", "PREOP"),
+    ]  # fmt: skip
+    assert (first["behind_station"], second["behind_station"], second["behind_port"]) == (0, 1, 1)
+    assert [port["communicating"] for port in first["ports"]] == [True, True, False, False]
+    assert [port["communicating"] for port in second["ports"]] == [True, False, False, False]
+    assert (first["reference_clock"], second["reference_clock"]) == (True, False)
+    assert (first["foe"], second["foe"]) == (True, False)
+    assert seen["exchange"] is None
+    assert second["clock_ahead_ns"] is None, "nobody keeps it current without exchange"
+
+
+def test_figures_of_the_exchange(station: Station) -> None:
+    station.ok(station.http.post("/buses/cyclic", json={"url": URL, "cycle_us": 1000}))
+    try:
+        seen = until(lambda: (now := view(station))["exchange"]["cycles"] > 100 and now, 10)
+        figures = seen["exchange"]
+        assert [s["state"] for s in seen["stations"]] == ["OP", "OP"]
+        # One wake-up per cycle; LRW counts 1 for reading and 2 for writing, per slave.
+        assert sum(each["count"] for each in figures["late"]) == figures["cycles"]
+        assert [each["below_us"] for each in figures["late"][:4]] == [1, 2, 4, 8]
+        assert figures["late"][-1]["below_us"] is None
+        assert figures["expected_wkc"] == 2 * (1 + 2)
+        assert figures["dc"]
+        assert seen["stations"][1]["clock_ahead_ns"] is not None
+        busy = station.http.post(
+            "/ethercat/alias", json={"url": URL, "station": 2, "alias": 7, "confirmed": True}
+        )
+        assert busy.status_code == 409
+        assert "stop the cyclic exchange" in busy.json()["remedy"]
+    finally:
+        station.http.delete("/buses/cyclic", params={"url": URL})
+
+
+def test_alias_wants_to_be_confirmed_and_is_read_back_after_power_on(station: Station) -> None:
+    body = {"url": URL, "station": 2, "alias": 1234}
+    asked = station.http.post("/ethercat/alias", json=body)
+    assert asked.status_code == 409
+    assert "EEPROM" in asked.json()["detail"]
+    refused = station.http.post("/ethercat/alias", json=body | {"alias": 70000})
+    assert refused.status_code == 422
+    station.ok(station.http.post("/ethercat/alias", json=body | {"confirmed": True}))
+    station.drives.segments[URL].command("power_cycle", slave=1, off_s=0.1)
+    # SOEM refuses the slave with its new alias, so the segment is searched again by itself.
+    until(lambda: [s["alias"] for s in view(station)["stations"]] == [0, 1234], 15, "new alias")
+
+
+def load(station: Station, drive: str, data: bytes, **query: bool) -> Any:
+    return station.http.post(
+        f"/drives/{drive}/jobs/firmware", params={"file": "app.efw", **query}, content=data
+    )
+
+
+def test_firmware_goes_only_where_the_profile_says_so(station: Station) -> None:
+    refused = load(station, "b", b"x", confirmed=True)
+    assert refused.status_code == 409
+    assert "does not say that it takes firmware" in refused.json()["detail"]
+    asked = load(station, "a", b"x")
+    assert asked.status_code == 409
+    assert "without firmware" in asked.json()["detail"]
+    assert load(station, "a", b"", confirmed=True).status_code == 422
+
+
+def test_firmware_is_loaded_to_the_end_even_if_cancelled(station: Station) -> None:
+    data = bytes(n % 253 for n in range(20_000))
+    station.drives.segments[URL].command("timing", slave=0, sdo_s=0.01)
+    job = station.ok(load(station, "a", data, confirmed=True))
+    seen = until(lambda: (
+        now := station.ok(station.http.get(f"/jobs/{job['id']}")))["progress"] > 0 and now, 10
+    )  # fmt: skip
+    assert "bytes: do not switch off" in seen["step"]
+    second = load(station, "a", data, confirmed=True)
+    assert second.status_code == 409, "the axis is held meanwhile"
+    station.http.post("/stop", json={})
+    ended = station.ok(station.http.delete(f"/jobs/{job['id']}"))
+    assert ended["state"] == "done", ended
+    assert ended["result"] == {"bytes": 20_000, "file": "app.efw"}
+
+
+def test_permissions_of_an_interface_that_is_not_there(station: Station) -> None:
+    query = {"url": "ethercat://nosuch0"}
+    told = station.ok(station.http.get("/ethercat/permissions", params=query))
+    assert told["ready"] is False
+    assert told["text"] == "there is no network interface 'nosuch0' on this computer"
+    wrong = station.http.get("/ethercat/permissions", params={"url": "canopen://x"})
+    assert wrong.status_code == 422
+    unknown = station.http.get("/ethercat/segment", params={"url": "ethercat://other"})
+    assert unknown.status_code == 404
