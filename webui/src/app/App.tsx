@@ -11,7 +11,9 @@ import { MotionPage } from '../pages/motion/MotionPage'
 import { OverviewPage } from '../pages/overview/OverviewPage'
 import { ParametersPage } from '../pages/parameters/ParametersPage'
 import { RerunPage } from '../pages/rerun/RerunPage'
+import { ResponsePage } from '../pages/response/ResponsePage'
 import { ScopePage } from '../pages/scope/ScopePage'
+import { TunePage } from '../pages/tune/TunePage'
 import { Frame } from './Frame'
 import { isAxisPage, useRoute } from './router'
 import { theme } from './theme'
@@ -30,6 +32,8 @@ const AXIS = {
   overview: OverviewPage,
   parameters: ParametersPage,
   motion: MotionPage,
+  tune: TunePage,
+  response: ResponsePage,
   io: IoPage,
   alarms: AlarmsPage,
 }

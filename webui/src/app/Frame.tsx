@@ -15,6 +15,7 @@ import {
 } from './router'
 import { StopButton } from './StopButton'
 import { linkLook, stateLook } from './states'
+import { useCanTune } from './useCanTune'
 import { useHasIo } from './useHasIo'
 
 /** What surrounds every page: axis, state, link, control, STOP, and the way to the pages. */
@@ -90,6 +91,9 @@ function Pages() {
   const { drive } = useRoute()
   const drives = useDrives() ?? []
   const hasIo = useHasIo(drive)
+  const canTune = useCanTune(drive)
+  const offered = (name: Page) =>
+    name === 'io' ? hasIo : name === 'tune' || name === 'response' ? canTune : true
   return (
     <>
       <h2>{t('frame.axes')}</h2>
@@ -98,7 +102,7 @@ function Pages() {
       ))}
       {drives.length === 0 && <p className="dim">{t('frame.noAxes')}</p>}
       <h2>{t('frame.axisPages')}</h2>
-      {AXIS_PAGES.filter((name) => name !== 'io' || hasIo).map((name) => (
+      {AXIS_PAGES.filter(offered).map((name) => (
         <PageLink key={name} name={name} />
       ))}
       <h2>{t('frame.bench')}</h2>

@@ -1,6 +1,14 @@
 import { useSyncExternalStore } from 'react'
 
-export const AXIS_PAGES = ['overview', 'parameters', 'motion', 'io', 'alarms'] as const
+export const AXIS_PAGES = [
+  'overview',
+  'parameters',
+  'motion',
+  'tune',
+  'response',
+  'io',
+  'alarms',
+] as const
 export const BENCH_PAGES = ['connect', 'scope', 'rerun', 'files'] as const
 export type AxisPage = (typeof AXIS_PAGES)[number]
 export type BenchPage = (typeof BENCH_PAGES)[number]

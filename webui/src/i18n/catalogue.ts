@@ -5,6 +5,7 @@ import { notListed } from './texts/notlisted'
 import { parameters } from './texts/parameters'
 import { recordings } from './texts/recordings'
 import { segment } from './texts/segment'
+import { tuning } from './texts/tuning'
 
 /** Every text of the page, in every language. A key that is not here does not compile. */
 export const catalogue = {
@@ -15,5 +16,6 @@ export const catalogue = {
   ...recordings,
   ...notListed,
   ...segment,
+  ...tuning,
 }
 export type Key = keyof typeof catalogue

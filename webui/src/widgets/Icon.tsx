@@ -5,6 +5,8 @@ const PATHS = {
   parameters: 'M4 5h16M4 10h16M4 15h16M4 20h16M10 5v15',
   motion: 'M3 12h18M16 7l5 5-5 5M8 7l-5 5 5 5',
   scope: 'M2 12h4l3-8 5 16 3-8h5',
+  tune: 'M6 3v8M6 17v4M3 14h6M12 3v2M12 11v10M9 8h6M18 3v10M18 19v2M15 16h6',
+  response: 'M3 14h5c3 0 2-9 4-9s2 13 4 13c2 0 2 2 5 2',
   io: 'M4 7h10a4 4 0 0 1 0 8H4M20 11h-2M4 4v6M4 12v6',
   alarms: 'M12 3 2 21h20zM12 10v5M12 18v.5',
   rerun: 'M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18M12 9a3 3 0 1 0 0 6 3 3 0 0 0 0-6',

@@ -1,0 +1,311 @@
+import { useEffect, useRef } from 'react'
+import uPlot from 'uplot'
+import 'uplot/dist/uPlot.min.css'
+import { figure } from '../../widgets/format'
+import { type Curve, gridOf, hertz, logTicks, onGrid, type Part, partOf, rangeOf } from './bode'
+
+/** A vertical line over all parts that can be dragged. */
+export interface Marker {
+  id: string
+  label: string
+  frequency: number
+  color: string
+}
+
+interface Frame {
+  curves: Curve[]
+  markers: Marker[]
+  band: [number, number] | null
+  shown: [number, number]
+}
+
+const HEIGHTS: Record<Part, number> = { magnitude: 260, phase: 180, coherence: 100 }
+const GRAB_PX = 22
+/** uPlot.Scale.Distr, which as an ambient const enum cannot be imported. */
+const LOGARITHMIC = 3
+
+/** Magnitude, phase and coherence over a common logarithmic frequency axis. */
+export function BodePlot({
+  curves,
+  markers,
+  band,
+  shown,
+  unit,
+  label,
+  dark,
+  onMarker,
+}: {
+  curves: Curve[]
+  markers: Marker[]
+  /** Where the estimate holds; shaded. */
+  band: [number, number] | null
+  /** Frequencies in sight. */
+  shown: [number, number]
+  unit: string
+  label: string
+  dark: boolean
+  onMarker: (id: string, frequency: number) => void
+}) {
+  const coherent = curves.some((curve) => curve.coherence)
+  const parts: Part[] = coherent ? ['magnitude', 'phase', 'coherence'] : ['magnitude', 'phase']
+  return (
+    <div className="bode" role="img" aria-label={label}>
+      {parts.map((part, i) => (
+        <BodePart
+          key={part}
+          part={part}
+          last={i === parts.length - 1}
+          unit={part === 'magnitude' ? `dB (${unit})` : part === 'phase' ? '°' : ''}
+          frame={{ curves, markers, band, shown }}
+          dark={dark}
+          onMarker={onMarker}
+        />
+      ))}
+    </div>
+  )
+}
+
+function BodePart({
+  part,
+  last,
+  unit,
+  frame,
+  dark,
+  onMarker,
+}: {
+  part: Part
+  last: boolean
+  unit: string
+  frame: Frame
+  dark: boolean
+  onMarker: (id: string, frequency: number) => void
+}) {
+  const box = useRef<HTMLDivElement>(null)
+  const plotted = useRef<uPlot | null>(null)
+  const now = useRef(frame)
+  now.current = frame
+  const moved = useRef(onMarker)
+  moved.current = onMarker
+  const drawn = frame.curves.filter((curve) => part !== 'coherence' || curve.coherence)
+  const shape = JSON.stringify([
+    drawn.map((each) => [each.label, each.color, each.dashed, banded(each, part)]),
+    part,
+    last,
+    unit,
+    dark,
+  ])
+  useEffect(() => {
+    const element = box.current
+    if (!element) return
+    const size = () => ({
+      width: Math.max(200, element.clientWidth),
+      height: HEIGHTS[part] + (last ? 26 : 0),
+    })
+    const plot = new uPlot(
+      options(drawn, part, last, unit, size(), () => now.current),
+      data(drawn, part),
+      element,
+    )
+    plotted.current = plot
+    const remove = listen(
+      plot,
+      () => now.current.markers,
+      (id, frequency) => moved.current(id, frequency),
+    )
+    const observer = new ResizeObserver(() => plot.setSize(size()))
+    observer.observe(element)
+    return () => {
+      observer.disconnect()
+      remove()
+      plotted.current = null
+      plot.destroy()
+    }
+    // Built anew only when what is drawn changes in kind.
+  }, [shape])
+  useEffect(() => {
+    plotted.current?.setData(data(drawn, part))
+  }, [frame.curves, frame.shown[0], frame.shown[1]])
+  useEffect(() => {
+    plotted.current?.redraw(false)
+  }, [JSON.stringify([frame.markers, frame.band])])
+  return <div ref={box} className="bode-part" />
+}
+
+const banded = (curve: Curve, part: Part) =>
+  part !== 'coherence' && (part === 'magnitude' ? curve.stdMagnitude : curve.stdPhase) !== undefined
+
+function data(curves: Curve[], part: Part): uPlot.AlignedData {
+  const grid = gridOf(curves)
+  const columns = curves.flatMap((curve) => {
+    const { values, low, high } = partOf(curve, part)
+    const lines = banded(curve, part) ? [values, low, high] : [values]
+    return lines.map((each) => onGrid(grid, curve.frequency, each))
+  })
+  return [grid, ...columns] as uPlot.AlignedData
+}
+
+function options(
+  curves: Curve[],
+  part: Part,
+  last: boolean,
+  unit: string,
+  size: { width: number; height: number },
+  frame: () => Frame,
+): uPlot.Options {
+  const style = getComputedStyle(document.documentElement)
+  const text = style.getPropertyValue('--dim')
+  const grid = style.getPropertyValue('--line')
+  const soft = style.getPropertyValue('--accent-soft')
+  const font = `12px ${getComputedStyle(document.body).fontFamily}`
+  const common: uPlot.Axis = {
+    stroke: text,
+    font,
+    labelFont: font,
+    grid: { stroke: grid, width: 1 },
+    ticks: { stroke: grid, width: 1 },
+  }
+  const series: uPlot.Series[] = [{}]
+  const bands: uPlot.Band[] = []
+  for (const curve of curves) {
+    const at = series.length
+    series.push({
+      label: curve.label,
+      stroke: curve.color,
+      width: 1.8,
+      points: { show: false },
+      ...(curve.dashed ? { dash: [6, 4] } : {}),
+    })
+    if (!banded(curve, part)) continue
+    const edge: uPlot.Series = { stroke: 'transparent', width: 0, points: { show: false } }
+    series.push(edge, edge)
+    bands.push({ series: [at + 2, at + 1], fill: `${curve.color}40` })
+  }
+  return {
+    ...size,
+    legend: { show: false },
+    padding: [8, 12, last ? 0 : 4, 0],
+    cursor: {
+      drag: { x: false, y: false, setScale: false },
+      points: { show: false },
+      sync: { key: 'bode' },
+    },
+    scales: {
+      // eslint-disable-next-line @typescript-eslint/no-unsafe-enum-assignment -- see LOGARITHMIC
+      x: { time: false, distr: LOGARITHMIC, log: 10, range: () => frame().shown },
+      y: {
+        range: () =>
+          part === 'coherence' ? [0, 1.02] : rangeOf(frame().curves, part, frame().shown),
+      },
+    },
+    axes: [
+      {
+        ...common,
+        size: last ? 34 : 8,
+        splits: (plot) => logTicks(plot.scales.x?.min ?? 1, plot.scales.x?.max ?? 1000),
+        filter: (_plot, splits) => splits,
+        values: (plot, splits) =>
+          last ? thinned(plot.width, splits).map((f) => (f === null ? '' : hertz(f))) : [],
+      },
+      {
+        ...common,
+        size: 58,
+        ...(unit ? { label: unit, labelSize: 18 } : {}),
+        ...(part === 'phase' ? { incrs: [15, 30, 45, 90, 180, 360] } : {}),
+        ...(part === 'coherence' ? { splits: () => [0, 0.5, 1] } : {}),
+        values: (_plot, splits) => splits.map((value) => figure(value, 4)),
+      },
+    ],
+    series,
+    bands,
+    hooks: {
+      drawClear: [(plot) => shade(plot, frame().band, soft)],
+      draw: [(plot) => drawMarkers(plot, frame().markers, part === 'magnitude')],
+    },
+  }
+}
+
+/** On a narrow screen only the decades get a number, so that none runs into the next. */
+function thinned(width: number, splits: number[]): (number | null)[] {
+  if (width / splits.length > 52) return splits
+  return splits.map((f) => (Number.isInteger(Math.log10(f)) || splits.length < 4 ? f : null))
+}
+
+function shade(plot: uPlot, band: [number, number] | null, color: string): void {
+  if (!band) return
+  const { ctx, bbox } = plot
+  const inside = (x: number) => Math.min(Math.max(x, bbox.left), bbox.left + bbox.width)
+  const from = inside(plot.valToPos(band[0], 'x', true))
+  const to = inside(plot.valToPos(band[1], 'x', true))
+  ctx.save()
+  ctx.fillStyle = color
+  ctx.globalAlpha = 0.6
+  ctx.fillRect(from, bbox.top, to - from, bbox.height)
+  ctx.restore()
+}
+
+function drawMarkers(plot: uPlot, markers: Marker[], named: boolean): void {
+  const { ctx, bbox } = plot
+  ctx.save()
+  ctx.lineWidth = 1.5 * devicePixelRatio
+  ctx.font = `bold ${13 * devicePixelRatio}px sans-serif`
+  for (const marker of markers) {
+    const x = plot.valToPos(marker.frequency, 'x', true)
+    if (x < bbox.left || x > bbox.left + bbox.width) continue
+    ctx.strokeStyle = marker.color
+    ctx.setLineDash([6, 4])
+    ctx.beginPath()
+    ctx.moveTo(x, bbox.top)
+    ctx.lineTo(x, bbox.top + bbox.height)
+    ctx.stroke()
+    if (!named) continue
+    ctx.fillStyle = marker.color
+    ctx.fillText(marker.label, x + 4, bbox.top + 14 * devicePixelRatio)
+  }
+  ctx.restore()
+}
+
+/** Dragging takes the nearest marker; a press far from any brings the nearest cursor there. */
+function listen(
+  plot: uPlot,
+  markers: () => Marker[],
+  move: (id: string, frequency: number) => void,
+): () => void {
+  let dragged: string | null = null
+  const left = (event: PointerEvent) => event.clientX - plot.over.getBoundingClientRect().left
+  const at = (event: PointerEvent) => {
+    const x = Math.min(Math.max(left(event), 0), plot.over.clientWidth)
+    return plot.posToVal(x, 'x')
+  }
+  const down = (event: PointerEvent) => {
+    const x = left(event)
+    const near = markers()
+      .map((marker) => ({
+        id: marker.id,
+        away: Math.abs(plot.valToPos(marker.frequency, 'x') - x),
+      }))
+      .toSorted((a, b) => a.away - b.away)
+    const grabbed =
+      near.find((each) => each.away <= GRAB_PX) ?? near.find((each) => each.id.startsWith('cursor'))
+    if (!grabbed) return
+    dragged = grabbed.id
+    plot.over.setPointerCapture(event.pointerId)
+    if (grabbed.away > GRAB_PX) move(grabbed.id, at(event))
+  }
+  const drag = (event: PointerEvent) => {
+    if (dragged !== null) move(dragged, at(event))
+  }
+  const up = () => {
+    dragged = null
+  }
+  const { over } = plot
+  over.addEventListener('pointerdown', down)
+  over.addEventListener('pointermove', drag)
+  over.addEventListener('pointerup', up)
+  over.addEventListener('pointercancel', up)
+  return () => {
+    over.removeEventListener('pointerdown', down)
+    over.removeEventListener('pointermove', drag)
+    over.removeEventListener('pointerup', up)
+    over.removeEventListener('pointercancel', up)
+  }
+}

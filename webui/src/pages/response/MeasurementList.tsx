@@ -1,0 +1,136 @@
+import { Button, FileButton, Modal } from '@mantine/core'
+import { useState } from 'react'
+import { API_ROOT, api, ask } from '../../api/client'
+import type { MeasurementInfo, Problem } from '../../api/schema'
+import { known, useT } from '../../i18n'
+import { dateTime } from '../../widgets/format'
+import { Icon } from '../../widgets/Icon'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+
+/** Stored responses: show one, lay another over it, take in, hand out, delete. */
+export function MeasurementList({
+  list,
+  problem,
+  shown,
+  over,
+  onShow,
+  onOver,
+  onChange,
+}: {
+  list: MeasurementInfo[]
+  problem: Problem | null
+  shown: string | null
+  over: string | null
+  onShow: (file: string) => void
+  onOver: (file: string | null) => void
+  onChange: () => Promise<void>
+}) {
+  const t = useT()
+  const act = useAction()
+  const [doomed, setDoomed] = useState<string | null>(null)
+  const upload = (file: File) =>
+    act.run(async () => {
+      const answer = await ask(
+        api.POST('/api/v1/measurements', {
+          params: { query: { name: file.name } },
+          body: file as never,
+          bodySerializer: (body: unknown) => body as BodyInit,
+          headers: { 'Content-Type': 'application/octet-stream' },
+        }),
+      )
+      await onChange()
+      onShow(answer.file)
+    })
+  const remove = (file: string) =>
+    act.run(async () => {
+      await ask(api.DELETE('/api/v1/measurements/{name}', { params: { path: { name: file } } }))
+      await onChange()
+    })
+  return (
+    <Panel
+      title={t('measured.title')}
+      tools={
+        <FileButton accept=".sdmeas" onChange={(file) => file && void upload(file)}>
+          {(props) => (
+            <Button {...props} loading={act.busy} leftSection={<Icon name="upload" />}>
+              {t('measured.upload')}
+            </Button>
+          )}
+        </FileButton>
+      }
+    >
+      {list.length === 0 && <p className="dim">{t('measured.none')}</p>}
+      <ul className="plain-list scroll-list tall">
+        {list.map((each) => (
+          <li key={each.file} className="set">
+            <span className="grow">
+              <strong>
+                {each.problem === ''
+                  ? known(t, 'measured', each.kind)
+                  : t('measured.unusable', { problem: each.problem })}
+              </strong>
+              <small className="dim num">
+                {' '}
+                {each.drive} · {dateTime(each.saved)}
+              </small>
+            </span>
+            {each.problem === '' && (
+              <>
+                <Button
+                  aria-pressed={shown === each.file}
+                  variant={shown === each.file ? 'filled' : 'default'}
+                  onClick={() => onShow(each.file)}
+                >
+                  {t('measured.show')}
+                </Button>
+                <Button
+                  aria-pressed={over === each.file}
+                  variant={over === each.file ? 'filled' : 'default'}
+                  disabled={shown === null || shown === each.file}
+                  onClick={() => onOver(over === each.file ? null : each.file)}
+                >
+                  {t('measured.compare')}
+                </Button>
+                <a
+                  className="icon-link"
+                  href={`${API_ROOT}/api/v1/measurements/${encodeURIComponent(each.file)}/file`}
+                  aria-label={t('measured.download', { file: each.file })}
+                  download={each.file}
+                >
+                  <Icon name="download" />
+                </a>
+              </>
+            )}
+            <Button
+              aria-label={t('measured.delete', { file: each.file })}
+              onClick={() => setDoomed(each.file)}
+            >
+              <Icon name="cross" />
+            </Button>
+          </li>
+        ))}
+      </ul>
+      <ProblemNote problem={problem ?? act.problem} onClose={act.clear} />
+      {doomed !== null && (
+        <Modal opened onClose={() => setDoomed(null)} title={t('measured.deleteTitle')}>
+          <p className="mono">{doomed}</p>
+          <p>{t('measured.deleteText')}</p>
+          <div className="row end">
+            <Button onClick={() => setDoomed(null)}>{t('cancel')}</Button>
+            <Button
+              variant="filled"
+              onClick={() => {
+                setDoomed(null)
+                void remove(doomed)
+              }}
+            >
+              {t('measured.deleteNow')}
+            </Button>
+          </div>
+        </Modal>
+      )}
+    </Panel>
+  )
+}

@@ -1,0 +1,95 @@
+import { useEffect, useRef } from 'react'
+import uPlot from 'uplot'
+import 'uplot/dist/uPlot.min.css'
+import { figure } from '../../widgets/format'
+
+export interface Trace {
+  label: string
+  color: string
+  dashed?: boolean
+  time: number[]
+  value: number[]
+}
+
+/** Answers to a step over time. */
+export function StepPlot({
+  traces,
+  unit,
+  label,
+  timeLabel,
+  dark,
+}: {
+  traces: Trace[]
+  unit: string
+  label: string
+  timeLabel: string
+  dark: boolean
+}) {
+  const box = useRef<HTMLDivElement>(null)
+  const plotted = useRef<uPlot | null>(null)
+  const shape = JSON.stringify([traces.map((each) => [each.label, each.color]), unit, dark])
+  useEffect(() => {
+    const element = box.current
+    if (!element) return
+    const size = () => ({ width: Math.max(200, element.clientWidth), height: 260 })
+    const plot = new uPlot(options(traces, unit, timeLabel, size()), data(traces), element)
+    plotted.current = plot
+    const observer = new ResizeObserver(() => plot.setSize(size()))
+    observer.observe(element)
+    return () => {
+      observer.disconnect()
+      plotted.current = null
+      plot.destroy()
+    }
+    // Built anew only when what is drawn changes in kind.
+  }, [shape])
+  useEffect(() => {
+    plotted.current?.setData(data(traces))
+  }, [traces])
+  return <div ref={box} className="bode" role="img" aria-label={label} />
+}
+
+function data(traces: Trace[]): uPlot.AlignedData {
+  const columns = traces.map((each): uPlot.AlignedData => [each.time, each.value])
+  return columns.length > 0 ? uPlot.join(columns) : [[]]
+}
+
+function options(
+  traces: Trace[],
+  unit: string,
+  timeLabel: string,
+  size: { width: number; height: number },
+): uPlot.Options {
+  const style = getComputedStyle(document.documentElement)
+  const line = { stroke: style.getPropertyValue('--line'), width: 1 }
+  const font = `12px ${getComputedStyle(document.body).fontFamily}`
+  const axis = {
+    stroke: style.getPropertyValue('--dim'),
+    font,
+    labelFont: font,
+    grid: line,
+    ticks: line,
+    labelSize: 18,
+    values: (_plot: uPlot, splits: number[]) => splits.map((value) => figure(value, 5)),
+  }
+  return {
+    ...size,
+    legend: { show: false },
+    cursor: { drag: { x: false, y: false, setScale: false }, points: { show: false } },
+    scales: { x: { time: false } },
+    axes: [
+      { ...axis, label: timeLabel, size: 34 },
+      { ...axis, size: 58, ...(unit ? { label: unit } : {}) },
+    ],
+    series: [
+      {},
+      ...traces.map((each) => ({
+        label: each.label,
+        stroke: each.color,
+        width: 1.8,
+        points: { show: false },
+        ...(each.dashed ? { dash: [6, 4] } : {}),
+      })),
+    ],
+  }
+}

@@ -1,0 +1,138 @@
+import { Button, Checkbox, NativeSelect, SegmentedControl } from '@mantine/core'
+import { useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { AxisState, SweepRequest } from '../../api/schema'
+import { useT } from '../../i18n'
+import { setJob } from '../../live/store'
+import { NumberField } from '../../widgets/NumberField'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { useRemembered } from '../motion/remembered'
+import { LimitFields, useLimits } from './limits'
+
+const KINDS = ['mechanics', 'speed_loop', 'position_loop'] as const
+const LOOPS = ['auto', 'none', 'speed', 'position'] as const
+
+/** What to measure, within which limits, and what will move. */
+export function SweepForm({ drive, state }: { drive: string; state: AxisState | null }) {
+  const t = useT()
+  const [kind, setKind] = useState<SweepRequest['kind']>('mechanics')
+  const [loop, setLoop] = useState<SweepRequest['loop']>('auto')
+  const [low, setLow] = useRemembered(drive, 'sweep.low', 5)
+  const [high, setHigh] = useState<number | null>(null)
+  const [share, setShare] = useRemembered(drive, 'sweep.share', 35)
+  const [count, setCount] = useRemembered(drive, 'sweep.count', 2)
+  const [base, setBase] = useState(true)
+  const limits = useLimits(drive)
+  const start = useAction()
+  const complete = limits.limits !== null && low !== null && share !== null && count !== null
+  const go = () =>
+    start.run(async () => {
+      if (!limits.limits || low === null || share === null || count === null) return
+      setJob(
+        await ask(
+          api.POST('/api/v1/drives/{drive_id}/jobs/sweep', {
+            params: { path: { drive_id: drive } },
+            body: {
+              ...limits.limits,
+              kind,
+              loop: kind === 'mechanics' ? loop : 'auto',
+              f_min_hz: low,
+              f_max_hz: high,
+              share: share / 100,
+              realisations: count,
+              base_motion: base,
+              cycle_ms: 1,
+            },
+          }),
+        ),
+      )
+    })
+  return (
+    <Panel title={t('sweep.title')}>
+      <SegmentedControl
+        fullWidth
+        value={kind}
+        onChange={(next) => setKind(next)}
+        data={KINDS.map((each) => ({ value: each, label: t(`sweep.kind.${each}`) }))}
+      />
+      <p className="dim">{t(`sweep.help.${kind}`)}</p>
+      <LimitFields of={limits} />
+      <details>
+        <summary>{t('sweep.more')}</summary>
+        <div className="fields">
+          {kind === 'mechanics' && (
+            <NativeSelect
+              label={t('sweep.loop')}
+              value={loop}
+              onChange={(event) => setLoop(event.currentTarget.value as SweepRequest['loop'])}
+              data={LOOPS.map((each) => ({ value: each, label: t(`sweep.loop.${each}`) }))}
+            />
+          )}
+          <NumberField
+            label={t('signal.from')}
+            unit="Hz"
+            value={low}
+            onChange={setLow}
+            min={3}
+            max={500}
+          />
+          <NumberField
+            label={t('signal.to')}
+            unit="Hz"
+            value={high}
+            onChange={setHigh}
+            optional
+            min={4 * (low ?? 3)}
+            help={t('sweep.highHelp')}
+          />
+          {kind === 'mechanics' && (
+            <NumberField
+              label={t('sweep.share')}
+              unit="%"
+              value={share}
+              onChange={setShare}
+              min={1}
+              max={90}
+              help={t('sweep.shareHelp')}
+            />
+          )}
+          <NumberField
+            label={t('sweep.count')}
+            value={count}
+            onChange={setCount}
+            min={1}
+            max={8}
+            integer
+            help={t('sweep.countHelp')}
+          />
+        </div>
+        <Checkbox
+          label={t('sweep.base')}
+          checked={base}
+          onChange={(event) => setBase(event.currentTarget.checked)}
+        />
+      </details>
+      {limits.limits && (
+        <p className="note warn">
+          {t(kind === 'mechanics' ? 'sweep.moves' : 'sweep.movesLoop', {
+            torque: limits.limits.torque_limit,
+            part: Math.round((limits.limits.torque_limit * (share ?? 0)) / 100),
+            travel: limits.limits.travel_limit,
+            speed: limits.limits.speed_limit,
+          })}
+        </p>
+      )}
+      <Button
+        variant="filled"
+        disabled={!complete || state?.moving_job != null || !state?.fresh}
+        loading={start.busy}
+        onClick={() => void go()}
+      >
+        {t('sweep.start')}
+      </Button>
+      <ProblemNote problem={start.problem} onClose={start.clear} />
+    </Panel>
+  )
+}

@@ -1,0 +1,50 @@
+import { Button } from '@mantine/core'
+import { api, ask } from '../../api/client'
+import { useT } from '../../i18n'
+import { dateTime } from '../../widgets/format'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { forget, useChanges } from './undo'
+
+/** The newest change to an axis, with the way back. */
+export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => void }) {
+  const t = useT()
+  const last = useChanges(drive).at(-1)
+  const act = useAction()
+  if (!last) return <ProblemNote problem={act.problem} onClose={act.clear} />
+  const undo = () =>
+    act.run(async () => {
+      await ask(
+        api.POST('/api/v1/drives/{drive_id}/tune/undo', {
+          params: { path: { drive_id: drive } },
+          body: { before: last.before },
+        }),
+      )
+      forget(drive)
+      onUndone()
+    })
+  return (
+    <div className="note info">
+      <div className="row wrap middle">
+        <span className="grow">
+          {t(`undo.${last.what}`)} <span className="num dim">{dateTime(last.time)}</span>
+        </span>
+        <Button loading={act.busy} onClick={() => void undo()}>
+          {t('undo.button')}
+        </Button>
+      </div>
+      <details>
+        <summary>{t('undo.what', { count: Object.keys(last.before).length })}</summary>
+        <dl className="facts mono">
+          {Object.entries(last.before).map(([key, raw]) => (
+            <div key={key} className="pair">
+              <dt>{key}</dt>
+              <dd>{raw}</dd>
+            </div>
+          ))}
+        </dl>
+      </details>
+      <ProblemNote problem={act.problem} onClose={act.clear} />
+    </div>
+  )
+}

@@ -1,0 +1,139 @@
+/** Results of tuning jobs, as the server's tools write them (backend/tools, `as_json`). */
+
+export interface Resonance {
+  kind: 'resonance' | 'antiresonance'
+  frequency_hz: number
+  damping: number
+  height_db: number
+}
+
+export type Margins = Record<string, number | boolean | null>
+
+export interface Sweep {
+  kind: 'mechanics' | 'speed_loop' | 'position_loop'
+  loop: string
+  sample_rate_hz: number
+  valid_band_hz: [number, number]
+  frequency_hz: number[]
+  magnitude_db: number[]
+  phase_deg: number[]
+  coherence: number[]
+  std_db: (number | null)[]
+  std_deg: (number | null)[]
+  resonances: Resonance[]
+  margins: Margins
+  unit: string
+  trusted: boolean
+  motion_s: number
+  saturated_share: number
+  warnings: string[]
+}
+
+export interface Inertia {
+  method: string
+  inertia_kgm2: number | null
+  viscous_nms: number | null
+  coulomb_nm: number | null
+  gravity_nm: number | null
+  load_ratio: number | null
+  load_ratio_against: string
+  ci95: Record<string, [number | null, number | null] | null>
+  r2: number
+  verdict: string
+  identifiable: boolean
+  unit: string
+  ends_rev: [number, number] | null
+  motion_s: number
+}
+
+export interface NotchShape {
+  center_hz: number
+  width_hz: number
+  depth_db: number
+}
+
+export interface Candidate {
+  notches: NotchShape[]
+  gains: {
+    speed_nms: number
+    integral_hz: number
+    position_1_s: number
+    speed_bandwidth_hz: number
+  }
+  bandwidth_hz: number | null
+  position_bandwidth_hz: number | null
+  nominal: {
+    phase_margin_deg: number | null
+    gain_margin_db: number | null
+    ms: number
+    stable: boolean
+  }
+  promised: { gain_margin_db: number; phase_margin_deg: number; ms: number }
+  phase_cost_deg: number
+  overshoot_percent: number
+  settling_s: number | null
+  marks: string[]
+}
+
+export interface Step {
+  kind: 'speed' | 'move'
+  unit: string
+  time_s: number[]
+  demand: number[]
+  actual: number[]
+  step: {
+    overshoot_percent: number
+    rise_s: number | null
+    settling_s: number | null
+  } | null
+  move: {
+    following_peak: number
+    following_rms: number
+    overshoot: number
+    settling_s: number | null
+  } | null
+  torque_peak_percent: number
+  torque_rms_percent: number
+}
+
+export interface Autotune {
+  inertia: Inertia
+  mechanics: Sweep
+  load: string
+  candidates: Candidate[]
+  applied: Candidate | null
+  verified: {
+    sweep: Sweep
+    predicted_bandwidth_hz: number | null
+    measured_bandwidth_hz: number | null
+  } | null
+  step: Step | null
+  before: Record<string, number>
+  tried: string[]
+  measurements?: string[]
+}
+
+const has = (value: unknown, ...names: string[]): boolean =>
+  typeof value === 'object' && value !== null && names.every((name) => name in value)
+
+/** The result of a frequency response, or null where it is something else. */
+export const asSweep = (value: unknown): Sweep | null =>
+  has(value, 'frequency_hz', 'magnitude_db', 'coherence', 'valid_band_hz') ? (value as Sweep) : null
+
+export const asInertia = (value: unknown): Inertia | null =>
+  has(value, 'inertia_kgm2', 'ci95', 'verdict') ? (value as Inertia) : null
+
+export const asStep = (value: unknown): Step | null =>
+  has(value, 'time_s', 'demand', 'actual') ? (value as Step) : null
+
+export const asAutotune = (value: unknown): Autotune | null =>
+  has(value, 'mechanics', 'candidates', 'before') ? (value as Autotune) : null
+
+export const asCandidates = (value: unknown[]): Candidate[] =>
+  value.filter((each) => has(each, 'gains', 'notches', 'marks')) as Candidate[]
+
+/** Files that a job stored, newest last. */
+export function filesOf(result: unknown): string[] {
+  const files = (result as { measurements?: unknown } | null)?.measurements
+  return Array.isArray(files) ? files.filter((file) => typeof file === 'string') : []
+}

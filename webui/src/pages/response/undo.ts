@@ -1,0 +1,62 @@
+import { useSyncExternalStore } from 'react'
+
+/** A change that was written, and the raw values that take it back. */
+export interface Change {
+  what: 'notches' | 'gains' | 'candidate' | 'undo'
+  time: string
+  before: Record<string, number>
+}
+
+const KEPT = 8
+const known = new Map<string, Change[]>()
+const listeners = new Set<() => void>()
+const NONE: Change[] = []
+const place = (drive: string) => `servodeck.${drive}.tune.undo`
+
+function read(drive: string): Change[] {
+  let list = known.get(drive)
+  if (!list) {
+    list = stored(drive)
+    known.set(drive, list)
+  }
+  return list
+}
+
+function stored(drive: string): Change[] {
+  try {
+    const found: unknown = JSON.parse(localStorage.getItem(place(drive)) ?? '[]')
+    return Array.isArray(found) ? (found as Change[]).filter((each) => each?.before) : NONE
+  } catch {
+    return NONE
+  }
+}
+
+function store(drive: string, list: Change[]): void {
+  known.set(drive, list)
+  localStorage.setItem(place(drive), JSON.stringify(list))
+  for (const listener of listeners) listener()
+}
+
+/** Keep what a write returned; nothing is kept of a write that changed nothing. */
+export function remember(
+  drive: string,
+  what: Change['what'],
+  before: Record<string, number>,
+): void {
+  if (Object.keys(before).length === 0) return
+  const change = { what, time: new Date().toISOString(), before }
+  store(drive, [...read(drive), change].slice(-KEPT))
+}
+
+/** Take the newest change off the list, once it has been undone. */
+export const forget = (drive: string) => store(drive, read(drive).slice(0, -1))
+
+/** Changes to an axis that can be taken back, newest last. */
+export const useChanges = (drive: string): Change[] =>
+  useSyncExternalStore(
+    (listener) => {
+      listeners.add(listener)
+      return () => listeners.delete(listener)
+    },
+    () => read(drive),
+  )

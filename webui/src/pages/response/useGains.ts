@@ -1,0 +1,39 @@
+import { useCallback, useEffect, useState } from 'react'
+import { api, ask, problemOf } from '../../api/client'
+import type { GainInfo, GainValues, Problem } from '../../api/schema'
+
+/** Loop gains of a drive, read from it. */
+export function useGains(drive: string) {
+  const [gains, setGains] = useState<GainInfo | null>(null)
+  const [problem, setProblem] = useState<Problem | null>(null)
+  const read = useCallback(async () => {
+    try {
+      setGains(
+        await ask(
+          api.GET('/api/v1/drives/{drive_id}/gains', { params: { path: { drive_id: drive } } }),
+        ),
+      )
+      setProblem(null)
+    } catch (error) {
+      setGains(null)
+      setProblem(problemOf(error))
+    }
+  }, [drive])
+  useEffect(() => {
+    void read()
+  }, [read])
+  return { gains, problem, read }
+}
+
+/** Gains that a loop can be predicted with, or null where one has no known meaning. */
+export function usable(gains: GainInfo | null): GainValues | null {
+  if (!gains?.speed_hz || !gains.integral_hz || !gains.position_1_s || !gains.inertia_kgm2) {
+    return null
+  }
+  return {
+    speed_bandwidth_hz: gains.speed_hz,
+    integral_hz: gains.integral_hz,
+    position_1_s: gains.position_1_s,
+    inertia_kgm2: gains.inertia_kgm2,
+  }
+}

@@ -1,0 +1,76 @@
+import { useCallback, useEffect, useState } from 'react'
+import { api, ask, problemOf } from '../../api/client'
+import type { NotchPreviewInfo, NotchSlotInfo, Problem } from '../../api/schema'
+import type { NotchShape } from './results'
+
+const SETTLE_MS = 250
+const MOST_LINES = 5000
+
+/** Notches of a drive as they are, as they are wanted, and what the drive would make of that. */
+export function useNotches(drive: string, frequency: number[]) {
+  const [now, setNow] = useState<NotchSlotInfo[] | null>(null)
+  const [wanted, setWanted] = useState<(NotchShape | null)[]>([])
+  const [problem, setProblem] = useState<Problem | null>(null)
+  const [preview, setPreview] = useState<NotchPreviewInfo | null>(null)
+  const [refused, setRefused] = useState<Problem | null>(null)
+  const path = { params: { path: { drive_id: drive } } }
+  const read = useCallback(async () => {
+    try {
+      const slots = await ask(
+        api.GET('/api/v1/drives/{drive_id}/notches', { params: { path: { drive_id: drive } } }),
+      )
+      setNow(slots)
+      setWanted(slots.map((slot) => (slot.enabled ? slot.notch : null)))
+      setProblem(null)
+    } catch (error) {
+      setNow(null)
+      setProblem(problemOf(error))
+    }
+  }, [drive])
+  useEffect(() => {
+    void read()
+  }, [read])
+  const asked = JSON.stringify(wanted)
+  useEffect(() => {
+    if (!now) return
+    let current = true
+    const timer = setTimeout(() => {
+      ask(
+        api.POST('/api/v1/drives/{drive_id}/notches/preview', {
+          ...path,
+          body: { notches: wanted, frequency_hz: frequency.slice(0, MOST_LINES) },
+        }),
+      ).then(
+        (made) => {
+          if (!current) return
+          setPreview(made)
+          setRefused(null)
+        },
+        (error: unknown) => {
+          if (!current) return
+          setPreview(null)
+          setRefused(problemOf(error))
+        },
+      )
+    }, SETTLE_MS)
+    return () => {
+      current = false
+      clearTimeout(timer)
+    }
+  }, [asked, drive, now, frequency])
+  const set = (slot: number, notch: NotchShape | null) =>
+    setWanted((old) => old.map((each, i) => (i === slot ? notch : each)))
+  /** A notch in the first free slot; false where all are taken. */
+  const add = (notch: NotchShape): boolean => {
+    const free = wanted.findIndex((each) => each === null)
+    if (free < 0) return false
+    set(free, notch)
+    return true
+  }
+  const edited =
+    now !== null && asked !== JSON.stringify(now.map((slot) => (slot.enabled ? slot.notch : null)))
+  /** Levels without a printed meaning cannot be edited as a shape. */
+  const shaped = now !== null && now.some((slot) => !slot.note.startsWith('levels'))
+  return { now, wanted, set, add, read, problem, preview, refused, edited, shaped }
+}
+export type Notches = ReturnType<typeof useNotches>

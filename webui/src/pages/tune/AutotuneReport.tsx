@@ -1,0 +1,236 @@
+import { Button, useComputedColorScheme } from '@mantine/core'
+import { useMemo, useState } from 'react'
+import { api, ask } from '../../api/client'
+import { known, useT } from '../../i18n'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { fixed, hertz, measuredCurve } from '../response/bode'
+import { BodePlot } from '../response/BodePlot'
+import { Legend } from '../response/Legend'
+import { MarginList, ResonanceTable } from '../response/Readings'
+import { type Autotune, filesOf, type Step } from '../response/results'
+import { StepPlot } from '../response/StepPlot'
+import { usePrediction } from '../response/usePrediction'
+import { TRACE_COLORS } from '../scope/channels'
+import { CandidateTable } from './CandidateTable'
+import { InertiaResult } from './InertiaPanel'
+
+const undone = new Set<string>()
+
+/** Everything that was measured and decided, the check of the promise, and the way back. */
+export function AutotuneReport({
+  drive,
+  job,
+  result,
+  onChanged,
+}: {
+  drive: string
+  job: string
+  result: Autotune
+  onChanged: () => void
+}) {
+  const t = useT()
+  const [back, setBack] = useState(undone.has(job))
+  const undo = useAction()
+  const applied = result.applied
+  const go = () =>
+    undo.run(async () => {
+      await ask(
+        api.POST('/api/v1/drives/{drive_id}/tune/undo', {
+          params: { path: { drive_id: drive } },
+          body: { before: result.before },
+        }),
+      )
+      undone.add(job)
+      setBack(true)
+      onChanged()
+    })
+  return (
+    <>
+      {applied && (
+        <div className={`note ${back ? 'info' : 'good'}`}>
+          <div className="row wrap middle">
+            <span className="grow">
+              {back
+                ? t('undo.undo')
+                : t('autotune.applied', {
+                    mark: applied.marks.map((mark) => known(t, 'mark', mark)).join(', '),
+                  })}
+            </span>
+            {!back && (
+              <Button loading={undo.busy} onClick={() => void go()}>
+                {t('undo.button')}
+              </Button>
+            )}
+          </div>
+          {!back && <p>{t('autotune.save')}</p>}
+        </div>
+      )}
+      <ProblemNote problem={undo.problem} onClose={undo.clear} />
+      {result.tried.length > 0 && (
+        <div className="note warn">
+          {t('autotune.tried')}
+          <ul>
+            {result.tried.map((each) => (
+              <li key={each}>{each}</li>
+            ))}
+          </ul>
+        </div>
+      )}
+      <Verification drive={drive} result={result} />
+      {result.step && <StepNumbers step={result.step} />}
+      <details>
+        <summary>{t('autotune.measured')}</summary>
+        <InertiaResult result={result.inertia} />
+        <ResonanceTable sweep={result.mechanics} onNotch={null} />
+      </details>
+      <details>
+        <summary>{t('candidate.title')}</summary>
+        <p>{t('candidate.as', { load: known(t, 'load', result.load) })}</p>
+        <CandidateTable candidates={result.candidates} onApply={null} />
+      </details>
+    </>
+  )
+}
+
+/** The tuned loop as measured, over what was predicted for it. */
+function Verification({ drive, result }: { drive: string; result: Autotune }) {
+  const t = useT()
+  const dark = useComputedColorScheme('light') === 'dark'
+  const colors = TRACE_COLORS[dark ? 'dark' : 'light']
+  const { applied, verified } = result
+  const file = filesOf(result).find((name) => name.includes('sweep-mechanics')) ?? null
+  const inertia = result.inertia.inertia_kgm2
+  const gains =
+    applied && inertia !== null
+      ? {
+          speed_bandwidth_hz: applied.gains.speed_bandwidth_hz,
+          integral_hz: applied.gains.integral_hz,
+          position_1_s: applied.gains.position_1_s,
+          inertia_kgm2: inertia,
+        }
+      : null
+  const predicted = usePrediction(drive, file, applied?.notches ?? [], gains)
+  const curves = useMemo(() => {
+    if (!verified) return []
+    const measured = measuredCurve(verified.sweep, t('response.measured'), colors[0] ?? '')
+    const [low, high] = verified.sweep.valid_band_hz
+    if (!predicted.found) return [measured]
+    const { frequency_hz, closed_db, closed_deg } = predicted.found
+    const inside = <V,>(values: V[]) =>
+      values.filter((_, i) => {
+        const f = frequency_hz[i] ?? 0
+        return f >= low && f <= high
+      })
+    return [
+      measured,
+      {
+        label: t('autotune.predicted'),
+        color: colors[1] ?? '',
+        dashed: true,
+        frequency: inside(frequency_hz),
+        magnitude: inside(closed_db),
+        phase: inside(closed_deg),
+      },
+    ]
+  }, [verified, predicted.found, dark, t('autotune.predicted')])
+  if (!verified) return null
+  return (
+    <>
+      <h3>{t('autotune.verification')}</h3>
+      <p className="num">
+        {t('autotune.bandwidths', {
+          predicted: hertz(verified.predicted_bandwidth_hz),
+          measured: hertz(verified.measured_bandwidth_hz),
+        })}
+      </p>
+      <Legend of={curves} />
+      <BodePlot
+        curves={curves}
+        markers={[]}
+        band={verified.sweep.valid_band_hz}
+        shown={[
+          Math.max(verified.sweep.frequency_hz[0] ?? 1, verified.sweep.valid_band_hz[0]),
+          verified.sweep.valid_band_hz[1],
+        ]}
+        unit={verified.sweep.unit}
+        label={t('autotune.verification')}
+        dark={dark}
+        onMarker={() => {}}
+      />
+      <MarginList margins={verified.sweep.margins} />
+    </>
+  )
+}
+
+/** A step's curve and its read-outs. */
+export function StepNumbers({ step }: { step: Step }) {
+  const t = useT()
+  const dark = useComputedColorScheme('light') === 'dark'
+  const colors = TRACE_COLORS[dark ? 'dark' : 'light']
+  const traces = useMemo(
+    () => [
+      {
+        label: t('step.demand'),
+        color: colors[1] ?? '',
+        dashed: true,
+        time: step.time_s,
+        value: step.demand,
+      },
+      { label: t('step.actual'), color: colors[0] ?? '', time: step.time_s, value: step.actual },
+    ],
+    [step, dark, t('step.demand')],
+  )
+  const ms = (s: number | null | undefined) => fixed(s == null ? null : s * 1000, 1, 'ms')
+  return (
+    <>
+      <h3>{t('predict.step')}</h3>
+      <Legend of={traces} />
+      <StepPlot
+        traces={traces}
+        unit={step.unit}
+        label={t('predict.step')}
+        timeLabel={t('predict.time')}
+        dark={dark}
+      />
+      <dl className="counters num">
+        {step.step && (
+          <>
+            <div>
+              <dt>{t('candidate.overshoot')}</dt>
+              <dd>{fixed(step.step.overshoot_percent, 1, '%')}</dd>
+            </div>
+            <div>
+              <dt>{t('step.rise')}</dt>
+              <dd>{ms(step.step.rise_s)}</dd>
+            </div>
+            <div>
+              <dt>{t('candidate.settling')}</dt>
+              <dd>{ms(step.step.settling_s)}</dd>
+            </div>
+          </>
+        )}
+        {step.move && (
+          <>
+            <div>
+              <dt>{t('step.following')}</dt>
+              <dd>{fixed(step.move.following_peak, 4, step.unit)}</dd>
+            </div>
+            <div>
+              <dt>{t('candidate.settling')}</dt>
+              <dd>{ms(step.move.settling_s)}</dd>
+            </div>
+          </>
+        )}
+        <div>
+          <dt>{t('step.torquePeak')}</dt>
+          <dd>{fixed(step.torque_peak_percent, 0, '%')}</dd>
+        </div>
+        <div>
+          <dt>{t('step.torqueRms')}</dt>
+          <dd>{fixed(step.torque_rms_percent, 0, '%')}</dd>
+        </div>
+      </dl>
+    </>
+  )
+}

@@ -1,0 +1,170 @@
+import { Button } from '@mantine/core'
+import { useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { AxisState } from '../../api/schema'
+import { useT } from '../../i18n'
+import { setJob } from '../../live/store'
+import { JobNote } from '../../widgets/JobNote'
+import { NumberField } from '../../widgets/NumberField'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { fixed } from '../response/bode'
+import type { Limits } from '../response/limits'
+import { asInertia, type Inertia } from '../response/results'
+import { useToolJob } from '../response/useToolJob'
+import { SchemeFields, useScheme } from './schemes'
+import { withInterval } from './steps'
+
+/** Inertia and friction, by moves forth and back. */
+export function InertiaPanel({
+  drive,
+  state,
+  limits,
+  able,
+}: {
+  drive: string
+  state: AxisState | null
+  limits: Limits | null
+  able: boolean
+}) {
+  const t = useT()
+  const scheme = useScheme()
+  const [repetitions, setRepetitions] = useState<number | null>(4)
+  const [motor, setMotor] = useState<number | null>(null)
+  const [searchTorque, setSearchTorque] = useState<number | null>(20)
+  const [searchSpeed, setSearchSpeed] = useState<number | null>(30)
+  const { job, note, dismiss } = useToolJob(drive, 'inertia')
+  const start = useAction()
+  const result = asInertia(job?.result)
+  const complete =
+    limits !== null &&
+    repetitions !== null &&
+    scheme.complete &&
+    searchTorque !== null &&
+    searchSpeed !== null
+  const go = () =>
+    start.run(async () => {
+      if (!limits || repetitions === null || searchTorque === null || searchSpeed === null) return
+      setJob(
+        await ask(
+          api.POST('/api/v1/drives/{drive_id}/jobs/inertia', {
+            params: { path: { drive_id: drive } },
+            body: {
+              ...limits,
+              cycle_ms: 1,
+              scheme: scheme.scheme,
+              ends_rev: scheme.ends,
+              search_torque: searchTorque,
+              search_speed: searchSpeed,
+              repetitions,
+              motor_inertia_kgm2: motor,
+            },
+          }),
+        ),
+      )
+    })
+  return (
+    <Panel title={t('inertia.title')}>
+      <p className="dim">{t('inertia.lead')}</p>
+      <SchemeFields of={scheme} state={state} />
+      <div className="fields">
+        {scheme.scheme === 'limited' && (
+          <>
+            <NumberField
+              label={t('inertia.searchTorque')}
+              unit="%"
+              value={searchTorque}
+              onChange={setSearchTorque}
+              above={0}
+              max={100}
+            />
+            <NumberField
+              label={t('inertia.searchSpeed')}
+              unit="rpm"
+              value={searchSpeed}
+              onChange={setSearchSpeed}
+              above={0}
+            />
+          </>
+        )}
+        <NumberField
+          label={t('inertia.repetitions')}
+          value={repetitions}
+          onChange={setRepetitions}
+          min={1}
+          max={10}
+          integer
+        />
+        <NumberField
+          label={t('inertia.motor')}
+          unit="kg·m²"
+          value={motor}
+          onChange={setMotor}
+          above={0}
+          optional
+          help={t('inertia.motorHelp')}
+        />
+      </div>
+      <Button
+        variant="filled"
+        disabled={!complete || !able}
+        loading={start.busy}
+        onClick={() => void go()}
+      >
+        {t('inertia.start')}
+      </Button>
+      <ProblemNote problem={start.problem} onClose={start.clear} />
+      <JobNote id={note} onClose={dismiss} />
+      {result && <InertiaResult result={result} />}
+    </Panel>
+  )
+}
+
+const ROWS = [
+  { name: 'inertia_kgm2', text: 'inertia.inertia', unit: 'kg·m²' },
+  { name: 'load_ratio', text: 'inertia.ratio', unit: '' },
+  { name: 'coulomb_nm', text: 'inertia.coulomb', unit: 'N·m' },
+  { name: 'viscous_nms', text: 'inertia.viscous', unit: 'N·m·s/rad' },
+  { name: 'gravity_nm', text: 'inertia.gravity', unit: 'N·m' },
+] as const
+
+/** What was found, how sure it is, and whether the data support it at all. */
+export function InertiaResult({ result }: { result: Inertia }) {
+  const t = useT()
+  const si = result.unit === 'SI'
+  return (
+    <>
+      <p className={`note ${result.identifiable ? 'good' : 'warn'}`}>
+        <strong>{t(result.identifiable ? 'inertia.sure' : 'inertia.unsure')}</strong>{' '}
+        {result.verdict}
+      </p>
+      <div className="scroll-table">
+        <table aria-label={t('inertia.title')}>
+          <thead>
+            <tr>
+              <th>{t('inertia.quantity')}</th>
+              <th className="right">{t('inertia.value')}</th>
+            </tr>
+          </thead>
+          <tbody className="num">
+            {ROWS.map(({ name, text, unit }) => (
+              <tr key={name}>
+                <td>{t(text)}</td>
+                <td className="right">
+                  {withInterval(result[name], result.ci95[name], si ? unit : '')}
+                </td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </div>
+      <p className="dim">
+        {!si && `${t('inertia.perRated')} `}
+        {t('inertia.fit', { r2: fixed(result.r2, 4) })}
+        {result.load_ratio_against &&
+          ` ${t('inertia.against', { what: result.load_ratio_against })}`}
+      </p>
+    </>
+  )
+}

@@ -1,0 +1,104 @@
+import { Button, SegmentedControl } from '@mantine/core'
+import { useState } from 'react'
+import { api, ask } from '../../api/client'
+import { useT } from '../../i18n'
+import { setJob } from '../../live/store'
+import { JobNote } from '../../widgets/JobNote'
+import { NumberField } from '../../widgets/NumberField'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import type { Limits } from '../response/limits'
+import { asStep } from '../response/results'
+import { useToolJob } from '../response/useToolJob'
+import { StepNumbers } from './AutotuneReport'
+
+/** A step of speed or a move, as a check of what the gains do. */
+export function StepPanel({
+  drive,
+  limits,
+  able,
+}: {
+  drive: string
+  limits: Limits | null
+  able: boolean
+}) {
+  const t = useT()
+  const [kind, setKind] = useState<'speed' | 'move'>('speed')
+  const [size, setSize] = useState<number | null>(100)
+  const [speed, setSpeed] = useState<number | null>(300)
+  const [acceleration, setAcceleration] = useState<number | null>(6000)
+  const start = useAction()
+  const { job, note, dismiss } = useToolJob(drive, 'step')
+  const result = asStep(job?.result)
+  const go = () =>
+    start.run(async () => {
+      if (!limits || size === null || speed === null || acceleration === null) return
+      setJob(
+        await ask(
+          api.POST('/api/v1/drives/{drive_id}/jobs/step', {
+            params: { path: { drive_id: drive } },
+            body: { ...limits, cycle_ms: 1, kind, size, hold_s: 0.25, speed, acceleration },
+          }),
+        ),
+      )
+    })
+  return (
+    <Panel title={t('step.title')}>
+      <SegmentedControl
+        fullWidth
+        value={kind}
+        onChange={(next) => {
+          setKind(next)
+          setSize(next === 'speed' ? 100 : 1)
+        }}
+        data={(['speed', 'move'] as const).map((each) => ({
+          value: each,
+          label: t(`step.kind.${each}`),
+        }))}
+      />
+      <div className="fields">
+        <NumberField
+          label={t('step.size')}
+          unit={kind === 'speed' ? 'rpm' : 'rev'}
+          value={size}
+          onChange={setSize}
+        />
+        {kind === 'move' && (
+          <>
+            <NumberField
+              label={t('motion.speed')}
+              unit="rpm"
+              value={speed}
+              onChange={setSpeed}
+              above={0}
+            />
+            <NumberField
+              label={t('motion.acceleration')}
+              unit="rpm/s"
+              value={acceleration}
+              onChange={setAcceleration}
+              above={0}
+            />
+          </>
+        )}
+      </div>
+      {limits && (
+        <p className="note warn">
+          {t('step.moves', { travel: limits.travel_limit, torque: limits.torque_limit })}
+        </p>
+      )}
+      <Button
+        variant="filled"
+        disabled={!able || !limits || !size || speed === null || acceleration === null}
+        loading={start.busy}
+        onClick={() => void go()}
+      >
+        {t('step.start')}
+      </Button>
+      <ProblemNote problem={start.problem} onClose={start.clear} />
+      <JobNote id={note} onClose={dismiss} />
+      {result && <StepNumbers step={result} />}
+    </Panel>
+  )
+}

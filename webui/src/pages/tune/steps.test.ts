@@ -1,0 +1,46 @@
+import { describe, expect, it } from 'vitest'
+import type { AxisState, DriveSummary } from '../../api/schema'
+import { engineering, preChecks, ready, stepOf, withInterval } from './steps'
+
+const drive = { lease: { holder: null, mine: false }, pending: 0 } as unknown as DriveSummary
+const state = { fresh: true, faults: [], moving_job: null } as unknown as AxisState
+const cyclic = { possible: true, running: false }
+
+describe('pre-checks', () => {
+  it('pass without a running exchange, which a measurement starts itself', () => {
+    expect(ready(preChecks(drive, state, cyclic))).toBe(true)
+  })
+  it.each([
+    ['no answer', drive, { ...state, fresh: false }, cyclic],
+    ['no state yet', drive, null, cyclic],
+    ['another holds control', { ...drive, lease: { holder: 'Li', mine: false } }, state, cyclic],
+    ['a fault', drive, { ...state, faults: [{ kind: 'fault', name: 'over-current' }] }, cyclic],
+    ['another motion', drive, { ...state, moving_job: 'j1' }, cyclic],
+    ['parameters that wait', { ...drive, pending: 2 }, state, cyclic],
+    ['a bus without process data', drive, state, { possible: false, running: false }],
+  ])('fail with %s', (_why, d, s, c) => {
+    expect(ready(preChecks(d as DriveSummary, s as AxisState | null, c))).toBe(false)
+  })
+  it('let a warning pass', () => {
+    const warned = { ...state, faults: [{ kind: 'warning', name: 'hot' }] } as unknown as AxisState
+    expect(ready(preChecks(drive, warned, cyclic))).toBe(true)
+  })
+})
+
+describe('texts', () => {
+  it('tell the step of a job', () => {
+    expect(stepOf('3 of 6: frequency response: measuring')).toEqual({ now: 3, of: 6 })
+    expect(stepOf('starting')).toBeNull()
+  })
+  it('write powers of ten as such', () => {
+    expect(engineering(5.1234e-5)).toBe('5.12·10⁻⁵')
+    expect(engineering(-2e-4)).toBe('−2.00·10⁻⁴')
+    expect(engineering(0.0312)).toBe('0.0312')
+    expect(engineering(0)).toBe('0')
+  })
+  it('give the interval beside the value, and nothing for what is not known', () => {
+    expect(withInterval(0.03, [0.029, 0.031], 'N·m')).toBe('0.03 (0.029 … 0.031) N·m')
+    expect(withInterval(2, null, '')).toBe('2')
+    expect(withInterval(null, null, 'N·m')).toBe('—')
+  })
+})

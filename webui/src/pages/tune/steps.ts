@@ -1,0 +1,74 @@
+import type { AxisState, DriveSummary } from '../../api/schema'
+
+/** One thing that must be right before an axis is tuned. */
+export interface Check {
+  name: 'answers' | 'control' | 'faults' | 'idle' | 'pending' | 'cyclic' | 'exchange'
+  ok: boolean
+  /** What is in the way, as the drive or the server says it. */
+  detail: string
+  /** Nothing is in the way of measuring; it is only good to know. */
+  optional?: boolean
+}
+
+/** What the server will insist on, told before the button is pressed. */
+export function preChecks(
+  drive: DriveSummary,
+  state: AxisState | null,
+  cyclic: { possible: boolean; running: boolean },
+): Check[] {
+  const { holder, mine } = drive.lease
+  return [
+    { name: 'answers', ok: state?.fresh === true, detail: state?.problem ?? '' },
+    { name: 'control', ok: mine || holder === null, detail: mine ? '' : (holder ?? '') },
+    {
+      name: 'faults',
+      ok: (state?.faults ?? []).every((each) => each.kind !== 'fault'),
+      detail: (state?.faults ?? []).map((each) => each.name).join(', '),
+    },
+    { name: 'idle', ok: state?.moving_job == null, detail: '' },
+    {
+      name: 'pending',
+      ok: drive.pending === 0,
+      detail: drive.pending ? String(drive.pending) : '',
+    },
+    { name: 'cyclic', ok: cyclic.possible, detail: '' },
+    { name: 'exchange', ok: cyclic.running, detail: '', optional: true },
+  ]
+}
+
+/** Whether a measurement may be asked for. */
+export const ready = (checks: Check[]): boolean => checks.every((each) => each.ok || each.optional)
+
+/** Number and count of the steps of a job that names them `2 of 6: …`; null before the first. */
+export function stepOf(step: string): { now: number; of: number } | null {
+  const match = /^(\d+) of (\d+):/.exec(step)
+  return match ? { now: Number(match[1]), of: Number(match[2]) } : null
+}
+
+/** A value with its confidence interval, `1.23e-4 (1.20e-4 … 1.26e-4)`, and its unit. */
+export function withInterval(
+  value: number | null,
+  interval: [number | null, number | null] | null | undefined,
+  unit: string,
+): string {
+  if (value === null) return '—'
+  const text = (each: number | null) => (each === null ? '—' : engineering(each))
+  const spread = interval ? ` (${text(interval[0])} … ${text(interval[1])})` : ''
+  return `${text(value)}${spread}${unit ? ` ${unit}` : ''}`
+}
+
+const SUPERSCRIPT = '⁰¹²³⁴⁵⁶⁷⁸⁹'
+
+/** Three significant digits, powers of ten written as such. */
+export function engineering(value: number): string {
+  const minus = (text: string) => text.replace(/^-/, '−')
+  if (value === 0) return '0'
+  const size = Math.abs(value)
+  if (size >= 1e-2 && size < 1e5) return minus(String(Number(value.toPrecision(3))))
+  const [digits = '', power = '0'] = value.toExponential(2).split('e')
+  const sign = power.startsWith('-') ? '⁻' : ''
+  const raised = Array.from(power.replace(/^[+-]/, ''))
+    .map((d) => SUPERSCRIPT[Number(d)])
+    .join('')
+  return `${minus(digits)}·10${sign}${raised}`
+}
