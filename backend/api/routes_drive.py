@@ -186,6 +186,8 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
     parameter = drive.parameter(key)
     if drive.matters_to_motion(parameter.key):
         bench.require_idle(member)
+    if drive.commands_motion(parameter.key):
+        await _require_disabled(member, parameter.key)
     old = drive.readings.get(parameter.key)
     if request.raw is not None:
         reading = await drive.write(key, request.raw)
@@ -200,6 +202,21 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
     if parameter.key in drive.profile.unit_keys:
         member.axis.forget()
     return reading
+
+
+async def _require_disabled(member: Member, key: str) -> None:
+    """A set-point, mode or control word of an enabled axis would move it with no envelope.
+
+    Raises:
+        NotAllowed: the axis is enabled.
+    """
+    if await member.axis.state() is State.OPERATION_ENABLED:
+        raise NotAllowed(
+            f"{member.drive.name}: {key} commands motion and the axis is enabled",
+            drive=member.drive.name,
+            parameter=key,
+            remedy="use the Motion page, which sets limits and a dead-man; or disable the axis",
+        )
 
 
 # --- procedures and jobs --------------------------------------------------------------

@@ -281,3 +281,15 @@ def test_power_cut_while_jogging(station: Station, x: str, page: Live) -> None:
     page.send(type="jog_stop", drive=x)
     ended = page.wait("jog_ended", drive=x)
     assert ended["problem"] is None, ended
+
+
+def test_setpoints_of_an_enabled_axis_are_not_written_by_hand(station: Station, x: str) -> None:
+    station.ok(
+        station.http.post(f"/drives/{x}/transition", json={"goal": "Operation enabled", "mode": 3})
+    )
+    answer = station.http.put(f"/drives/{x}/parameters/60FF:00", json={"raw": 100000})
+    assert answer.status_code == 409
+    assert "commands motion" in answer.json()["detail"]
+    assert at_rest(station, x)
+    station.ok(station.http.post(f"/drives/{x}/transition", json={"goal": "Switch on disabled"}))
+    station.ok(station.http.put(f"/drives/{x}/parameters/60FF:00", json={"raw": 0}))
