@@ -63,7 +63,7 @@ def demo(
         with tempfile.TemporaryDirectory(prefix="servodeck-") as folder:
             state = config or Path(folder) / "state"
             print("starting the virtual drives …", flush=True)
-            with DemoBench(bench, Path(folder) / "wires", state / "nvm") as drives:
+            with DemoBench(bench, Path(folder) / "wires", state / "nvm", steady=True) as drives:
                 for url, real in drives.addresses.items():
                     print(f"  {url}  is  {real}")
                 for problem in drives.problems:

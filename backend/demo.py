@@ -22,7 +22,8 @@ from drivers.virtual.wires.netns import Namespace, NamespaceUnavailable
 class DemoBench:
     """Starts the wires of a bench file and knows their real addresses.
 
-    ``segment_options`` go to the EtherCAT segments (see drivers.virtual.wires.ethercat).
+    ``segment_options`` go to the EtherCAT segments (see drivers.virtual.wires.ethercat). With
+    ``steady`` a cycle that comes late because the computer is busy is not late for the drives.
 
     Use as a context manager; leaving it ends all virtual drives.
     """
@@ -34,7 +35,9 @@ class DemoBench:
         nvm: Path | None = None,
         *,
         segment_options: Sequence[str] = (),
+        steady: bool = False,
     ) -> None:
+        self._steady = steady
         self._segment_options = tuple(segment_options)
         self._file = bench or STANDARD_BENCH
         self._folder = folder
@@ -96,6 +99,8 @@ class DemoBench:
             return
         self._namespaces.append(namespace)
         arguments = ["--bench", str(self._file), "--on", url, *self._segment_options]
+        if self._steady:
+            arguments.append("--steady")
         if self._nvm is not None:
             folder = self._nvm / f"ethercat{number}"
             folder.mkdir(parents=True, exist_ok=True)
@@ -103,7 +108,9 @@ class DemoBench:
         self.segments[url] = VirtualSegment.start(slave, arguments, namespace)
         launcher = namespace.command(())
         self.addresses[url] = f"interface {master} in the network of process {namespace.pid}"
-        self.wires[url] = partial(EthercatLink, master, url=url, launcher=launcher)
+        self.wires[url] = partial(
+            EthercatLink, master, url=url, launcher=launcher, lockstep=1.0 if self._steady else 0.0
+        )
 
     def command(self, **command: object) -> object:
         """Cause trouble: see drivers.virtual.host.

@@ -205,7 +205,8 @@ class CyclicLoop:
         if self._fd is not None:
             left_s = (self.next_ns + self.cycle_ns - time.monotonic_ns()) * 0.95e-9
             if self._lockstep:
-                left_s = _LOCKSTEP_WAIT_S
+                # A late reply is awaited; one that is missing must not hold up the others.
+                left_s = self.cycle_ns * 1e-9 if self._invalid_run else _LOCKSTEP_WAIT_S
             ready, _, _ = select.select((self._fd,), (), (), max(left_s, _LEAST_WAIT_S))
             if not ready:
                 # Tells SOEM to give the frame up; it returns at once.

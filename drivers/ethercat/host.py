@@ -29,6 +29,7 @@ from drivers.ethercat.ring import Ring
 
 _LAST_WORDS_S = 5
 _STATUS_S = 0.2
+_PATIENT_FRAME_US = 30_000
 _SERVER_SILENT_S = 3.0
 
 
@@ -156,7 +157,10 @@ def main(argv: list[str] | None = None) -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     control = socket.socket(fileno=options.control)
     host = Host(options.interface, control, Ring(options.ring))
-    host.operations.roster.exchange.lockstep = options.lockstep
+    if options.lockstep:
+        host.operations.roster.exchange.lockstep = options.lockstep
+        # A virtual segment on a busy computer answers when it gets its turn.
+        host.operations.segment.frame_timeout_us = _PATIENT_FRAME_US
     signal.signal(signal.SIGTERM, host.orphan)
     granted = realtime.claim(wanted=not options.no_realtime)
     with contextlib.suppress(LinkLost):

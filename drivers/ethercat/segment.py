@@ -40,6 +40,7 @@ class Segment:
         self.socket_fd: int | None = None
         self.slaves: Sequence[pysoem.CdefSlave] = ()
         self.mapped = False
+        self.frame_timeout_us = _FRAME_TIMEOUT_US
         self.late_frames = 0
         """Frames that came back after they had been given up."""
         self._ear: socket.socket | None = None
@@ -142,7 +143,7 @@ class Segment:
         """Read a register of a slave, or None when it does not answer."""
         self.discard_late_frames()
         try:
-            data: bytes = self.slaves[station - 1]._fprd(register, size, _FRAME_TIMEOUT_US)  # noqa: SLF001 - the only register access pysoem offers
+            data: bytes = self.slaves[station - 1]._fprd(register, size, self.frame_timeout_us)  # noqa: SLF001 - the only register access pysoem offers
         except pysoem.WkcError:
             return None
         return data
@@ -151,7 +152,7 @@ class Segment:
         """Write a register of a slave; False when it does not answer."""
         self.discard_late_frames()
         try:
-            self.slaves[station - 1]._fpwr(register, data, _FRAME_TIMEOUT_US)  # noqa: SLF001 - as above
+            self.slaves[station - 1]._fpwr(register, data, self.frame_timeout_us)  # noqa: SLF001 - as above
         except pysoem.WkcError:
             return False
         return True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import tempfile
 from collections.abc import AsyncIterator, Mapping
@@ -89,7 +88,7 @@ async def bench(
             arguments.append("--lockstep")
         with VirtualSegment.start("ec0s", arguments, namespace) as segment:
             link = EthercatLink(
-                "ec0m", url=URL, launcher=namespace.command([]), lockstep=1.5 if lockstep else 0.0
+                "ec0m", url=URL, launcher=namespace.command([]), lockstep=1.2 if lockstep else 0.0
             )
             await link.open()
             try:
@@ -136,10 +135,3 @@ def errors(frf, spec: MechanicsSpec, low_hz: float, high_hz: float) -> Errors:
     return Errors(
         float(np.median(db)), float(np.median(deg)), float(np.mean(inside)), int(use.sum())
     )
-
-
-async def until(condition, within_s: float = 5.0) -> None:
-    deadline = asyncio.get_running_loop().time() + within_s
-    while not condition():
-        assert asyncio.get_running_loop().time() < deadline, f"not within {within_s} s"
-        await asyncio.sleep(0.01)

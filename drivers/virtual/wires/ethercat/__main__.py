@@ -14,7 +14,7 @@ from pathlib import Path
 from drivers.errors import DriveError
 from drivers.virtual.device import Device
 from drivers.virtual.wires.ethercat.bench import axes_by_name, axes_of_bench, load_factory
-from drivers.virtual.wires.ethercat.clock import LockstepClock, RealClock
+from drivers.virtual.wires.ethercat.clock import LockstepClock, RealClock, SteadyClock, WireClock
 from drivers.virtual.wires.ethercat.segment import Segment
 from drivers.virtual.wires.ethercat.server import SegmentServer
 from drivers.virtual.wires.ethercat.slave import Slave, SlaveIdentity
@@ -32,6 +32,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--nvm", type=Path, help="folder for the drives' memory; kept if given")
     parser.add_argument("--factory", default=_FACTORY, help="module:function that makes devices")
     parser.add_argument("--lockstep", action="store_true", help="time follows the frames")
+    parser.add_argument(
+        "--steady", action="store_true", help="time follows process data while they flow"
+    )
     parser.add_argument("--cycle-us", type=int, default=1000, help="lockstep cycle without DC")
     parser.add_argument("--al-ms", type=float, default=2.0, help="time of a state change")
     parser.add_argument("--sdo-ms", type=float, default=1.0, help="answer time of the mailbox")
@@ -68,7 +71,9 @@ def build(arguments: argparse.Namespace) -> Segment:
     ]
     for device in devices:
         _warm_up(device)
-    clock = LockstepClock(arguments.cycle_us * 1000) if arguments.lockstep else RealClock()
+    clock: WireClock = SteadyClock() if arguments.steady else RealClock()
+    if arguments.lockstep:
+        clock = LockstepClock(arguments.cycle_us * 1000)
     slaves = [
         Slave(device, clock, SlaveIdentity(serial=axis.serial or station))
         for station, (device, axis) in enumerate(zip(devices, axes, strict=True), 1)

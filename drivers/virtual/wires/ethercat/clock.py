@@ -90,3 +90,52 @@ class LockstepClock:
     def grid(self, start_ns: int, cycle_ns: int) -> int:
         """The next whole multiple of the cycle: the master's own clock must not matter here."""
         return -(-start_ns // cycle_ns) * cycle_ns
+
+
+class SteadyClock:
+    """Real time while no process data flow, and one cycle per frame while they do.
+
+    For drives and a master that share a busy computer: a cycle that comes late for lack of
+    processor time is then not late for the drives, and measurements are as on a quiet bus. When
+    the frames end, real time goes on after `SILENT_NS`, so that watchdogs work.
+    """
+
+    SILENT_NS = 200_000_000
+
+    def __init__(self, frame_ns: int = 2_000) -> None:
+        self._start = time.monotonic_ns()
+        self._frame_ns = frame_ns
+        self._now = 0
+        self._behind = 0
+        self._last_cyclic: int | None = None
+
+    def _real(self) -> int:
+        return time.monotonic_ns() - self._start
+
+    def _flowing(self, real: int) -> bool:
+        return self._last_cyclic is not None and real - self._last_cyclic < self.SILENT_NS
+
+    def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
+        """Middle of the next cycle for process data of a synchronised segment."""
+        real = self._real()
+        flowing = self._flowing(real)
+        if process_data and cycle_ns:
+            start = self._now if flowing else max(self._now, real - age_ns - self._behind)
+            self._now = ((start + cycle_ns // 2) // cycle_ns) * cycle_ns + cycle_ns // 2
+            self._last_cyclic, self._behind = real, real - self._now
+        elif flowing:
+            self._now += self._frame_ns
+        else:
+            self._now = max(self._now, real - age_ns - self._behind)
+        return self._now
+
+    def now(self) -> int:
+        """Time of the last frame while process data flow, else real time from there on."""
+        real = self._real()
+        if not self._flowing(real):
+            self._now = max(self._now, real - self._behind)
+        return self._now
+
+    def grid(self, start_ns: int, cycle_ns: int) -> int:
+        """The next whole multiple of the cycle."""
+        return -(-start_ns // cycle_ns) * cycle_ns

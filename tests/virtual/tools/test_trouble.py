@@ -1,0 +1,133 @@
+"""Situations in which a measurement must end, say why, and leave everything as it was."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import pytest
+
+from backend.axis import Envelope
+from backend.cyclic import CyclicSession
+from backend.jobs import Progress
+from backend.tools.inertia import InertiaSettings, inertia
+from backend.tools.sweep import SweepSettings, sweep
+from drivers.cia402 import State
+from drivers.errors import DriveError, NotAllowed, OutOfRange
+from drivers.virtual.wires.netns import Namespace
+from tests.virtual.tools.rig import WIDE, Bench, bench, mechanics, silent
+
+ONE = mechanics((1e-4, 60.0, 0.006))
+
+
+def spy(reached: Callable[[Progress], bool]) -> tuple[Progress, asyncio.Event]:
+    """A progress that tells when the tool has come to a place."""
+    there = asyncio.Event()
+    progress = Progress(lambda: there.set() if reached(progress) else None)
+    return progress, there
+
+
+async def as_before(b: Bench, before: dict[str, object]) -> None:
+    state = await b.axis.state()
+    assert state is not State.OPERATION_ENABLED
+    after = await b.values()
+    assert after == before, {k: (before[k], after[k]) for k in before if before[k] != after[k]}
+
+
+@pytest.mark.parametrize("where", ["feeling", "measuring"])
+async def test_cancelled(namespace: Namespace, where: str) -> None:
+    async with bench(namespace, ONE, settings={"2008:01": 1, "2008:02": 12768 + 20000,
+                                               "2008:03": 42768, "2008:04": 12800,
+                                               "2008:05": 42600}) as b:  # fmt: skip
+        before = await b.values()
+        assert before["2008:01"] == 1
+        progress, there = spy(
+            lambda p: where in p.step and (where == "feeling" or p.fraction > 0.2)
+        )
+        task = asyncio.create_task(sweep(b.axis, b.session, SweepSettings(WIDE), progress))
+        await asyncio.wait_for(there.wait(), 20.0)
+        await asyncio.sleep(0.2)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        await as_before(b, before)
+
+
+async def test_a_fault_in_the_middle(namespace: Namespace) -> None:
+    async with bench(namespace, ONE) as b:
+        before = await b.values()
+        progress, there = spy(lambda p: "measuring" in p.step and p.fraction > 0.15)
+        task = asyncio.create_task(sweep(b.axis, b.session, SweepSettings(WIDE), progress))
+        await asyncio.wait_for(there.wait(), 20.0)
+        b.segment.command("inject", slave=0, what="over_temperature", value=1)
+        with pytest.raises(NotAllowed, match=r"Operation enabled|Fault|fault"):
+            await task
+        await as_before(b, before)
+
+
+async def test_the_cable_is_pulled(namespace: Namespace) -> None:
+    async with bench(namespace, ONE) as b:
+        progress, there = spy(lambda p: "measuring" in p.step and p.fraction > 0.15)
+        task = asyncio.create_task(sweep(b.axis, b.session, SweepSettings(WIDE), progress))
+        await asyncio.wait_for(there.wait(), 20.0)
+        b.segment.command("cut", cable=0)
+        try:
+            with pytest.raises(DriveError):
+                await asyncio.wait_for(task, 30.0)
+        finally:
+            b.segment.command("heal")
+
+
+async def test_a_blocked_axis(namespace: Namespace) -> None:
+    async with bench(namespace, mechanics(coulomb=0.9)) as b:
+        before = await b.values()
+        low = Envelope(2.0, 600.0, 40.0, 30.0)
+        with pytest.raises(NotAllowed, match="does not move"):
+            await sweep(b.axis, b.session, SweepSettings(low), silent())
+        with pytest.raises(DriveError, match=r"moves only|torque"):
+            await inertia(b.axis, b.session, InertiaSettings(low), silent())
+        await as_before(b, before)
+
+
+async def test_too_little_travel_moves_nothing_far(namespace: Namespace) -> None:
+    async with bench(namespace, ONE) as b:
+        before = await b.values()
+        units = await b.axis.units()
+        start = await b.axis.position_raw()
+        tight = Envelope(0.02, 600.0, 60.0, 30.0)
+        with pytest.raises((OutOfRange, NotAllowed)):
+            await sweep(b.axis, b.session, SweepSettings(tight), silent())
+        assert abs(units.position(await b.axis.position_raw() - start)) < 0.2
+        await as_before(b, before)
+
+
+async def test_a_load_that_pulls_is_measured_only_under_a_loop(namespace: Namespace) -> None:
+    spec = mechanics((1e-4, 200.0, 0.005), gravity=0.15)
+    # The holding brake of the drive keeps the load while it is disabled (2108h:01).
+    async with bench(namespace, spec, settings={"2108:01": 1}) as b:
+        if await b.axis.state() is State.FAULT:
+            await b.axis.reset_fault()
+        before = await b.values()
+        units = await b.axis.units()
+        start = await b.axis.position_raw()
+        with pytest.raises(NotAllowed, match="pulls the axis"):
+            await sweep(b.axis, b.session, SweepSettings(WIDE, loop="none"), silent())
+        assert abs(units.position(await b.axis.position_raw() - start)) < 0.3
+        await as_before(b, before)
+
+
+async def test_gains_that_oscillate_are_noticed_and_survived(namespace: Namespace) -> None:
+    soft = mechanics((1e-4, 60.0, 0.0005))
+    # Ten times the rotor's inertia in 2001h:06 makes the speed gain ten times what fits.
+    async with bench(namespace, soft, settings={"2001:06": 8000, "2005:03": 5000}) as b:
+        before = await b.values()
+        with pytest.raises(DriveError):
+            await sweep(b.axis, b.session, SweepSettings(WIDE, loop="speed"), silent())
+        await as_before(b, before)
+
+
+async def test_without_an_exchange_nothing_moves(namespace: Namespace) -> None:
+    async with bench(namespace, ONE) as b:
+        idle = CyclicSession(b.link, [b.axis.drive])
+        with pytest.raises(NotAllowed, match="cyclic"):
+            await sweep(b.axis, idle, SweepSettings(WIDE, loop="speed"), silent())
