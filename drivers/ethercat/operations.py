@@ -15,7 +15,6 @@ from drivers.ethercat import station as transactions
 from drivers.ethercat.al_status import AlState, state_name
 from drivers.ethercat.cyclic import CyclicLoop
 from drivers.ethercat.lanes import Done, Lanes
-from drivers.ethercat.mailbox import Steps, Write
 from drivers.ethercat.protocol import Message, error_to_wire
 from drivers.ethercat.realtime import RealTime
 from drivers.ethercat.ring import Ring
@@ -244,13 +243,8 @@ class Operations:
         }  # fmt: skip
 
     def _clear_counters(self, message: Message, done: Done) -> None:
-        def clear() -> Steps[None]:
-            # Any write to the counters clears them (ETG.1000.4 clause 6.2).
-            yield Write(0x300, bytes(8))
-            yield Write(0x310, bytes(4))
-
         station = self.roster.station(message)
-        self.lanes.submit(station.number, "register", clear(), done)
+        self.lanes.submit(station.number, "register", transactions.clear_ports(station), done)
 
     def _alias(self, message: Message, done: Done) -> None:
         station = self.roster.station(message)

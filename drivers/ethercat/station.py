@@ -24,6 +24,9 @@ Item = tuple[int, int, int | None]
 """Index, subindex and length in bytes (None for text)."""
 
 
+_TRIES = 3
+
+
 @dataclass
 class Station:
     """One slave, counted from 1 in the order of the cable."""
@@ -196,19 +199,45 @@ def _try_read(station: Station, index: int, subindex: int) -> Steps[bytes | None
         return None
 
 
+def _read_again(register: int, size: int) -> Steps[bytes | None]:
+    """A register, asked again when a single frame is lost."""
+    for _ in range(_TRIES):
+        data = yield Read(register, size)
+        if data is not None:
+            return data
+    return None
+
+
+def clear_ports(station: Station) -> Steps[None]:
+    """Set the error counters to zero; any write to them does (ETG.1000.4 clause 6.2).
+
+    Raises:
+        LinkLost: the station does not answer.
+    """
+    # The counters of processing unit and PDI are optional: a chip without them may not answer.
+    yield Write(0x30C, b"\0")
+    yield Write(0x30D, b"\0")
+    for register, size in ((esc.ERROR_COUNTERS, 8), (0x310, 4)):
+        for attempt in range(_TRIES):
+            if (yield Write(register, bytes(size))) is not None:
+                break
+            if attempt == _TRIES - 1:
+                raise _gone(station)
+
+
 def read_ports(station: Station) -> Steps[bool]:
     """Read link state and error counters of the four ports, and the deviation of the clock.
 
     Returns whether the station answered; its last figures stay where it did not.
     """
-    status = yield Read(esc.DL_STATUS, 2)
+    status = yield from _read_again(esc.DL_STATUS, 2)
     if status is None:
         return False
-    counters = yield Read(esc.ERROR_COUNTERS, esc.ERROR_COUNTERS_SIZE)
+    counters = yield from _read_again(esc.ERROR_COUNTERS, esc.ERROR_COUNTERS_SIZE)
     if counters is not None:
         station.ports = esc.decode_ports(station.number, status, counters)
     if station.distributed_clock:
-        difference = yield Read(esc.TIME_DIFFERENCE, 4)
+        difference = yield from _read_again(esc.TIME_DIFFERENCE, 4)
         if difference is not None:
             station.clock_ahead_ns = esc.decode_time_difference(difference)
     return counters is not None

@@ -12,13 +12,15 @@ import re
 import signal
 import statistics
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from drivers.link import Link
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import unavailable
 from tests.api.test_ethercat import BENCH, JOG, URL, hold, undisturbed
@@ -153,7 +155,11 @@ def segment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Segment]:
     bench = folder / "bench.toml"
     bench.write_text(BENCH)
     station = Station(folder, bench, ["--lockstep"])
-    station.start()
+    station.drives.start()
+    # A late reply is awaited: a stalling machine is then no trouble of its own.
+    open_bus: Callable[..., Link] = station.drives.wires[URL]
+    station.drives.wires[URL] = partial(open_bus, lockstep=1.0)
+    station.start_server()
     made = Segment(station, ["--bench", str(bench), "--on", URL, "--lockstep"])
     yield made
     made.stop()
