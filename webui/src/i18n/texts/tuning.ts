@@ -9,6 +9,7 @@ export const tuning = {
     '测量需要每周期交换过程数据的总线（EtherCAT、带 SYNC 的 CANopen）。请用此类总线连接驱动器；当前总线可写入陷波和增益。',
   ],
   'sweep.title': ['Measure', '测量'],
+  'sweep.what': ['What to measure', '测量对象'],
   'sweep.kind.mechanics': ['Mechanics', '机械'],
   'sweep.kind.speed_loop': ['Speed loop', '速度环'],
   'sweep.kind.position_loop': ['Position loop', '位置环'],

@@ -55,7 +55,15 @@ export function BodePlot({
           key={part}
           part={part}
           last={i === parts.length - 1}
-          unit={part === 'magnitude' ? `dB (${unit})` : part === 'phase' ? '°' : ''}
+          unit={
+            part === 'magnitude'
+              ? unit === '1'
+                ? 'dB'
+                : `dB (${unit})`
+              : part === 'phase'
+                ? '°'
+                : ''
+          }
           frame={{ curves, markers, band, shown }}
           dark={dark}
           onMarker={onMarker}
@@ -209,7 +217,9 @@ function options(
       {
         ...common,
         size: 58,
-        ...(unit ? { label: unit, labelSize: 18 } : {}),
+        // A label on every part, so that their frequency axes stand in line.
+        label: unit || ' ',
+        labelSize: 18,
         ...(part === 'phase' ? { incrs: [15, 30, 45, 90, 180, 360] } : {}),
         ...(part === 'coherence' ? { splits: () => [0, 0.5, 1] } : {}),
         values: (_plot, splits) => splits.map((value) => figure(value, 4)),

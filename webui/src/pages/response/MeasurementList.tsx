@@ -64,7 +64,7 @@ export function MeasurementList({
       {list.length === 0 && <p className="dim">{t('measured.none')}</p>}
       <ul className="plain-list scroll-list tall">
         {list.map((each) => (
-          <li key={each.file} className="set">
+          <li key={each.file} className="set measured">
             <span className="grow">
               <strong>
                 {each.problem === ''

@@ -10,7 +10,7 @@ import { fixed, hertz } from './bode'
 import type { NotchShape } from './results'
 import { remember } from './undo'
 import { UndoNote } from './UndoNote'
-import type { Notches } from './useNotches'
+import { inForce, legible, type Notches } from './useNotches'
 
 const NEW: NotchShape = { center_hz: 400, width_hz: 150, depth_db: -20 }
 
@@ -52,16 +52,16 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
           const notch = wanted[i] ?? null
           const made = preview?.slots[i]
           return (
-            <li
-              key={slot.slot}
-              className={same(slot.enabled ? slot.notch : null, notch) ? '' : 'edited'}
-            >
+            <li key={slot.slot} className={same(inForce(slot), notch) ? '' : 'edited'}>
               <Checkbox
                 label={t('notch.slot', { number: slot.slot + 1 })}
                 checked={notch !== null}
                 disabled={!notches.shaped}
                 onChange={(event) =>
-                  notches.set(i, event.currentTarget.checked ? (slot.notch ?? NEW) : null)
+                  notches.set(
+                    i,
+                    event.currentTarget.checked ? (slot.notch ? legible(slot.notch) : NEW) : null,
+                  )
                 }
               />
               {notch && notches.shaped && (

@@ -1,4 +1,4 @@
-import { Button, Checkbox, NativeSelect, SegmentedControl } from '@mantine/core'
+import { Button, Checkbox, NativeSelect } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AxisState, SweepRequest } from '../../api/schema'
@@ -51,10 +51,10 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
     })
   return (
     <Panel title={t('sweep.title')}>
-      <SegmentedControl
-        fullWidth
+      <NativeSelect
+        label={t('sweep.what')}
         value={kind}
-        onChange={(next) => setKind(next)}
+        onChange={(event) => setKind(event.currentTarget.value as SweepRequest['kind'])}
         data={KINDS.map((each) => ({ value: each, label: t(`sweep.kind.${each}`) }))}
       />
       <p className="dim">{t(`sweep.help.${kind}`)}</p>

@@ -31,9 +31,11 @@ export function usable(gains: GainInfo | null): GainValues | null {
     return null
   }
   return {
-    speed_bandwidth_hz: gains.speed_hz,
-    integral_hz: gains.integral_hz,
-    position_1_s: gains.position_1_s,
-    inertia_kgm2: gains.inertia_kgm2,
+    speed_bandwidth_hz: legible(gains.speed_hz),
+    integral_hz: legible(gains.integral_hz),
+    position_1_s: legible(gains.position_1_s),
+    inertia_kgm2: legible(gains.inertia_kgm2),
   }
 }
+
+const legible = (value: number) => Number(value.toPrecision(4))

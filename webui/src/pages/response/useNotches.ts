@@ -6,6 +6,17 @@ import type { NotchShape } from './results'
 const SETTLE_MS = 250
 const MOST_LINES = 5000
 
+/** The notch that acts in a slot, in digits that a person would type; null where none does. */
+export function inForce(slot: NotchSlotInfo): NotchShape | null {
+  return slot.enabled && slot.notch ? legible(slot.notch) : null
+}
+
+export const legible = (notch: NotchShape): NotchShape => ({
+  center_hz: Number(notch.center_hz.toPrecision(4)),
+  width_hz: Number(notch.width_hz.toPrecision(4)),
+  depth_db: Number(notch.depth_db.toFixed(1)),
+})
+
 /** Notches of a drive as they are, as they are wanted, and what the drive would make of that. */
 export function useNotches(drive: string, frequency: number[]) {
   const [now, setNow] = useState<NotchSlotInfo[] | null>(null)
@@ -20,7 +31,7 @@ export function useNotches(drive: string, frequency: number[]) {
         api.GET('/api/v1/drives/{drive_id}/notches', { params: { path: { drive_id: drive } } }),
       )
       setNow(slots)
-      setWanted(slots.map((slot) => (slot.enabled ? slot.notch : null)))
+      setWanted(slots.map(inForce))
       setProblem(null)
     } catch (error) {
       setNow(null)
@@ -67,8 +78,7 @@ export function useNotches(drive: string, frequency: number[]) {
     set(free, notch)
     return true
   }
-  const edited =
-    now !== null && asked !== JSON.stringify(now.map((slot) => (slot.enabled ? slot.notch : null)))
+  const edited = now !== null && asked !== JSON.stringify(now.map(inForce))
   /** Levels without a printed meaning cannot be edited as a shape. */
   const shaped = now !== null && now.some((slot) => !slot.note.startsWith('levels'))
   return { now, wanted, set, add, read, problem, preview, refused, edited, shaped }

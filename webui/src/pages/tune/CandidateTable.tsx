@@ -53,7 +53,7 @@ export function CandidateTable({
                 {fixed(each.settling_s === null ? null : each.settling_s * 1000, 1, 'ms')}
               </td>
               <td className="right">{fixed(each.overshoot_percent, 0, '%')}</td>
-              <td className="right">{fixed(each.phase_cost_deg, 0, '°')}</td>
+              <td className="right">{fixed(Math.abs(each.phase_cost_deg), 0, '°')}</td>
               <td>
                 {each.notches.length === 0
                   ? '—'

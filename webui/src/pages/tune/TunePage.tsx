@@ -57,6 +57,15 @@ export function TunePage({ drive }: { drive: string }) {
           {possible && (
             <InertiaPanel drive={drive} state={state} limits={limits.limits} able={able} />
           )}
+          <GainsPanel drive={drive} of={gains} inertia={si} />
+          {possible && (
+            <Panel title={t('tune.response')}>
+              <p>{t('tune.responseText')}</p>
+              <a className="big" href={href('response', drive)}>
+                {t('page.response')}
+              </a>
+            </Panel>
+          )}
         </div>
         <div className="stack">
           {possible && designable && (
@@ -67,15 +76,6 @@ export function TunePage({ drive }: { drive: string }) {
               able={able}
               onChanged={() => void gains.read()}
             />
-          )}
-          <GainsPanel drive={drive} of={gains} inertia={si} />
-          {possible && (
-            <Panel title={t('tune.response')}>
-              <p>{t('tune.responseText')}</p>
-              <a className="big" href={href('response', drive)}>
-                {t('page.response')}
-              </a>
-            </Panel>
           )}
           {possible && <StepPanel drive={drive} limits={limits.limits} able={able} />}
         </div>
