@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, Playwright, expect
 
 from tests.browser.conftest import FLAGS
 from tests.browser.driving import Bench
@@ -20,16 +20,15 @@ VIEWER_MS = 90_000
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
+def browser(playwright: Playwright) -> Iterator[Browser]:
     """With WebGL, which the viewer needs; the other tests run without a GPU."""
     flags = [flag for flag in FLAGS if flag != "--disable-gpu"]
-    with sync_playwright() as playwright:
-        running = playwright.chromium.launch(
-            executable_path=shutil.which("chromium") or "/usr/bin/chromium",
-            args=[*flags, "--enable-unsafe-swiftshader"],
-        )
-        yield running
-        running.close()
+    running = playwright.chromium.launch(
+        executable_path=shutil.which("chromium") or "/usr/bin/chromium",
+        args=[*flags, "--enable-unsafe-swiftshader"],
+    )
+    yield running
+    running.close()
 
 
 @pytest.fixture
