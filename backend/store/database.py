@@ -1,0 +1,241 @@
+"""Opening the database, bringing it up to date, and transactions on worker threads.
+
+SQLite by default (``servodeck.db`` in the state folder: WAL, foreign keys, full synchronisation,
+five seconds of patience), PostgreSQL by URL. Migrations run when it is opened, in one transaction
+under a lock, so that stations that start together do not disturb each other.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import functools
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection, Engine, create_engine, event, text
+from sqlalchemy.engine import URL, make_url
+from sqlalchemy.exc import ArgumentError, SQLAlchemyError
+from sqlalchemy.orm import Session
+from sqlalchemy.pool import ConnectionPoolEntry
+
+from backend.files import StorageFailed
+from backend.store import migrate
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+FILE = "servodeck.db"
+#: Any number that nothing else on the server uses; all servodeck stations use the same.
+_MIGRATION_LOCK = 0x5E2D0DEC
+_PATIENCE_S = 5
+
+
+class DatabaseFailed(StorageFailed):
+    """The database cannot be used: disk full, server away, of a newer version."""
+
+    kind = "storage-failed"
+
+
+class Store:
+    """The database of one station. Making it touches nothing; it opens on first use or `open`.
+
+    ``database`` is an SQLAlchemy URL (``postgresql://…``, ``sqlite:///…``), or None for the file
+    in ``folder``. Transactions block and belong on threads: `call` runs them there.
+    """
+
+    def __init__(self, folder: Path, database: str | None = None) -> None:
+        self.folder = folder
+        self.url = _url(folder, database)
+        self._engine: Engine | None = None
+        self._opening = threading.Lock()
+        self._pool = ThreadPoolExecutor(max_workers=4, thread_name_prefix="store")
+
+    @property
+    def shown(self) -> str:
+        """The URL without its password."""
+        return self.url.render_as_string(hide_password=True)
+
+    @property
+    def sqlite_file(self) -> Path | None:
+        """The file of an SQLite database, else None."""
+        return Path(self.url.database) if self._is_sqlite and self.url.database else None
+
+    @property
+    def _is_sqlite(self) -> bool:
+        return self.url.get_backend_name() == "sqlite"
+
+    def open(self) -> Engine:
+        """Connect and bring the tables up to date; does nothing when that has been done. Blocks.
+
+        Raises:
+            DatabaseFailed: it cannot be reached, or a newer version has written it.
+        """
+        with self._opening:
+            if self._engine is None:
+                engine = self._make_engine()
+                try:
+                    with self._translated():
+                        self._upgrade(engine)
+                except BaseException:
+                    engine.dispose()
+                    raise
+                self._engine = engine
+            return self._engine
+
+    def close(self) -> None:
+        """Let go of the database. It opens again when it is used again."""
+        with self._opening:
+            if self._engine is not None:
+                self._engine.dispose()
+                self._engine = None
+
+    # --- transactions -----------------------------------------------------------------
+
+    @contextmanager
+    def reading(self) -> Iterator[Session]:
+        """A transaction that changes nothing.
+
+        Raises:
+            DatabaseFailed: see `open`.
+        """
+        engine = self.open()
+        with self._translated(), Session(engine, expire_on_commit=False) as session:
+            yield session
+
+    @contextmanager
+    def writing(self) -> Iterator[Session]:
+        """A transaction that is committed at the end, or rolled back when an error leaves it.
+
+        On SQLite it holds the write lock from the start, so that it never fails half way.
+
+        Raises:
+            DatabaseFailed: nothing was changed.
+        """
+        engine = self.open().execution_options(immediate=True)
+        with (
+            self._translated(),
+            Session(engine, expire_on_commit=False) as session,
+            session.begin(),
+        ):
+            yield session
+
+    async def call(self, work: Callable[P, T], /, *arguments: P.args, **named: P.kwargs) -> T:
+        """Run blocking work on a thread of the store, as the person who asks for it."""
+        context = contextvars.copy_context()
+        bound = functools.partial(work, *arguments, **named)
+        return await asyncio.get_running_loop().run_in_executor(
+            self._pool, functools.partial(context.run, bound)
+        )
+
+    # --- opening ----------------------------------------------------------------------
+
+    def _make_engine(self) -> Engine:
+        if not self._is_sqlite:
+            return create_engine(
+                self.url,
+                pool_pre_ping=True,
+                pool_timeout=_PATIENCE_S,
+                connect_args={"connect_timeout": _PATIENCE_S},
+            )
+        file = self.sqlite_file
+        if file is not None:
+            try:
+                file.parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise DatabaseFailed(
+                    f"the folder of the database {file} cannot be made: {error.strerror}",
+                    value=str(file),
+                    remedy="choose another folder with --config",
+                ) from error
+        engine = create_engine(self.url, connect_args={"timeout": _PATIENCE_S})
+        event.listen(engine, "connect", _prepare_sqlite)
+        event.listen(engine, "begin", _begin_sqlite)
+        return engine
+
+    def _upgrade(self, engine: Engine) -> None:
+        script = migrate.script()
+        with engine.connect() as connection:
+            if self._is_current(connection, script):
+                return
+        with engine.execution_options(immediate=True).begin() as connection:
+            if not self._is_sqlite:
+                lock = text("SELECT pg_advisory_xact_lock(:key)")
+                connection.execute(lock, {"key": _MIGRATION_LOCK})
+            if not self._is_current(connection, script):
+                migrate.upgrade(connection)
+
+    def _is_current(self, connection: Connection, script: ScriptDirectory) -> bool:
+        have = set(MigrationContext.configure(connection).get_current_heads())
+        known = {revision.revision for revision in script.walk_revisions()}
+        if have - known:
+            raise DatabaseFailed(
+                f"{self.shown} was written by a newer servodeck "
+                f"(it has {', '.join(sorted(have - known))})",
+                value=self.shown,
+                remedy="update servodeck on this station; nothing was changed",
+            )
+        return have == set(script.get_heads())
+
+    @contextmanager
+    def _translated(self) -> Iterator[None]:
+        try:
+            yield
+        except SQLAlchemyError as error:
+            cause = getattr(error, "orig", None) or error
+            first = (str(cause).strip() or type(cause).__name__).splitlines()[0]
+            raise DatabaseFailed(
+                f"the database {self.shown} failed: {first}",
+                value=self.shown,
+                remedy="check free space, permissions and, for PostgreSQL, that its server "
+                "runs and can be reached; what was stored before is unharmed",
+            ) from error
+
+
+def _url(folder: Path, database: str | None) -> URL:
+    if not database:
+        return URL.create("sqlite", database=str(folder / FILE))
+    try:
+        url = make_url(database)
+    except ArgumentError as error:
+        raise DatabaseFailed(
+            "the database address is not a URL",
+            remedy="write it as postgresql://user:password@host/name or sqlite:////folder/file.db",
+        ) from error
+    if url.drivername in ("postgresql", "postgres"):
+        url = url.set(drivername="postgresql+psycopg")
+    if url.drivername not in ("postgresql+psycopg", "sqlite"):
+        raise DatabaseFailed(
+            f"servodeck cannot use a {url.drivername} database",
+            value=url.drivername,
+            limit="sqlite, postgresql",
+            remedy="choose one of these",
+        )
+    if url.drivername == "sqlite" and not url.database:
+        raise DatabaseFailed(
+            "an SQLite database in memory would forget everything",
+            remedy="name a file: sqlite:////folder/file.db",
+        )
+    return url
+
+
+def _prepare_sqlite(connection: object, _record: ConnectionPoolEntry) -> None:
+    """Transactions begin when we say so, and what is committed is on the disk."""
+    import sqlite3
+
+    if not isinstance(connection, sqlite3.Connection):
+        raise TypeError("not an SQLite connection")
+    connection.isolation_level = None
+    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
+        connection.execute(f"PRAGMA {pragma}").close()
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    immediate = connection.get_execution_options().get("immediate")
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if immediate else "BEGIN")

@@ -1,0 +1,35 @@
+"""Alembic without its command line: the scripts are packaged with the program.
+
+Every part of the program has a branch of its own (``library``, ``audit`` …), so that each can add
+revisions without knowing of the others; an upgrade goes to the heads of all.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection
+
+_FOLDER = Path(__file__).parent / "migrations"
+
+
+def _config() -> Config:
+    config = Config()
+    config.set_main_option("script_location", str(_FOLDER).replace("%", "%%"))
+    config.set_main_option("path_separator", "os")
+    return config
+
+
+def script() -> ScriptDirectory:
+    """The revisions that this program knows."""
+    return ScriptDirectory.from_config(_config())
+
+
+def upgrade(connection: Connection) -> None:
+    """Bring the tables up to date within the connection's transaction."""
+    config = _config()
+    config.attributes["connection"] = connection
+    command.upgrade(config, "heads")

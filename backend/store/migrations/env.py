@@ -1,0 +1,13 @@
+"""Run by Alembic for every upgrade; the connection comes from backend.store.database."""
+
+from alembic import context
+from sqlalchemy import Connection
+
+from backend.store.base import Base
+
+connection = context.config.attributes["connection"]
+if not isinstance(connection, Connection):
+    raise TypeError("the store starts migrations; there is no command line for them")
+context.configure(connection=connection, target_metadata=Base.metadata)
+with context.begin_transaction():
+    context.run_migrations()

@@ -1,0 +1,1 @@
+"""Revisions of the database, one branch for each part of the program."""
