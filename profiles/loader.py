@@ -142,7 +142,8 @@ def _explain(merged: dict[str, Any], error: ValidationError) -> str:
 
 def _cache_path(drive: str, files: list[Path]) -> Path:
     digest = hashlib.sha256()
-    for path in [_HERE / "schema.py", Path(__file__), *files]:
+    schema = (_HERE / name for name in ("schema.py", "functions.py", "record.py"))
+    for path in [*schema, Path(__file__), *files]:
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     folder = Path(os.environ.get("SERVODECK_CACHE") or platformdirs.user_cache_dir("servodeck"))

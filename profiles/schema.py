@@ -11,7 +11,10 @@ from collections import Counter
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from profiles.functions import Functions, referenced_keys
+from profiles.record import Frozen
 
 DataType = Literal[
     "BOOL", "INT8", "UINT8", "INT16", "UINT16", "INT32", "UINT32",
@@ -22,6 +25,9 @@ PdoMapping = Literal["none", "rx", "tx", "rxtx"]
 Effective = Literal["now", "stopped", "reenable", "write_settings", "power_cycle"]
 Settable = Literal["any", "stopped"]
 LinkKind = Literal["ethercat", "canopen", "modbus", "mlink"]
+#: ``command`` is the fault reset (6040h bit 7 or the family's own), ``automatic`` the end of the
+#: cause itself, ``special`` a step of its own that the fault's ``reset`` text names.
+ResetBy = Literal["command", "power_cycle", "automatic", "special", "unknown"]
 Raw = int | float | str
 
 #: Limits of the integer types, inclusive (ETG.1000.6 table of basic data types).
@@ -36,12 +42,6 @@ INTEGER_RANGE: dict[str, tuple[int, int]] = {
     "INT64": (-(2**63), 2**63 - 1),
     "UINT64": (0, 2**64 - 1),
 }
-
-
-class Frozen(BaseModel):
-    """Base of every profile record."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Parameter(Frozen):
@@ -137,6 +137,7 @@ class Fault(Frozen):
     causes: tuple[str, ...] = ()
     remedies: tuple[str, ...] = ()
     reset: str = Field(default="", description="when and how it can be reset")
+    reset_by: ResetBy = Field(default="unknown", description="what ends it once its cause is gone")
     source: str
     also_printed: tuple[str, ...] = ()
     notes: str = ""
@@ -480,6 +481,7 @@ class Profile(Frozen):
     stiffness: tuple[StiffnessTable, ...] = ()
     gains: GainSpec | None = None
     quirks: tuple[Quirk, ...] = ()
+    functions: Functions = Functions()
     conflicts: tuple[Conflict, ...] = ()
     chapters: dict[str, str] = Field(
         default_factory=dict,
@@ -562,4 +564,5 @@ def _referenced_keys(profile: Profile) -> list[str]:
         found.extend(method.parameters)
     for pdo_set in profile.pdo.sets if profile.pdo else ():
         found.extend(pdo_set.entries)
+    found.extend(referenced_keys(profile.functions))
     return found
