@@ -17,8 +17,10 @@ from backend.api import (
     routes_description,
     routes_drive,
     routes_ethercat,
+    routes_lists,
     routes_recordings,
     routes_rerun,
+    routes_scope,
     routes_sets,
     routes_tune,
 )
@@ -95,9 +97,11 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
         routes_bench,
         routes_drive,
         routes_ethercat,
+        routes_lists,
         routes_sets,
         routes_description,
         routes_recordings,
+        routes_scope,
         routes_tune,
     ):
         api.include_router(part.router)

@@ -73,3 +73,11 @@ class MissingPort(Message):
     parameters: int = Field(description="parameters that only this port would reach")
     groups: list[str]
     wiring: str
+
+
+class ImportedList(Message):
+    """A CSV list stored as a parameter set; lines that could not be used say why."""
+
+    file: str
+    parameters: int
+    problems: list[str]

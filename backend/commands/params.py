@@ -14,9 +14,11 @@ from backend.commands.session import drive_at, run, show_progress
 from backend.drive import Drive, Reading
 from backend.files import write_atomically
 from backend.library import SetLibrary
+from backend.parameter_list import export_list, import_list
 from backend.parameter_set import SUFFIX, Difference
 from backend.tools import parameters
 from drivers.errors import NotAllowed
+from profiles import load_profile
 from profiles.schema import Parameter, Raw
 
 app = typer.Typer(help="Read and write parameters on a bus, without the server.")
@@ -138,7 +140,7 @@ def load(
                 raise NotAllowed("nothing was written", remedy="run it again to write")
             result = await parameters.load_set(
                 drive,
-                parameter_set.parse(file.read_bytes(), file.name),
+                parameter_set.parse(_bytes_of(file), file.name),
                 chosen,
                 show_progress,
                 library=SetLibrary(file.resolve().parent),
@@ -152,13 +154,57 @@ def load(
         raise typer.Exit(1)
 
 
-async def _differences(drive: Drive, file: Path) -> list[Difference]:
+@app.command("export")
+def export(
+    file: Annotated[Path, typer.Argument(help="parameter set")],
+    out: Annotated[Path, typer.Argument(help="file to write: .csv or .dcf")],
+) -> None:
+    """Turn a parameter set into a CSV list or a CiA 306 device configuration file."""
+
+    async def work() -> None:
+        if out.suffix.lower() not in (".csv", ".dcf"):
+            raise NotAllowed(
+                f"{out.name} is neither CSV nor DCF", remedy="name the file .csv or .dcf"
+            )
+        content = parameter_set.parse(_bytes_of(file), file.name)
+        data = export_list(content, load_profile(content.profile), out.name, datetime.now())
+        write_atomically(out, data)
+        print(f"{out}: {len(content.rows)} parameters")
+
+    run(work)
+
+
+@app.command("import")
+def import_(
+    file: Annotated[Path, typer.Argument(help="CSV list or DCF")],
+    out: Annotated[Path, typer.Argument(help=f"parameter set to write ({SUFFIX})")],
+    profile: Annotated[str, typer.Option(help="drive family that the list is of")],
+) -> None:
+    """Turn a CSV list or a DCF into a parameter set; nothing is written to a drive."""
+
+    async def work() -> None:
+        data, found = import_list(
+            _bytes_of(file), load_profile(profile), file.name, datetime.now(UTC)
+        )
+        for problem in found.problems:
+            print(problem, file=sys.stderr)
+        write_atomically(out, data)
+        print(f"{out}: {len(found.readings)} parameters, {len(found.problems)} lines not used")
+
+    run(work)
+
+
+def _bytes_of(file: Path) -> bytes:
     try:
-        content = parameter_set.parse(file.read_bytes(), file.name)
+        return file.read_bytes()
     except OSError as error:
         raise NotAllowed(
-            f"{file} cannot be read: {error.strerror}", remedy=f"name a {SUFFIX} file"
+            f"{file} cannot be read: {error.strerror}", remedy="name a file that can be read"
         ) from error
+
+
+async def _differences(drive: Drive, file: Path) -> list[Difference]:
+    content = parameter_set.parse(_bytes_of(file), file.name)
     if content.profile != drive.profile.drive:
         raise NotAllowed(
             f"{file.name} is of a {content.profile} drive, this is a {drive.profile.drive}",

@@ -1,15 +1,17 @@
 """Profiles from makers' description files (ESI, EDS, DCF) or from a drive's own dictionary."""
 
 from profiles.importer.build import ImportedProfile, build_profile
+from profiles.importer.dcf import ConfiguredValue, is_dcf, read_dcf_values
 from profiles.importer.description import DescribedEntry, DescribedPdo, Description
 from profiles.importer.dictionary import describe_dictionary
 from profiles.importer.eds import read_eds
 from profiles.importer.esi import EsiDevice, read_esi
-from profiles.importer.export_eds import export_eds
+from profiles.importer.export_eds import export_dcf, export_eds
 from profiles.importer.files import import_file, write_profile
 from profiles.importer.report import Finding, ImportFailed, ImportReport
 
 __all__ = [
+    "ConfiguredValue",
     "DescribedEntry",
     "DescribedPdo",
     "Description",
@@ -20,8 +22,11 @@ __all__ = [
     "ImportedProfile",
     "build_profile",
     "describe_dictionary",
+    "export_dcf",
     "export_eds",
     "import_file",
+    "is_dcf",
+    "read_dcf_values",
     "read_eds",
     "read_esi",
     "write_profile",

@@ -7,6 +7,7 @@ use, one that guesses in silence is dangerous. So everything repaired or left ou
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -77,6 +78,20 @@ def read_eds(data: bytes, name: str, report: ImportReport) -> Description:
         entries=tuple(entries),
         pdos=tuple(_pdos(entries, name, report)),
     )
+
+
+def object_values(
+    text: str, name: str, report: ImportReport
+) -> Iterator[tuple[int, int, str, int]]:
+    """Index, subindex, ``ParameterValue`` and line of every object that has one (a DCF)."""
+    for title, section in _sections(text, name, report).items():
+        value = section.get("parametervalue")
+        if not value:
+            continue
+        if match := _SUBOBJECT.match(title):
+            yield int(match[1], 16), int(match[2], 16), value, section.line
+        elif match := _OBJECT.match(title):
+            yield int(match[1], 16), 0, value, section.line
 
 
 def _identity(device: _Section, key: str, name: str, report: ImportReport) -> int | None:

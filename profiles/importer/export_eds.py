@@ -1,11 +1,14 @@
-"""A profile as a CANopen electronic data sheet (CiA 306-1 v1.3)."""
+"""A profile as a CANopen electronic data sheet, with values as a device configuration file.
+
+Source: CiA 306-1 v1.3.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from datetime import datetime
 
-from profiles.schema import DataType, Parameter, Profile
+from profiles.schema import DataType, Parameter, Profile, Raw
 
 _CODE: dict[DataType, int] = {
     "BOOL": 0x01, "INT8": 0x02, "INT16": 0x03, "INT32": 0x04, "UINT8": 0x05, "UINT16": 0x06,
@@ -22,16 +25,43 @@ def export_eds(profile: Profile, created: datetime, file_name: str | None = None
     Parameters that only Modbus reaches have no object and are left out. ``created`` stands in
     the file, so that the same profile and time give the same text.
     """
+    return _file(profile, created, file_name or f"{profile.drive}.eds", [], {})
+
+
+def export_dcf(
+    profile: Profile,
+    values: Mapping[str, Raw],
+    created: datetime,
+    *,
+    file_name: str,
+    node_name: str = "",
+    node_id: int | None = None,
+) -> str:
+    """The same with ``ParameterValue`` for each key of ``values`` (clause 5.3: a DCF)."""
+    commissioning = ["[DeviceComissioning]"]  # the standard spells it so
+    if node_id is not None:
+        commissioning.append(f"NodeID=0x{node_id:02X}")
+    commissioning += [f"NodeName={_text(node_name)}", "CANopenManager=0", ""]
+    return _file(profile, created, file_name, commissioning, values)
+
+
+def _file(
+    profile: Profile,
+    created: datetime,
+    file_name: str,
+    commissioning: list[str],
+    values: Mapping[str, Raw],
+) -> str:
     objects: dict[int, list[Parameter]] = {}
     for parameter in profile.parameters:
         if parameter.index is not None:
             objects.setdefault(parameter.index, []).append(parameter)
     for members in objects.values():
         members.sort(key=lambda p: p.subindex or 0)
-    lines = _head(profile, created, file_name or f"{profile.drive}.eds", objects)
+    lines = _head(profile, created, file_name, objects) + commissioning
     lines += _lists(objects)
     for index in sorted(objects):
-        lines += _object(index, objects[index])
+        lines += _object(index, objects[index], values)
     return "\r\n".join(lines) + "\r\n"
 
 
@@ -75,9 +105,9 @@ def _lists(objects: Iterable[int]) -> list[str]:
     return lines
 
 
-def _object(index: int, members: list[Parameter]) -> list[str]:
+def _object(index: int, members: list[Parameter], values: Mapping[str, Raw]) -> list[str]:
     if len(members) == 1 and members[0].subindex == 0:
-        return [f"[{index:04X}]", *_entry(members[0], members[0].name), ""]
+        return [f"[{index:04X}]", *_entry(members[0], members[0].name, values), ""]
     titles = {p.name.partition(":")[0].strip() for p in members}
     title = titles.pop() if len(titles) == 1 else f"Object {index:04X}h"
     counted = [p for p in members if p.subindex]
@@ -90,11 +120,12 @@ def _object(index: int, members: list[Parameter]) -> list[str]:
     ]  # fmt: skip
     for parameter in counted:
         name = parameter.name.partition(":")[2].strip() or parameter.name
-        lines += [f"[{index:04X}sub{parameter.subindex or 0:X}]", *_entry(parameter, name), ""]
+        lines.append(f"[{index:04X}sub{parameter.subindex or 0:X}]")
+        lines += [*_entry(parameter, name, values), ""]
     return lines
 
 
-def _entry(parameter: Parameter, name: str) -> list[str]:
+def _entry(parameter: Parameter, name: str, values: Mapping[str, Raw]) -> list[str]:
     access = parameter.access
     if access == "rw" and parameter.pdo in ("rx", "tx"):
         access_text = "rww" if parameter.pdo == "rx" else "rwr"
@@ -108,6 +139,8 @@ def _entry(parameter: Parameter, name: str) -> list[str]:
         f"DefaultValue={_value(parameter)}",
         f"PDOMapping={int(parameter.pdo != 'none')}",
     ]
+    if parameter.key in values and parameter.type != "OCTETS":
+        lines.append(f"ParameterValue={_text(str(values[parameter.key]))}")
     if parameter.min_raw is not None:
         lines.append(f"LowLimit={parameter.min_raw}")
     if parameter.max_raw is not None:

@@ -174,3 +174,25 @@ def test_exchanged_drive_is_noticed_before_anything_is_written(station: Station)
     finally:
         station.drives.command(do="swap", wire="mlink://virtual0", first=1, second=2)
         station.ok(station.http.delete(f"/drives/{x}"))
+
+
+def test_a_set_goes_to_other_tools_and_comes_back(station: Station, x: str) -> None:
+    saved = station.ok(station.http.post(f"/drives/{x}/sets", json={"file": "for export"}))
+    for kind in ("csv", "dcf"):
+        exported = station.http.get(f"/sets/{saved['file']}/list", params={"format": kind})
+        assert exported.status_code == 200
+        assert f'filename="for export.{kind}"' in exported.headers["content-disposition"]
+        stored = station.ok(
+            station.http.post(
+                f"/drives/{x}/sets/list", params={"file": f"as {kind}"}, content=exported.content
+            )
+        )
+        assert (stored["parameters"], stored["problems"]) == (saved["count"], [])
+        diff = station.ok(station.http.get(f"/drives/{x}/diff", params={"file": stored["file"]}))
+        assert not [row["key"] for row in diff["rows"] if row["status"] != "same"]
+    refused = station.http.post(
+        f"/drives/{x}/sets/list", params={"file": "none"}, content=b"hello,world\n"
+    )
+    assert refused.status_code == 409
+    assert "has no value of" in refused.json()["detail"]
+    assert station.http.get("/sets/missing.sdset/list").status_code == 404

@@ -774,6 +774,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/sets/list": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Store List
+         * @description Store a CSV list or a DCF as a parameter set of this drive's family.
+         *
+         *     Nothing is written to a drive: compare it first, as any other set.
+         */
+        post: operations["store_list"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/state": {
         parameters: {
             query?: never;
@@ -1447,6 +1469,28 @@ export interface paths {
          * @description Delete a file.
          */
         delete: operations["delete_set"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sets/{file}/list": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Export Set
+         * @description A stored parameter set as CSV for spreadsheets, or as DCF for CANopen tools.
+         *
+         *     Parameters without an object (only Modbus reaches them) are not in a DCF.
+         */
+        get: operations["export_set"];
+        put?: never;
+        post?: never;
+        delete?: never;
         options?: never;
         head?: never;
         patch?: never;
@@ -2298,6 +2342,18 @@ export interface components {
             title: string;
             /** Vendor Id */
             vendor_id: number | null;
+        };
+        /**
+         * ImportedList
+         * @description A CSV list stored as a parameter set; lines that could not be used say why.
+         */
+        ImportedList: {
+            /** File */
+            file: string;
+            /** Parameters */
+            parameters: number;
+            /** Problems */
+            problems: string[];
         };
         /**
          * InertiaRequest
@@ -4159,6 +4215,7 @@ export type HomeRequest = components['schemas']['HomeRequest'];
 export type HomingMethodInfo = components['schemas']['HomingMethodInfo'];
 export type ImportFinding = components['schemas']['ImportFinding'];
 export type ImportedDescription = components['schemas']['ImportedDescription'];
+export type ImportedList = components['schemas']['ImportedList'];
 export type InertiaRequest = components['schemas']['InertiaRequest'];
 export type Interfaces = components['schemas']['Interfaces'];
 export type JobChanged = components['schemas']['JobChanged'];
@@ -7965,6 +8022,90 @@ export interface operations {
             };
         };
     };
+    store_list: {
+        parameters: {
+            query: {
+                /** @description of the new set */
+                file: string;
+                overwrite?: boolean;
+            };
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "text/plain": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ImportedList"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     state: {
         parameters: {
             query?: never;
@@ -11037,6 +11178,83 @@ export interface operations {
         responses: {
             /** @description Successful Response */
             204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    export_set: {
+        parameters: {
+            query?: {
+                /** @description of the download */
+                format?: "csv" | "dcf";
+            };
+            header?: never;
+            path: {
+                file: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
                 headers: {
                     [name: string]: unknown;
                 };

@@ -192,6 +192,12 @@ export const bench = {
   ],
   'sets.overwrite': ['Replace a file of this name', '覆盖同名文件'],
   'sets.upload': ['Upload a file', '上传文件'],
+  'sets.exportAs': ['{name} as {format}', '将 {name} 导出为 {format}'],
+  'sets.listRead': [
+    '{count} parameters of the list were stored as a set. Nothing was written to a drive.',
+    '列表中的 {count} 个参数已存为参数集，未写入驱动器。',
+  ],
+  'sets.listProblems': ['Lines that could not be used:', '无法使用的行：'],
   'sets.download': ['Download', '下载'],
   'sets.delete': ['Delete {name}', '删除 {name}'],
   'sets.deleteText': ['The file cannot be brought back.', '文件无法恢复。'],

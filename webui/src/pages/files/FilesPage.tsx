@@ -11,7 +11,7 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { SaveSet, UploadSet } from './SetActions'
-import { offerDownload, useSets } from './sets'
+import { listUrl, offerDownload, useSets } from './sets'
 
 /** Parameter sets kept by the server. */
 export function FilesPage() {
@@ -37,7 +37,7 @@ export function FilesPage() {
         tools={
           <>
             {drive && <SaveSet drive={drive} onSaved={refresh} />}
-            <UploadSet onStored={() => void refresh()} />
+            <UploadSet drive={drive} onStored={() => void refresh()} />
           </>
         }
       >
@@ -69,6 +69,18 @@ export function FilesPage() {
             <Button leftSection={<Icon name="download" />} onClick={() => void download(set.file)}>
               {t('sets.download')}
             </Button>
+            {!set.problem &&
+              (['csv', 'dcf'] as const).map((format) => (
+                <Button
+                  key={format}
+                  component="a"
+                  href={listUrl(set.file, format)}
+                  download
+                  aria-label={t('sets.exportAs', { name: set.file, format: format.toUpperCase() })}
+                >
+                  {format.toUpperCase()}
+                </Button>
+              ))}
             <ActionIcon
               aria-label={t('sets.delete', { name: set.file })}
               onClick={() => setDeleting(set)}

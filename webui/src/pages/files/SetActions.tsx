@@ -1,7 +1,7 @@
 import { Button, Checkbox, Modal, Textarea, TextInput } from '@mantine/core'
 import { useRef, useState } from 'react'
 import { api, ask } from '../../api/client'
-import type { DriveSummary } from '../../api/schema'
+import type { DriveSummary, ImportedList } from '../../api/schema'
 import { useT } from '../../i18n'
 import { Icon } from '../../widgets/Icon'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -102,13 +102,42 @@ export function SaveSet({ drive, onSaved }: { drive: DriveSummary; onSaved: () =
   )
 }
 
-/** Store a file from this computer; the server refuses what is no usable parameter set. */
-export function UploadSet({ onStored }: { onStored: (file: string) => void }) {
+const LIST = /\.(csv|dcf|txt)$/i
+
+/**
+ * Store a file from this computer; the server refuses what is no usable parameter set. A list of
+ * another tool (CSV, DCF) becomes a set of this drive's family.
+ */
+export function UploadSet({
+  drive,
+  onStored,
+}: {
+  drive: DriveSummary | null
+  onStored: (file: string) => void
+}) {
   const t = useT()
   const input = useRef<HTMLInputElement>(null)
   const upload = useAction()
+  const [list, setList] = useState<ImportedList | null>(null)
   const send = (file: File) =>
     upload.run(async () => {
+      setList(null)
+      if (drive && LIST.test(file.name)) {
+        const stored = await ask(
+          api.POST('/api/v1/drives/{drive_id}/sets/list', {
+            params: {
+              path: { drive_id: drive.id },
+              query: { file: file.name.replace(LIST, '').replace(/[^\w .-]/g, '_') },
+            },
+            body: file as never,
+            bodySerializer: (body: unknown) => body as BodyInit,
+            headers: { 'Content-Type': 'text/plain' },
+          }),
+        )
+        setList(stored)
+        onStored(stored.file)
+        return
+      }
       const stored = await ask(
         api.PUT('/api/v1/sets/{file}', {
           params: { path: { file: file.name }, query: { overwrite: false } },
@@ -125,7 +154,7 @@ export function UploadSet({ onStored }: { onStored: (file: string) => void }) {
         ref={input}
         type="file"
         hidden
-        accept=".sdset,.toml,text/plain"
+        accept={drive ? '.sdset,.toml,.csv,.dcf,text/plain' : '.sdset,.toml,text/plain'}
         aria-label={t('sets.upload')}
         onChange={(event) => {
           const file = event.currentTarget.files?.[0]
@@ -141,6 +170,24 @@ export function UploadSet({ onStored }: { onStored: (file: string) => void }) {
         {t('sets.upload')}
       </Button>
       <ProblemNote problem={upload.problem} onClose={upload.clear} />
+      {list && (
+        <Modal opened onClose={() => setList(null)} title={list.file}>
+          <p>{t('sets.listRead', { count: list.parameters })}</p>
+          {list.problems.length > 0 && (
+            <>
+              <p className="warn-text">{t('sets.listProblems')}</p>
+              <ul>
+                {list.problems.map((problem) => (
+                  <li key={problem}>{problem}</li>
+                ))}
+              </ul>
+            </>
+          )}
+          <div className="row end">
+            <Button onClick={() => setList(null)}>{t('close')}</Button>
+          </div>
+        </Modal>
+      )}
     </>
   )
 }

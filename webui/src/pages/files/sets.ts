@@ -32,3 +32,8 @@ export function offerDownload(name: string, parts: BlobPart[], type: string): vo
   // The browser has taken the data over by the time the next task runs.
   setTimeout(() => URL.revokeObjectURL(url), 1000)
 }
+
+/** Where a set is to be had as a list for other tools. */
+export function listUrl(file: string, format: 'csv' | 'dcf'): string {
+  return `/api/v1/sets/${encodeURIComponent(file)}/list?format=${format}`
+}

@@ -89,6 +89,7 @@ export function Compare({ drive, rows }: { drive: DriveSummary; rows: ParameterR
         </Button>
         <SaveSet drive={drive} onSaved={refresh} />
         <UploadSet
+          drive={drive}
           onStored={(file) => {
             void refresh()
             setSource(`file:${file}`)

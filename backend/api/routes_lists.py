@@ -1,0 +1,83 @@
+"""Parameter sets as CSV and DCF: export, and import of lists as other tools write them."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+
+from backend.api.context import TheBench, TheMember
+from backend.api.errors import NotFound
+from backend.api.models_description import ImportedList
+from backend.parameter_list import export_list, import_list
+from backend.parameter_set import MAX_BYTES, BadSet
+from drivers.errors import NotAllowed
+from profiles import load_profile
+from profiles.loader import ProfileError
+
+router = APIRouter()
+
+_MEDIA = {"csv": "text/csv; charset=utf-8", "dcf": "application/octet-stream"}
+
+
+@router.get("/sets/{file}/list", response_class=Response)
+async def export_set(
+    bench: TheBench,
+    file: str,
+    kind: Annotated[
+        Literal["csv", "dcf"], Query(alias="format", description="of the download")
+    ] = "csv",
+) -> Response:
+    """A stored parameter set as CSV for spreadsheets, or as DCF for CANopen tools.
+
+    Parameters without an object (only Modbus reaches them) are not in a DCF.
+    """
+    try:
+        content = bench.sets.load(file)
+        profile = load_profile(content.profile)
+    except BadSet:
+        raise
+    except (NotAllowed, ProfileError) as error:
+        raise NotFound(str(error), value=file) from error
+    stem = file.removesuffix(".sdset").encode("ascii", "replace").decode().replace("?", "_")
+    name = f"{stem}.{kind}"
+    return Response(
+        export_list(content, profile, name, datetime.now()),
+        media_type=_MEDIA[kind],
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
+
+
+@router.post(
+    "/drives/{drive_id}/sets/list",
+    status_code=201,
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {"text/plain": {"schema": {"type": "string"}}},
+        }
+    },
+)
+async def store_list(
+    bench: TheBench,
+    member: TheMember,
+    request: Request,
+    file: Annotated[str, Query(pattern=r"^[\w][\w .\-]{0,100}$", description="of the new set")],
+    overwrite: bool = False,
+) -> ImportedList:
+    """Store a CSV list or a DCF as a parameter set of this drive's family.
+
+    Nothing is written to a drive: compare it first, as any other set.
+    """
+    data = bytearray()
+    async for chunk in request.stream():
+        data += chunk
+        if len(data) > MAX_BYTES:
+            raise BadSet(f"{file} is larger than {MAX_BYTES} bytes", remedy="choose another file")
+    text, found = import_list(bytes(data), member.drive.profile, file, datetime.now(UTC))
+    stored = bench.sets.store(file, text, overwrite=overwrite)
+    bench.journal.add(f"imported {stored}: {len(found.readings)} parameters")
+    return ImportedList(
+        file=stored, parameters=len(found.readings), problems=list(found.problems[:200])
+    )

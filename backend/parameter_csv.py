@@ -1,0 +1,221 @@
+"""Parameter lists as CSV: export of a set, and import of lists as other tools write them.
+
+Read are lists with a heading (``key`` or ``index`` and ``subindex``, with ``raw`` or ``value``)
+and bare lists of ``key, raw`` or ``index, subindex, raw``. Comma, semicolon or tabulator separate;
+lines that begin with ``#`` are comments. ``raw`` is the number that travels; ``value`` is in the
+parameter's unit. A bad line spoils only itself.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from backend.drive import Reading
+from backend.parameter_set import MAX_BYTES, BadSet, Row
+from profiles.schema import Parameter, Profile, Raw
+
+_MAX_LINES = 20_000
+_KEY = re.compile(r"(?:0x)?([0-9a-f]{4})(?:h?[:.\s_/-]\s*|sub)(?:0x)?([0-9a-f]{1,2})h?", re.I)
+_INDEX = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{4})h?)", re.I)
+_HEADINGS = {
+    "key": {"key", "address", "object", "parameter", "id", "number"},
+    "index": {"index", "idx"},
+    "subindex": {"subindex", "sub", "sub index", "sub-index"},
+    "raw": {"raw", "raw value", "data"},
+    "value": {"value", "current value", "actual value", "engineering value", "set value"},
+    "unit": {"unit", "units"},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Columns:
+    """Numbers of the columns; -1 where there is none. Bare lists: the last one is raw."""
+
+    key: int = -1
+    index: int = -1
+    subindex: int = -1
+    raw: int = -1
+    value: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterList:
+    """Rows that can go on, and a sentence for each line that cannot."""
+
+    readings: tuple[Reading, ...]
+    problems: tuple[str, ...]
+
+
+def write_csv(profile: Profile, rows: Iterable[Row]) -> str:
+    """A list with heading ``key,name,group,unit,value,raw`` and CRLF line ends (RFC 4180)."""
+    out = io.StringIO()
+    writer = csv.writer(out)
+    writer.writerow(("key", "name", "group", "unit", "value", "raw"))
+    for row in rows:
+        if row.raw is None:
+            continue
+        parameter = profile.by_key.get(row.key)
+        if parameter is None:
+            facts: tuple[Raw, ...] = (row.name, "", row.unit, "")
+        else:
+            value = parameter.to_value(row.raw)
+            facts = (parameter.name, parameter.group, parameter.unit, value)
+        writer.writerow(_harmless(cell) for cell in (row.key, *facts, row.raw))
+    return out.getvalue()
+
+
+def read_csv(data: bytes, profile: Profile, name: str = "the file") -> ParameterList:
+    """Read a list for drives of ``profile``.
+
+    Raises:
+        BadSet: too large, no text, or no line of it is a parameter of this family.
+    """
+    if len(data) > MAX_BYTES:
+        raise BadSet(f"{name} is larger than {MAX_BYTES} bytes", remedy="choose another file")
+    text = _decoded(data, name)
+    separator = _separator(text)
+    lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] != "#"]
+    columns: _Columns | None = None
+    readings: dict[str, Reading] = {}
+    problems: list[str] = []
+    try:
+        rows = csv.reader(lines[:_MAX_LINES], delimiter=separator, skipinitialspace=True)
+        for number, cells in enumerate(rows, start=1):
+            if columns is None:
+                columns = _headed(cells)
+                if columns is not None:
+                    continue
+                columns = _bare(cells)
+            try:
+                reading = _reading(cells, columns, profile, separator)
+            except ValueError as error:
+                problems.append(f"line {number}: {error}")
+                continue
+            if reading.key in readings:
+                problems.append(f"line {number}: {reading.key} comes twice, the first one counts")
+                continue
+            readings[reading.key] = reading
+    except csv.Error as error:
+        raise BadSet(f"{name} is no CSV file: {error}", remedy="export it anew") from error
+    if len(lines) > _MAX_LINES:
+        problems.append(f"only the first {_MAX_LINES} lines were read")
+    if not readings:
+        first = f" ({problems[0]})" if problems else ""
+        raise BadSet(
+            f"{name} has no value of a {profile.title}{first}",
+            remedy="the columns must be key and raw, key and value, or index, subindex and value",
+        )
+    return ParameterList(tuple(readings.values()), tuple(problems))
+
+
+def _harmless(cell: Raw) -> Raw:
+    """Text that a spreadsheet does not take for a formula; numbers pass."""
+    risky = isinstance(cell, str) and cell[:1] in ("=", "+", "-", "@")
+    return f"'{cell}" if risky else cell
+
+
+def _decoded(data: bytes, name: str) -> str:
+    encodings = ["utf-16"] if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ["utf-8-sig", "cp1252"]
+    for encoding in encodings:
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if "\0" not in text:
+            return text
+    raise BadSet(f"{name} is no text file", remedy="choose a CSV file")
+
+
+def _separator(text: str) -> str:
+    """Of the first line that is no comment: tabulator before semicolon before comma."""
+    first = next((li for li in text.splitlines() if li.strip() and li.lstrip()[0] != "#"), "")
+    return next((mark for mark in ("\t", ";") if mark in first), ",")
+
+
+def _headed(cells: list[str]) -> _Columns | None:
+    """Columns by their headings; None where this line is no heading."""
+    places: dict[str, int] = {}
+    for place, cell in enumerate(cells):
+        title = cell.strip().lower()
+        for column, names in _HEADINGS.items():
+            if title in names:
+                places.setdefault(column, place)
+    places.pop("unit", None)
+    if not ({"key", "index"} & places.keys() and {"raw", "value"} & places.keys()):
+        return None
+    return _Columns(**places)
+
+
+def _bare(cells: list[str]) -> _Columns:
+    """``key, raw`` or ``index, subindex, raw``."""
+    if cells and _KEY.fullmatch(cells[0].strip()):
+        return _Columns(key=0, raw=1)
+    if cells and len(cells) >= 3 and _INDEX.fullmatch(cells[0].strip()):
+        return _Columns(index=0, subindex=1, raw=2)
+    return _Columns(key=0, raw=1)
+
+
+def _reading(cells: list[str], columns: _Columns, profile: Profile, separator: str) -> Reading:
+    def cell(place: int) -> str:
+        return cells[place].strip() if 0 <= place < len(cells) else ""
+
+    parameter = _parameter(cell(columns.key), cell(columns.index), cell(columns.subindex), profile)
+    raw = cell(columns.raw)
+    if raw:
+        return _made(parameter, _value(parameter, raw, separator))
+    text = cell(columns.value)
+    if not text:
+        raise ValueError(f"{parameter.key} has no value")
+    value = _value(parameter, text, separator)
+    if isinstance(value, str):
+        return _made(parameter, value)
+    return _made(parameter, parameter.to_raw(value))
+
+
+def _made(parameter: Parameter, raw: Raw) -> Reading:
+    if parameter.is_integer and isinstance(raw, float):
+        if not raw.is_integer():
+            raise ValueError(f"{parameter.key}: {raw} is no whole number")
+        raw = int(raw)
+    return Reading(parameter.key, raw, parameter.to_value(raw), None)
+
+
+def _parameter(key: str, index: str, subindex: str, profile: Profile) -> Parameter:
+    shown = key or f"{index}:{subindex}"
+    found = profile.parameter(key) if key else None
+    if found is None and (match := _KEY.fullmatch(key)):
+        found = profile.by_key.get(f"{match[1].upper()}:{int(match[2], 16):02X}")
+    if found is None and (match := _INDEX.fullmatch(index)):
+        sub = _whole(subindex or "0")
+        number = int(match[1] or match[2], 16)
+        found = profile.by_key.get(f"{number:04X}:{sub:02X}") if sub is not None else None
+    if found is None:
+        raise ValueError(f"{profile.title} has no parameter {shown[:60]!r}")
+    return found
+
+
+def _whole(text: str) -> int | None:
+    match = re.fullmatch(r"([+-]?)(?:0x([0-9a-f]{1,16})|([0-9]{1,20}))", text, re.I | re.A)
+    if match is None:
+        return None
+    number = int(match[2], 16) if match[2] else int(match[3])
+    return -number if match[1] == "-" else number
+
+
+def _value(parameter: Parameter, text: str, separator: str) -> Raw:
+    if parameter.type in ("STRING", "OCTETS"):
+        return text.removeprefix("'") if text[:2] in ("'=", "'+", "'-", "'@") else text
+    if (whole := _whole(text)) is not None:
+        return whole
+    if separator != "," and re.fullmatch(r"[+-]?\d{1,3}(,\d{3})+", text, re.A):
+        # 1,000 is a thousand to one person and one to another.
+        raise ValueError(f"{parameter.key}: {text} can be read in two ways")
+    if separator != ",":
+        text = text.replace(",", ".")
+    if re.fullmatch(r"[+-]?(\d{1,20}\.?\d{0,20}|\.\d{1,20})(e[+-]?\d{1,2})?", text, re.I | re.A):
+        return float(text)
+    raise ValueError(f"{parameter.key}: {text[:40]!r} is no number")

@@ -1,0 +1,65 @@
+"""Parameter sets as device configuration files (CiA 306-1 v1.3), as CANopen tools exchange them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from datetime import datetime
+
+from backend.drive import Reading
+from backend.parameter_csv import ParameterList
+from backend.parameter_set import BadSet, Row
+from profiles.importer import ImportFailed, ImportReport, export_dcf, read_dcf_values
+from profiles.importer.values import default_value
+from profiles.schema import Profile, Raw
+
+
+def write_dcf(
+    profile: Profile, rows: Iterable[Row], *, file_name: str, node_name: str, created: datetime
+) -> tuple[str, int]:
+    """The file's text, and how many rows have no object and so no place in it."""
+    values: dict[str, Raw] = {}
+    left_out = 0
+    for row in rows:
+        parameter = profile.by_key.get(row.key)
+        if row.raw is None:
+            continue
+        if parameter is None or parameter.index is None or parameter.type == "OCTETS":
+            left_out += 1
+        else:
+            values[row.key] = row.raw
+    text = export_dcf(profile, values, created, file_name=file_name, node_name=node_name)
+    return text, left_out
+
+
+def read_dcf(data: bytes, profile: Profile, name: str = "the file") -> ParameterList:
+    """Values that a DCF configures, for drives of ``profile``.
+
+    Raises:
+        BadSet: too large, damaged, an EDS without values, or of another kind of drive.
+    """
+    report = ImportReport()
+    readings: dict[str, Reading] = {}
+    problems: list[str] = []
+    try:
+        for value in read_dcf_values(data, name, report):
+            key = f"{value.index:04X}:{value.subindex:02X}"
+            parameter = profile.by_key.get(key)
+            if parameter is None:
+                problems.append(f"line {value.line}: {profile.title} has no parameter {key}")
+                continue
+            place = f"line {value.line}"
+            raw, _ = default_value(value.text, parameter.type, place, report)
+            if raw is None:
+                problems.append(f"{place}: {key}: {value.text[:40]!r} is no value of this type")
+            else:
+                readings[key] = Reading(key, raw, parameter.to_value(raw), None)
+    except ImportFailed as error:
+        raise BadSet(str(error), remedy="choose a DCF file, or a CSV list") from error
+    problems += [str(finding) for finding in report.findings]
+    if not readings:
+        first = f" ({problems[0]})" if problems else ""
+        raise BadSet(
+            f"{name} has no value of a {profile.title}{first}",
+            remedy="choose a file of the same drive family",
+        )
+    return ParameterList(tuple(readings.values()), tuple(problems))

@@ -1,0 +1,38 @@
+"""Lists of parameters in the formats of other tools, told apart by contents and name."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from backend.drive import Drive
+from backend.parameter_csv import ParameterList, read_csv, write_csv
+from backend.parameter_dcf import read_dcf, write_dcf
+from backend.parameter_set import ParameterSet, dump
+from profiles.importer import is_dcf
+from profiles.schema import Profile
+
+
+def import_list(
+    data: bytes, profile: Profile, name: str, saved: datetime
+) -> tuple[bytes, ParameterList]:
+    """A parameter set (its file's bytes) of a CSV list or a DCF, and what was read.
+
+    Raises:
+        BadSet: no such list, or nothing in it belongs to ``profile``.
+    """
+    found = (read_dcf if is_dcf(data) else read_csv)(data, profile, name)
+    # A list names no drive: the set must not claim to have been saved from one.
+    source = Drive("", f"list {name}", profile, [])
+    notes = "\n".join(("imported from a list", *found.problems))[:4000]
+    return dump(source, found.readings, author="", notes=notes, saved=saved), found
+
+
+def export_list(content: ParameterSet, profile: Profile, name: str, created: datetime) -> bytes:
+    """A parameter set as DCF where ``name`` ends so, else as CSV with a byte order mark."""
+    if not name.lower().endswith(".dcf"):
+        # Spreadsheets take a file without the mark for one of their own code page.
+        return write_csv(profile, content.rows).encode("utf-8-sig")
+    text, _ = write_dcf(
+        profile, content.rows, file_name=name, node_name=content.drive_name, created=created
+    )
+    return text.encode("utf-8")

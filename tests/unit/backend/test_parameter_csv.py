@@ -1,0 +1,120 @@
+"""CSV lists: what is understood, what is refused, and that nothing makes the reader crash."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from backend.parameter_csv import read_csv, write_csv
+from backend.parameter_set import BadSet, Row
+from profiles import load_profile
+from profiles.schema import Profile
+
+MMS7 = load_profile("mms7")
+
+
+def values(profile: Profile, text: str) -> dict[str, object]:
+    return {r.key: r.raw for r in read_csv(text.encode(), profile).readings}
+
+
+def test_what_is_written_is_read(profile: Profile) -> None:
+    text = write_csv(profile, [Row("2005:03", 350), Row("2100:00", -7)])
+    rows = list(csv.reader(io.StringIO(text)))
+    assert rows[0] == ["key", "name", "group", "unit", "value", "raw"]
+    assert rows[1] == ["2005:03", "Speed bandwidth", "Gains", "Hz", "35.0", "350"]
+    assert values(profile, text) == {"2005:03": 350, "2100:00": -7}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "key,raw\n2005:03,350\n",
+        "key;value;unit\n2005:03;35,0;Hz\n",
+        "Index,Subindex,Name,Value\n0x2005,3,Speed bandwidth,35.0\n",
+        "Index\tSub Index\tData\n2005h\t0x03\t0x15E\n",
+        "# made by a tool\n0x2005, 3, 350\n",
+        "2005:03, 350\n",
+        "2005h:03h;350\n",
+        "0x2005:3,350",
+        "\ufeffkey,raw\r\n2005:03,350\r\n",
+    ],
+)
+def test_lists_of_other_tools(profile: Profile, text: str) -> None:
+    assert values(profile, text) == {"2005:03": 350}
+
+
+@pytest.mark.parametrize(
+    ("line", "complaint"),
+    [
+        ("9999:00,1", "no parameter"),
+        ("2005:03,many", "no number"),
+        ("2005:10,1.5", "no whole number"),
+        ("2005:10,", "no value"),
+        ("2100:00,1", "comes twice"),
+        ("2005:03,nan", "no number"),
+        ("2005:03,1e999", "no number"),
+    ],
+)
+def test_a_bad_line_spoils_only_itself(profile: Profile, line: str, complaint: str) -> None:
+    found = read_csv(f"key,raw\n2100:00,5\n{line}\n".encode(), profile)
+    assert [(r.key, r.raw) for r in found.readings] == [("2100:00", 5)]
+    assert len(found.problems) == 1
+    assert complaint in found.problems[0]
+
+
+def test_a_thousand_or_one_is_not_guessed(profile: Profile) -> None:
+    found = read_csv(b"key;raw\n2100:00;5\n2005:03;1,000\n", profile)
+    assert "two ways" in found.problems[0]
+
+
+def test_no_formulas_for_spreadsheets(profile: Profile) -> None:
+    evil = profile.parameters[0].model_copy(update={"name": "=1+1"})
+    changed = Profile.model_validate(
+        profile.model_dump() | {"parameters": (evil, *profile.parameters[1:])}
+    )
+    assert ",'=1+1," in write_csv(changed, [Row(evil.key, 1)])
+    assert "\n'=2+2," in write_csv(changed, [Row("=2+2", 1)])
+
+
+@pytest.mark.parametrize("data", [b"", b"\0\0\0", b"hello", b"\xff\xfe\0", b"x" * 5_000_000])
+def test_what_is_no_list_is_refused_in_words(profile: Profile, data: bytes) -> None:
+    with pytest.raises(BadSet):
+        read_csv(data, profile)
+
+
+@settings(deadline=None)
+@given(st.binary(max_size=400) | st.text(max_size=400).map(lambda t: t.encode("utf-8", "replace")))
+def test_any_bytes_are_read_or_refused(data: bytes) -> None:
+    for head in (b"", b"key,raw\n", b"Index;Subindex;Value\n"):
+        try:
+            found = read_csv(head + data, MMS7)
+        except BadSet:
+            continue
+        for reading in found.readings:
+            assert reading.key in MMS7.by_key
+            assert MMS7.by_key[reading.key].type in ("STRING", "OCTETS") or isinstance(
+                reading.raw, (int, float)
+            )
+
+
+@settings(deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["6083:00", "0x6083", "6083h", "2005:01", "PA_38", "9999:00", '"']),
+            st.sampled_from(["0", "", "0x1", "-1", "1e5", "9" * 30, "1.5", "1,5", '"', "nan"]),
+            st.sampled_from([",", ";", "\t", ", ", '",']),
+        ),
+        max_size=8,
+    )
+)
+def test_odd_lines_are_read_or_refused(lines: list[tuple[str, str, str]]) -> None:
+    text = "\n".join(f"{key}{mark}{value}" for key, value, mark in lines)
+    try:
+        read_csv(text.encode(), MMS7)
+    except BadSet:
+        return

@@ -1,0 +1,130 @@
+"""DCF: what is exported is a file of CiA 306 that others read, and theirs is read here."""
+
+from __future__ import annotations
+
+import io
+from contextlib import suppress
+from datetime import datetime
+from pathlib import Path
+
+import canopen
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from backend.commands.params import app
+from backend.parameter_dcf import read_dcf, write_dcf
+from backend.parameter_set import BadSet, Row, parse
+from profiles import load_profile
+from profiles.importer import export_eds
+
+DS_C = load_profile("ds_c")
+WHEN = datetime(2026, 1, 2, 3, 4)
+ROWS = [Row("6083:00", 250), Row("607C:00", -1200)]
+
+#: As CiA 306 clause 5.3 lays a DCF out, with notations that makers use.
+THEIRS = b"""[FileInfo]\r
+FileName=theirs.dcf\r
+[DeviceInfo]\r
+VendorName=somebody\r
+[DeviceComissioning]\r
+NodeID=3\r
+[6083]\r
+ParameterName=Profile acceleration\r
+ObjectType=0x7\r
+DataType=0x0007\r
+AccessType=rw\r
+DefaultValue=100\r
+ParameterValue=0xFA\r
+[607C]\r
+ParameterName=Home offset\r
+DataType=0x0004\r
+AccessType=rw\r
+ParameterValue=0xFFFFFB50\r
+[6084]\r
+DataType=0x0007\r
+DefaultValue=100\r
+[5FFF]\r
+DataType=0x0007\r
+ParameterValue=1\r
+"""
+
+
+def dcf(rows: list[Row]) -> tuple[str, int]:
+    return write_dcf(DS_C, rows, file_name="x.dcf", node_name="Z axis", created=WHEN)
+
+
+def test_another_library_reads_the_values() -> None:
+    text, left_out = dcf(ROWS)
+    assert left_out == 0
+    file = io.StringIO(text)
+    file.name = "x.dcf"
+    objects = canopen.import_od(file)
+    assert objects[0x6083].value == 250
+    assert objects[0x607C].value == -1200
+    assert objects[0x6084].value is None
+
+
+def test_what_is_written_is_read() -> None:
+    text, _ = dcf(ROWS)
+    assert {r.key: r.raw for r in read_dcf(text.encode(), DS_C).readings} == {
+        "6083:00": 250,
+        "607C:00": -1200,
+    }
+
+
+def test_another_makers_file() -> None:
+    found = read_dcf(THEIRS, DS_C, "theirs.dcf")
+    # FFFFFB50h as a 32-bit two's complement is -1200; a default is no value to be set.
+    assert {r.key: r.raw for r in found.readings} == {"6083:00": 250, "607C:00": -1200}
+    assert any("5FFF:00" in problem for problem in found.problems)
+
+
+def test_parameters_without_an_object_are_counted() -> None:
+    only_modbus = next(p.key for p in DS_C.parameters if p.index is None and p.access == "rw")
+    _, left_out = dcf([*ROWS, Row(only_modbus, 1)])
+    assert left_out == 1
+
+
+@pytest.mark.parametrize(
+    ("data", "complaint"),
+    [
+        (export_eds(DS_C, WHEN).encode(), "sets no values"),
+        (b"[FileInfo]\n[2FFF]\nParameterValue=1\n", "no value of a"),
+        (b"", "sets no values"),
+    ],
+)
+def test_unusable_files_are_refused_in_words(data: bytes, complaint: str) -> None:
+    with pytest.raises(BadSet, match=complaint):
+        read_dcf(data, DS_C)
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.binary(max_size=300), st.integers(0, len(THEIRS)))
+def test_no_bytes_make_the_reader_crash(noise: bytes, at: int) -> None:
+    with suppress(BadSet):
+        read_dcf(THEIRS[:at] + noise + THEIRS[at:], DS_C)
+
+
+def test_from_a_set_to_a_dcf_and_back_on_the_command_line(tmp_path: Path) -> None:
+    def run(*words: str) -> tuple[int, str]:
+        done = CliRunner().invoke(app, [*(w.replace("@", f"{tmp_path}/") for w in words)])
+        return done.exit_code, done.output
+
+    (tmp_path / "theirs.dcf").write_bytes(THEIRS)
+    code, text = run("import", "@theirs.dcf", "@a.sdset", "--profile", "ds_c")
+    assert code == 0, text
+    assert "2 parameters, 1 lines not used" in text
+    for name in ("@b.dcf", "@b.csv"):
+        code, text = run("export", "@a.sdset", name)
+        assert code == 0, text
+    for name in ("b.dcf", "b.csv"):
+        code, text = run("import", f"@{name}", "@c.sdset", "--profile", "ds_c")
+        assert code == 0, text
+        back = parse((tmp_path / "c.sdset").read_bytes(), "c").rows
+        first = parse((tmp_path / "a.sdset").read_bytes(), "a").rows
+        assert {r.key: r.raw for r in back} == {r.key: r.raw for r in first}
+    code, text = run("export", "@a.sdset", "@b.xls")
+    assert (code, "neither CSV nor DCF" in text) == (1, True)
+    assert run("export", "@none.sdset", "@b.csv")[0] == 1
