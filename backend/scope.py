@@ -49,6 +49,7 @@ class Subscription:
     since: float = 0.0
     synchronous: bool = False
     leave: Callable[[], None] | None = None
+    sampler: _Sampler | None = None
     sink: Callable[[ScopeBlock], None] | None = None
     """Takes every block at once instead of the queue, for who must not lose any. Never blocks."""
 
@@ -128,9 +129,11 @@ class ScopeHub:
     def _poll(self, axis: Axis, drive: str, keys: Sequence[str], period_s: float) -> Subscription:
         subscription = Subscription(drive, tuple(keys), period_s)
         sampler = self._samplers.get(drive)
-        if sampler is None:
+        if sampler is None or sampler.axis is not axis:
+            # A drive that was taken off the bench and came back is another one.
             sampler = self._samplers[drive] = _Sampler(axis)
         sampler.add(subscription)
+        subscription.sampler = sampler
         return subscription
 
     async def unsubscribe(self, subscription: Subscription) -> None:
@@ -138,9 +141,10 @@ class ScopeHub:
         if subscription.leave is not None:
             subscription.leave()
             return
-        sampler = self._samplers.get(subscription.drive)
+        sampler, subscription.sampler = subscription.sampler, None
         if sampler is not None and sampler.remove(subscription):
-            del self._samplers[subscription.drive]
+            if self._samplers.get(subscription.drive) is sampler:
+                del self._samplers[subscription.drive]
             await sampler.close()
 
     async def close(self) -> None:
@@ -153,7 +157,7 @@ class _Sampler:
     """Polls one drive for all its subscribers."""
 
     def __init__(self, axis: Axis) -> None:
-        self._axis = axis
+        self.axis = axis
         self._subscriptions: list[Subscription] = []
         self._task = asyncio.create_task(self._run(), name=f"scope-{axis.drive.id}")
 
@@ -171,7 +175,7 @@ class _Sampler:
         await asyncio.wait([self._task])
 
     async def _run(self) -> None:
-        drive = self._axis.drive
+        drive = self.axis.drive
         while True:
             now = time.monotonic()
             due = [s for s in self._subscriptions if s.due <= now]

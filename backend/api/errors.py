@@ -46,6 +46,7 @@ _TITLES = {
     "bad-description": "Not a usable description",
     "bad-parameter-set": "Not a usable parameter set",
     "bad-recording": "Not a usable recording",
+    "bad-snapshot": "Not a usable snapshot",
     "storage-failed": "Could not be stored",
     "restore-failed": "Not everything was restored",
     "not-found": "Not found",

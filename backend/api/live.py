@@ -9,11 +9,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
-import struct
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from functools import partial
 
-import numpy as np
 from fastapi import WebSocket, WebSocketDisconnect
 from pydantic import BaseModel, ValidationError
 
@@ -34,8 +32,6 @@ from backend.api.live_messages import (
     Ping,
     Pong,
     Refused,
-    ScopeChannelInfo,
-    ScopeInfo,
     ScopeStart,
     ScopeStop,
     StateChanged,
@@ -45,20 +41,17 @@ from backend.api.live_messages import (
     WatchValues,
     from_page,
 )
+from backend.api.live_scope import ScopeStreams
 from backend.axis import Axis
 from backend.bench import Bench
 from backend.drive import Reading
 from backend.jobs import Job, JobResult, Progress
 from backend.journal import Entry
 from backend.monitor import Snapshot
-from backend.scope import Subscription
 from backend.tools.cyclic_motion import jog_cyclic
 from backend.tools.jog import Hold, JogSettings, jog
 from drivers.errors import DriveError
-from drivers.link import ScopeBlock
 
-MAGIC = 0x424B4353
-_HEADER = struct.Struct("<IIIIHHIdd")
 #: Messages that wait for a slow page; states, values and drive lists coalesce and do not count.
 QUEUE = 500
 #: A connection that has not taken a message for this long is closed.
@@ -108,6 +101,7 @@ class LiveHub:
     def _drives(self) -> None:
         for connection in self._each():
             connection.later("drives", "", connection.drive_list)
+            connection.scopes.bench_changed()
 
     def _logged(self, entry: Entry) -> None:
         for connection in self._each():
@@ -139,12 +133,9 @@ class Connection:
         self._values: dict[str, set[str]] = {}
         self._wake = asyncio.Event()
         self._holds: dict[str, Hold] = {}
-        self._scopes: dict[int, list[tuple[Subscription, tuple[int, ...]]]] = {}
-        self._scope_tasks: dict[int, list[asyncio.Task[None]]] = {}
+        self.scopes = ScopeStreams(bench, name, self.send, socket.send_bytes)
         self._polls: dict[str, asyncio.Task[None]] = {}
         self._overflow = False
-        #: Ending a poll may take as long as a mute drive; STOP and jog never wait for that.
-        self._scope_requests: asyncio.Queue[ScopeStart | ScopeStop] = asyncio.Queue()
 
     async def run(self) -> None:
         """Until the page is gone."""
@@ -152,7 +143,7 @@ class Connection:
         self.later("drives", "", self.drive_list)
         sender = asyncio.create_task(self._sender(), name=f"live-{self.id}")
         receiver = asyncio.create_task(self._receiver(), name=f"hear-{self.id}")
-        scoper = asyncio.create_task(self._scoper(), name=f"scopes-{self.id}")
+        scoper = asyncio.create_task(self.scopes.run(), name=f"scopes-{self.id}")
         tasks = (sender, receiver, scoper)
         done, pending = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         # Before anything is waited for: nobody holds a button here any more.
@@ -162,8 +153,9 @@ class Connection:
         await asyncio.wait(tasks)
         for task in done:
             error = None if task.cancelled() else task.exception()
-            # A page may go in the middle of a message; that is its ordinary end.
-            if error is not None and not isinstance(error, WebSocketDisconnect):
+            # A page may go in the middle of a message, or sleep for so long that its messages
+            # wait for ever; both are ordinary ends.
+            if error is not None and not isinstance(error, (WebSocketDisconnect, TimeoutError)):
                 raise error
 
     async def close(self) -> None:
@@ -175,8 +167,7 @@ class Connection:
         self.watched = set()
         for task in self._polls.values():
             task.cancel()
-        for subscription in list(self._scopes):
-            await self._scope_stop(subscription)
+        await self.scopes.close()
         self._bench.leases.drop(self.id)
 
     def _release_holds(self) -> None:
@@ -254,18 +245,6 @@ class Connection:
             problem = DriveError(f"not a message of this interface: {first['msg']}")
             self.send(Refused(request="?", problem=problem_of(problem)))
             return
-        if isinstance(request, (ScopeStart, ScopeStop)):
-            self._scope_requests.put_nowait(request)
-            return
-        await self._answered(request)
-
-    async def _scoper(self) -> None:
-        """Begin and end subscriptions, in the order asked for."""
-        while True:
-            await self._answered(await self._scope_requests.get())
-
-    async def _answered(self, request: FromPage) -> None:
-        """Carry a message out; what speaks against it goes back to the page."""
         try:
             await self._act(request)
         except DriveError as error:
@@ -289,10 +268,8 @@ class Connection:
                 self._watch_values(request)
             case LeaseTake():
                 self._lease(request)
-            case ScopeStart():
-                await self._scope_start(request)
-            case ScopeStop():
-                await self._scope_stop(request.subscription)
+            case ScopeStart() | ScopeStop():
+                self.scopes.request(request)
             case Ping():
                 self.send(Pong(n=request.n))
 
@@ -383,95 +360,9 @@ class Connection:
         if job.task is not None:
             job.task.add_done_callback(ended)
 
-    # --- scope ------------------------------------------------------------------------
-
-    async def _scope_start(self, request: ScopeStart) -> None:
-        await self._scope_stop(request.subscription)
-        columns: dict[str, list[int]] = {}
-        for number, channel in enumerate(request.channels):
-            columns.setdefault(channel.drive, []).append(number)
-        streams: list[tuple[Subscription, tuple[int, ...]]] = []
-        try:
-            for drive, numbers in columns.items():
-                keys = [request.channels[n].key for n in numbers]
-                self._bench.member(drive)
-                for stream, places in self._bench.scope.subscribe(drive, keys, request.period_s):
-                    streams.append((stream, tuple(numbers[place] for place in places)))
-        except DriveError as error:
-            for stream, _ in streams:
-                await self._bench.scope.unsubscribe(stream)
-            self.send(
-                ScopeInfo(subscription=request.subscription, channels=[], problem=problem_of(error))
-            )
-            return
-        self._scopes[request.subscription] = streams
-        synchronous = {n for stream, numbers in streams if stream.synchronous for n in numbers}
-        described = self._described(request, synchronous)
-        self.send(ScopeInfo(subscription=request.subscription, channels=described))
-        count = len(request.channels)
-        self._scope_tasks[request.subscription] = [
-            asyncio.create_task(self._pump(request.subscription, stream, numbers, count))
-            for stream, numbers in streams
-        ]
-
-    def _described(self, request: ScopeStart, synchronous: set[int]) -> list[ScopeChannelInfo]:
-        result = []
-        for number, channel in enumerate(request.channels):
-            drive = self._bench.member(channel.drive).drive
-            parameter = drive.parameter(channel.key)
-            result.append(
-                ScopeChannelInfo(
-                    drive=channel.drive,
-                    key=parameter.key,
-                    name=parameter.name,
-                    unit=parameter.unit,
-                    synchronous=number in synchronous,
-                )
-            )
-        return result
-
-    async def _scope_stop(self, subscription: int) -> None:
-        for task in self._scope_tasks.pop(subscription, []):
-            task.cancel()
-        for stream, _ in self._scopes.pop(subscription, []):
-            await self._bench.scope.unsubscribe(stream)
-
-    async def _pump(
-        self, subscription: int, stream: Subscription, numbers: tuple[int, ...], count: int
-    ) -> None:
-        send: Callable[[bytes], Awaitable[None]] = self._socket.send_bytes
-        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-            while True:
-                block = await stream.next()
-                await send(encode_block(subscription, block, numbers, count))
-
 
 async def _jog_work(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress) -> JobResult:
     """Through the cyclic exchange where it runs, else as a moving target."""
     if axis.session is not None and axis.session.running:
         return await jog_cyclic(axis, axis.session, settings, hold, progress)
     return await jog(axis, settings, hold, progress)
-
-
-def encode_block(
-    subscription: int, block: ScopeBlock, numbers: tuple[int, ...], count: int
-) -> bytes:
-    """A block as a binary frame (see live_messages); columns of other drives are NaN."""
-    rows = len(block.samples)
-    samples = np.full((rows, count), np.nan, dtype="<f4")
-    samples[:, list(numbers)] = block.samples
-    if block.valid is not None:
-        samples[~block.valid] = np.nan
-    times = b"" if block.times_s is None else block.times_s.astype("<f8").tobytes()
-    header = _HEADER.pack(
-        MAGIC,
-        subscription,
-        block.sequence,
-        block.dropped,
-        rows,
-        count,
-        1 if times else 0,
-        block.t0_s,
-        block.dt_s,
-    )
-    return header + times + samples.tobytes()

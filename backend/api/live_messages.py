@@ -3,10 +3,16 @@
 Binary frames carry scope blocks, little endian::
 
     u32 magic 0x424B4353 ("SCKB")   u32 subscription   u32 sequence   u32 dropped samples
-    u16 n rows   u16 k channels   u32 flags (bit 0: true times follow)
+    u16 n rows   u16 k channels   u32 flags (bit 0: true times follow, bit 1: bases follow,
+                                             bits 8 to 15: number of the stream)
     f64 t0_s   f64 dt_s
     [n] f64 times_s (only with flag bit 0)
+    [k] f64 bases, to be added to the samples of each channel (only with flag bit 1)
     [n*k] f32 samples in engineering units, row after row; NaN where a value is not valid
+
+Sequence and dropped samples are of one stream of a subscription: channels that the cyclic exchange
+carries and channels that are polled are streams of their own; the others' columns are NaN. After
+another ScopeInfo the sequence begins anew.
 """
 
 from __future__ import annotations
@@ -194,7 +200,7 @@ class JogEnded(Message):
 
 
 class ScopeInfo(Message):
-    """How a subscription's channels are sampled."""
+    """How a subscription's channels are sampled; again whenever that changes."""
 
     type: Literal["scope_info"] = "scope_info"
     subscription: int
@@ -210,6 +216,8 @@ class ScopeChannelInfo(Message):
     name: str
     unit: str
     synchronous: bool
+    axis_unit: str = Field(default="", description="unit of the axis; empty where there is none")
+    axis_factor: float | None = Field(default=None, description="from ``unit`` to ``axis_unit``")
 
 
 class Logged(Message):

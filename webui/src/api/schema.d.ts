@@ -1115,7 +1115,7 @@ export interface paths {
         };
         /**
          * Read Measurement
-         * @description One measurement, evaluated anew from its raw data.
+         * @description One measurement, evaluated anew from its raw data and compared with its first result.
          */
         get: operations["read_measurement"];
         put?: never;
@@ -1381,6 +1381,98 @@ export interface paths {
          */
         post: operations["scan"];
         delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/scope/setups": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Scope Setups
+         * @description Named set-ups; those that an older or newer version wrote differently are left out.
+         */
+        get: operations["list_scope_setups"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/scope/setups/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Save Scope Setup
+         * @description Keep a set-up under a name, in place of an earlier one of that name.
+         */
+        put: operations["save_scope_setup"];
+        post?: never;
+        /**
+         * Delete Scope Setup
+         * @description Forget a set-up.
+         */
+        delete: operations["delete_scope_setup"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/scope/snapshots": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Scope Snapshots
+         * @description Snapshots, newest first.
+         */
+        get: operations["list_scope_snapshots"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/scope/snapshots/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read Scope Snapshot
+         * @description A snapshot's file.
+         */
+        get: operations["read_scope_snapshot"];
+        put?: never;
+        /**
+         * Save Scope Snapshot
+         * @description Store a snapshot; the body is the file (see docs/scope.md), at most 32 MiB.
+         */
+        post: operations["save_scope_snapshot"];
+        /**
+         * Delete Scope Snapshot
+         * @description Delete a snapshot.
+         */
+        delete: operations["delete_scope_snapshot"];
         options?: never;
         head?: never;
         patch?: never;
@@ -2712,7 +2804,27 @@ export interface components {
          * @description Its settings, and its result evaluated anew from the raw data.
          */
         MeasurementContent: {
+            /**
+             * Agrees
+             * @description whether the result is the one that was concluded at the time; null: unknown
+             */
+            agrees: boolean | null;
+            /**
+             * Differences
+             * @description fields that differ, at most five
+             */
+            differences: string[];
             info: components["schemas"]["MeasurementInfo"];
+            /**
+             * Profile Version
+             * @description digest of the profile it was measured with
+             */
+            profile_version: string;
+            /**
+             * Program
+             * @description version of servodeck that measured; empty: not told
+             */
+            program: string;
             /** Result */
             result: {
                 [key: string]: unknown;
@@ -2814,6 +2926,20 @@ export interface components {
              * @description greatest distance from the start point
              */
             travel_limit: number;
+        };
+        /**
+         * NamedSetup
+         * @description A stored set-up.
+         */
+        NamedSetup: {
+            /** Name */
+            name: string;
+            /**
+             * Saved
+             * Format: date-time
+             */
+            saved: string;
+            setup: components["schemas"]["ScopeSetup"];
         };
         /**
          * NetworkInterface
@@ -3579,6 +3705,18 @@ export interface components {
          * @description Name, unit and timing of one trace.
          */
         ScopeChannelInfo: {
+            /**
+             * Axis Factor
+             * @description from ``unit`` to ``axis_unit``
+             * @default null
+             */
+            axis_factor: number | null;
+            /**
+             * Axis Unit
+             * @description unit of the axis; empty where there is none
+             * @default
+             */
+            axis_unit: string;
             /** Drive */
             drive: string;
             /** Key */
@@ -3592,7 +3730,7 @@ export interface components {
         };
         /**
          * ScopeInfo
-         * @description How a subscription's channels are sampled.
+         * @description How a subscription's channels are sampled; again whenever that changes.
          */
         ScopeInfo: {
             /** Channels */
@@ -3607,6 +3745,60 @@ export interface components {
              * @constant
              */
             type: "scope_info";
+        };
+        /**
+         * ScopeMath
+         * @description A computed channel over the shown values of others (docs/scope.md has the language).
+         */
+        ScopeMath: {
+            /** Expression */
+            expression: string;
+            /** Id */
+            id: string;
+            /** Name */
+            name: string;
+            /**
+             * Unit
+             * @default
+             */
+            unit: string;
+        };
+        /**
+         * ScopeSetup
+         * @description Everything that is set on the Scope page.
+         */
+        ScopeSetup: {
+            /**
+             * Maths
+             * @default []
+             */
+            maths: components["schemas"]["ScopeMath"][];
+            /**
+             * Persistence
+             * @default 0
+             */
+            persistence: number;
+            /**
+             * Traces
+             * @default []
+             */
+            traces: components["schemas"]["ScopeTrace"][];
+            /** @default {
+             *       "before": 0.2,
+             *       "bit": 0,
+             *       "drive": "",
+             *       "high": 0,
+             *       "kind": "rising",
+             *       "level": 0,
+             *       "mode": "off",
+             *       "trace": ""
+             *     } */
+            trigger: components["schemas"]["ScopeTrigger"];
+            /**
+             * Window S
+             * @default 5
+             */
+            window_s: number;
         };
         /**
          * ScopeStart
@@ -3643,6 +3835,89 @@ export interface components {
              * @constant
              */
             type: "scope_stop";
+        };
+        /**
+         * ScopeTrace
+         * @description A channel that is shown. ``show``: the drive's own unit, the axis' unit, or one's own,
+         *     which is (drive's value × ``factor`` + ``offset``) in ``unit``.
+         */
+        ScopeTrace: {
+            /** Drive */
+            drive: string;
+            /**
+             * Factor
+             * @default 1
+             */
+            factor: number;
+            /** Id */
+            id: string;
+            /** Key */
+            key: string;
+            /**
+             * Offset
+             * @default 0
+             */
+            offset: number;
+            /**
+             * Show
+             * @default axis
+             * @enum {string}
+             */
+            show: "drive" | "axis" | "own";
+            /**
+             * Unit
+             * @default
+             */
+            unit: string;
+        };
+        /**
+         * ScopeTrigger
+         * @description When the picture is taken. ``drive`` is for ``fault`` and ``motion``, ``trace`` for all
+         *     other kinds; ``before`` is the part of the window before the trigger.
+         */
+        ScopeTrigger: {
+            /**
+             * Before
+             * @default 0.2
+             */
+            before: number;
+            /**
+             * Bit
+             * @default 0
+             */
+            bit: number;
+            /**
+             * Drive
+             * @default
+             */
+            drive: string;
+            /**
+             * High
+             * @default 0
+             */
+            high: number;
+            /**
+             * Kind
+             * @default rising
+             * @enum {string}
+             */
+            kind: "rising" | "falling" | "either" | "above" | "below" | "enters" | "leaves" | "bit_set" | "bit_clear" | "change" | "fault" | "motion";
+            /**
+             * Level
+             * @default 0
+             */
+            level: number;
+            /**
+             * Mode
+             * @default off
+             * @enum {string}
+             */
+            mode: "off" | "auto" | "normal" | "single";
+            /**
+             * Trace
+             * @default
+             */
+            trace: string;
         };
         /**
          * SegmentExchange
@@ -3872,6 +4147,52 @@ export interface components {
             saved: string | null;
             /** Serial */
             serial: number | null;
+        };
+        /**
+         * SnapshotHeader
+         * @description Head of a snapshot file. ``origin_s`` is the time that was shown as zero.
+         */
+        SnapshotHeader: {
+            /**
+             * Created
+             * Format: date-time
+             */
+            created: string;
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /** Origin S */
+            origin_s: number;
+            setup: components["schemas"]["ScopeSetup"];
+            /** Traces */
+            traces: components["schemas"]["SnapshotTrace"][];
+        };
+        /**
+         * SnapshotInfo
+         * @description A snapshot of the list; ``header`` is null where the file is not usable.
+         */
+        SnapshotInfo: {
+            /** Bytes */
+            bytes: number;
+            header: components["schemas"]["SnapshotHeader"] | null;
+            /** Name */
+            name: string;
+        };
+        /**
+         * SnapshotTrace
+         * @description A trace of a snapshot.
+         */
+        SnapshotTrace: {
+            /** Label */
+            label: string;
+            /** Rows */
+            rows: number;
+            /** Synchronous */
+            synchronous: boolean;
+            /** Unit */
+            unit: string;
         };
         /**
          * StartRecording
@@ -4237,6 +4558,7 @@ export type MeasurementContent = components['schemas']['MeasurementContent'];
 export type MeasurementInfo = components['schemas']['MeasurementInfo'];
 export type MissingPort = components['schemas']['MissingPort'];
 export type MoveRequest = components['schemas']['MoveRequest'];
+export type NamedSetup = components['schemas']['NamedSetup'];
 export type NetworkInterface = components['schemas']['NetworkInterface'];
 export type NotchPreviewInfo = components['schemas']['NotchPreviewInfo'];
 export type NotchPreviewRequest = components['schemas']['NotchPreviewRequest'];
@@ -4278,8 +4600,12 @@ export type ScanRequest = components['schemas']['ScanRequest'];
 export type ScopeChannel = components['schemas']['ScopeChannel'];
 export type ScopeChannelInfo = components['schemas']['ScopeChannelInfo'];
 export type ScopeInfo = components['schemas']['ScopeInfo'];
+export type ScopeMath = components['schemas']['ScopeMath'];
+export type ScopeSetup = components['schemas']['ScopeSetup'];
 export type ScopeStart = components['schemas']['ScopeStart'];
 export type ScopeStop = components['schemas']['ScopeStop'];
+export type ScopeTrace = components['schemas']['ScopeTrace'];
+export type ScopeTrigger = components['schemas']['ScopeTrigger'];
 export type SegmentExchange = components['schemas']['SegmentExchange'];
 export type SegmentPort = components['schemas']['SegmentPort'];
 export type SegmentStation = components['schemas']['SegmentStation'];
@@ -4287,6 +4613,9 @@ export type SequenceRequest = components['schemas']['SequenceRequest'];
 export type SerialPort = components['schemas']['SerialPort'];
 export type Session = components['schemas']['Session'];
 export type SetFileInfo = components['schemas']['SetFileInfo'];
+export type SnapshotHeader = components['schemas']['SnapshotHeader'];
+export type SnapshotInfo = components['schemas']['SnapshotInfo'];
+export type SnapshotTrace = components['schemas']['SnapshotTrace'];
 export type StartRecording = components['schemas']['StartRecording'];
 export type StateChanged = components['schemas']['StateChanged'];
 export type StepRequest = components['schemas']['StepRequest'];
@@ -10730,6 +11059,530 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["JobInfo"];
                 };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_scope_setups: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["NamedSetup"][];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    save_scope_setup: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ScopeSetup"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    delete_scope_setup: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_scope_snapshots: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SnapshotInfo"][];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_scope_snapshot: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    save_scope_snapshot: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SnapshotInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    delete_scope_snapshot: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description No such thing */
             404: {

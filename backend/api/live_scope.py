@@ -1,0 +1,260 @@
+"""Scope subscriptions of one live connection: bounded, counted, and kept alive as buses change.
+
+A subscription may be carried by several streams: what the cyclic exchange brings with every cycle,
+and what is polled. When an exchange starts or ends, or a drive comes back, the streams are made
+anew by themselves and the page is told with another ScopeInfo.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import struct
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from fastapi import WebSocketDisconnect
+from pydantic import BaseModel
+
+from backend.api.errors import problem_of
+from backend.api.live_messages import ScopeChannelInfo, ScopeInfo, ScopeStart, ScopeStop
+from backend.bench import Bench
+from backend.scope import Subscription
+from backend.scope_units import axis_scale
+from backend.units import AxisUnits
+from drivers.errors import Busy, DriveError
+from drivers.link import ScopeBlock
+
+MAGIC = 0x424B4353
+_HEADER = struct.Struct("<IIIIHHIdd")
+TRUE_TIMES, BASES = 1, 2
+#: Integers beyond this have no exact float32.
+_EXACT = 2.0**24
+#: Subscriptions of one connection, and requests that may wait.
+MOST_SUBSCRIPTIONS = 32
+MOST_REQUESTS = 200
+#: A page that takes no block for this long is cut off; what it missed is counted until then.
+SEND_TIMEOUT_S = 10.0
+#: The gearing of a mute drive must not keep the samples of the others waiting.
+UNITS_TIMEOUT_S = 2.0
+
+_Streams = list[tuple[Subscription, tuple[int, ...]]]
+SendBytes = Callable[[bytes], Awaitable[None]]
+
+
+@dataclass(slots=True)
+class _Running:
+    """A subscription. ``signature`` changes when its streams must be made anew."""
+
+    request: ScopeStart
+    signature: object
+    streams: _Streams
+    pumps: list[asyncio.Task[None]]
+
+
+class ScopeStreams:
+    """All subscriptions of one connection. ``tell`` queues a text message to the page."""
+
+    def __init__(self, bench: Bench, name: str, tell: Callable[[BaseModel], None],
+                 send: SendBytes) -> None:  # fmt: skip
+        self._bench = bench
+        self._name = name
+        self._tell = tell
+        self._send = send
+        self._running: dict[int, _Running] = {}
+        #: Ending a poll may take as long as a mute drive; STOP and jog never wait for that.
+        self._requests: asyncio.Queue[ScopeStart | ScopeStop | None] = asyncio.Queue(MOST_REQUESTS)
+        self._stuck = False
+        self._changed = False
+
+    def request(self, request: ScopeStart | ScopeStop) -> None:
+        """Begin or end a subscription, in the order asked for.
+
+        Raises:
+            Busy: the page asks faster than it can be served.
+        """
+        try:
+            self._requests.put_nowait(request)
+        except asyncio.QueueFull as error:
+            raise Busy(
+                f"{MOST_REQUESTS} scope requests wait already",
+                limit=str(MOST_REQUESTS),
+                remedy="wait for the answers",
+            ) from error
+
+    def bench_changed(self) -> None:
+        """Drives or exchanges changed; streams that this concerns are made anew."""
+        if not self._changed:
+            self._changed = True
+            with contextlib.suppress(asyncio.QueueFull):  # whatever waits there sees it as well
+                self._requests.put_nowait(None)
+
+    async def run(self) -> None:
+        """Serve requests until cancelled; returns when the page takes no more samples."""
+        while not self._stuck:
+            request = await self._requests.get()
+            if isinstance(request, ScopeStart):
+                await self._start(request)
+            elif isinstance(request, ScopeStop):
+                await self._stop(request.subscription)
+            if self._changed:
+                self._changed = False
+                await self._renew()
+
+    async def close(self) -> None:
+        """End all."""
+        for subscription in list(self._running):
+            await self._stop(subscription)
+
+    # --- subscriptions ----------------------------------------------------------------
+
+    async def _start(self, request: ScopeStart) -> None:
+        await self._stop(request.subscription)
+        if len(self._running) >= MOST_SUBSCRIPTIONS:
+            self._refuse(request, Busy(
+                f"{MOST_SUBSCRIPTIONS} subscriptions are the most of one page",
+                limit=str(MOST_SUBSCRIPTIONS), remedy="end some",
+            ))  # fmt: skip
+            return
+        signature = self._signature(request)
+        try:
+            streams = await self._subscribe(request)
+        except DriveError as error:
+            self._refuse(request, error)
+            # It is tried again when the bench changes: a drive may come back.
+            self._running[request.subscription] = _Running(request, signature, [], [])
+            return
+        described = await self._described(request, streams)
+        self._tell(ScopeInfo(subscription=request.subscription, channels=described))
+        count = len(request.channels)
+        pumps = [
+            asyncio.create_task(
+                self._pump(request.subscription, place, stream, numbers, count),
+                name=f"scope-{self._name}-{request.subscription}-{place}",
+            )
+            for place, (stream, numbers) in enumerate(streams)
+        ]
+        self._running[request.subscription] = _Running(request, signature, streams, pumps)
+
+    def _refuse(self, request: ScopeStart, error: DriveError) -> None:
+        problem = problem_of(error)
+        self._tell(ScopeInfo(subscription=request.subscription, channels=[], problem=problem))
+
+    async def _subscribe(self, request: ScopeStart) -> _Streams:
+        columns: dict[str, list[int]] = {}
+        for number, channel in enumerate(request.channels):
+            columns.setdefault(channel.drive, []).append(number)
+        streams: _Streams = []
+        try:
+            for drive, numbers in columns.items():
+                keys = [request.channels[n].key for n in numbers]
+                self._bench.member(drive)
+                for stream, places in self._bench.scope.subscribe(drive, keys, request.period_s):
+                    streams.append((stream, tuple(numbers[place] for place in places)))
+        except DriveError:
+            for stream, _ in streams:
+                await self._bench.scope.unsubscribe(stream)
+            raise
+        return streams
+
+    def _signature(self, request: ScopeStart) -> object:
+        """What the streams depend on: which axis object answers, and what its bus carries."""
+        found: list[object] = []
+        for channel in request.channels:
+            member = self._bench.members.get(channel.drive)
+            session = member.axis.session if member is not None else None
+            carried = (
+                member is not None
+                and session is not None
+                and session.carries(member.drive, channel.key)
+            )
+            found.append((id(member), id(session) if carried else 0))
+        return found
+
+    async def _renew(self) -> None:
+        for running in list(self._running.values()):
+            if self._signature(running.request) != running.signature:
+                await self._start(running.request)
+
+    async def _stop(self, subscription: int) -> None:
+        running = self._running.pop(subscription, None)
+        if running is None:
+            return
+        for pump in running.pumps:
+            pump.cancel()
+        for stream, _ in running.streams:
+            await self._bench.scope.unsubscribe(stream)
+
+    async def _described(self, request: ScopeStart, streams: _Streams) -> list[ScopeChannelInfo]:
+        carried = {n: stream for stream, numbers in streams for n in numbers}
+        units = {drive: await self._units(drive) for drive in {c.drive for c in request.channels}}
+        result = []
+        for number, channel in enumerate(request.channels):
+            drive = self._bench.member(channel.drive).drive
+            parameter = drive.parameter(channel.key)
+            known = units[channel.drive]
+            unit, factor = axis_scale(known, drive, parameter) if known else ("", None)
+            result.append(
+                ScopeChannelInfo(
+                    drive=channel.drive,
+                    key=parameter.key,
+                    name=parameter.name,
+                    unit=parameter.unit,
+                    synchronous=carried[number].synchronous,
+                    axis_unit=unit,
+                    axis_factor=factor,
+                )
+            )
+        return result
+
+    async def _units(self, drive: str) -> AxisUnits | None:
+        """None where the gearing cannot be read: then the drive's own unit is shown."""
+        with contextlib.suppress(DriveError, TimeoutError):
+            async with asyncio.timeout(UNITS_TIMEOUT_S):
+                return await self._bench.member(drive).axis.units()
+        return None
+
+    # --- samples ----------------------------------------------------------------------
+
+    async def _pump(self, subscription: int, place: int, stream: Subscription,
+                    numbers: tuple[int, ...], count: int) -> None:  # fmt: skip
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            while True:
+                block = await stream.next()
+                frame = encode_block(subscription, block, numbers, count, place)
+                try:
+                    async with asyncio.timeout(SEND_TIMEOUT_S):
+                        await self._send(frame)
+                except TimeoutError:
+                    self._stuck = True
+                    self.bench_changed()  # wakes `run`, which ends the connection
+                    return
+
+
+def encode_block(
+    subscription: int, block: ScopeBlock, numbers: tuple[int, ...], count: int, place: int = 0
+) -> bytes:
+    """A block as a binary frame (see live_messages); columns of other streams are NaN."""
+    rows = len(block.samples)
+    values: npt.NDArray[np.float64] = np.full((rows, count), np.nan)
+    values[:, list(numbers)] = block.samples
+    if block.valid is not None:
+        values[~block.valid] = np.nan
+    flags, extra = place << 8, b""
+    if block.times_s is not None:
+        flags |= TRUE_TIMES
+        extra = block.times_s.astype("<f8").tobytes()
+    largest = np.abs(values, where=~np.isnan(values), out=np.zeros_like(values))
+    if rows and largest.max() > _EXACT:
+        # A multi-turn position: its change within a block has an exact float32, itself has not.
+        flags |= BASES
+        bases = np.nan_to_num(values[0]).astype("<f8")
+        values = values - bases
+        extra += bases.tobytes()
+    header = _HEADER.pack(
+        MAGIC, subscription, block.sequence, block.dropped, rows, count, flags, block.t0_s,
+        block.dt_s,
+    )  # fmt: skip
+    return header + extra + values.astype("<f4").tobytes()

@@ -1,0 +1,98 @@
+"""Messages of the scope's set-ups and snapshots."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from backend.api.models import Finite, Message, Positive
+
+TraceId = Annotated[str, Field(pattern=r"^[cm][0-9]{1,3}$")]
+
+
+class ScopeTrace(Message):
+    """A channel that is shown. ``show``: the drive's own unit, the axis' unit, or one's own,
+    which is (drive's value × ``factor`` + ``offset``) in ``unit``.
+    """
+
+    id: TraceId
+    drive: str = Field(max_length=100)
+    key: str = Field(max_length=40)
+    show: Literal["drive", "axis", "own"] = "axis"
+    factor: Finite = 1.0
+    offset: Finite = 0.0
+    unit: str = Field(default="", max_length=20)
+
+
+class ScopeMath(Message):
+    """A computed channel over the shown values of others (docs/scope.md has the language)."""
+
+    id: TraceId
+    name: str = Field(max_length=60)
+    unit: str = Field(default="", max_length=20)
+    expression: str = Field(max_length=300)
+
+
+class ScopeTrigger(Message):
+    """When the picture is taken. ``drive`` is for ``fault`` and ``motion``, ``trace`` for all
+    other kinds; ``before`` is the part of the window before the trigger.
+    """
+
+    mode: Literal["off", "auto", "normal", "single"] = "off"
+    kind: Literal[
+        "rising", "falling", "either", "above", "below", "enters", "leaves", "bit_set",
+        "bit_clear", "change", "fault", "motion",
+    ] = "rising"  # fmt: skip
+    trace: str = Field(default="", max_length=4)
+    drive: str = Field(default="", max_length=100)
+    level: Finite = 0.0
+    high: Finite = 0.0
+    bit: int = Field(default=0, ge=0, le=31)
+    before: float = Field(default=0.2, ge=0, le=1)
+
+
+class ScopeSetup(Message):
+    """Everything that is set on the Scope page."""
+
+    traces: list[ScopeTrace] = Field(default=[], max_length=32)
+    maths: list[ScopeMath] = Field(default=[], max_length=16)
+    trigger: ScopeTrigger = ScopeTrigger()
+    window_s: Positive = 5.0
+    persistence: int = Field(default=0, ge=0, le=50)
+
+
+class NamedSetup(Message):
+    """A stored set-up."""
+
+    name: str
+    saved: datetime
+    setup: ScopeSetup
+
+
+class SnapshotTrace(Message):
+    """A trace of a snapshot."""
+
+    label: str
+    unit: str
+    rows: int = Field(ge=0)
+    synchronous: bool
+
+
+class SnapshotHeader(Message):
+    """Head of a snapshot file. ``origin_s`` is the time that was shown as zero."""
+
+    created: datetime
+    notes: str = Field(default="", max_length=4000)
+    origin_s: float
+    traces: list[SnapshotTrace] = Field(max_length=64)
+    setup: ScopeSetup
+
+
+class SnapshotInfo(Message):
+    """A snapshot of the list; ``header`` is null where the file is not usable."""
+
+    name: str
+    bytes: int
+    header: SnapshotHeader | None

@@ -1,0 +1,195 @@
+"""What people keep of the scope: named set-ups, and snapshots of what it showed.
+
+A set-up is a JSON file. A snapshot (``.sdsnap``) is 8 bytes of magic, the length of a JSON header
+(u32, little endian), the header, and then for each of its traces all times and all values as
+64-bit floats. The server only checks that it is whole; browsers write and read it.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from backend.files import StorageFailed, checked_name, write_atomically
+from backend.recording.writer import RESERVE_BYTES, free_bytes
+from drivers.errors import NotAllowed
+
+SETUP_SUFFIX, SNAPSHOT_SUFFIX = ".json", ".sdsnap"
+MAGIC = b"SDSNAP1\n"
+_LENGTH = struct.Struct("<I")
+MAX_HEADER_BYTES = 256 * 1024
+MAX_SNAPSHOT_BYTES = 32 * 1024 * 1024
+MOST_SETUPS, MOST_SNAPSHOTS = 200, 500
+
+
+class BadSnapshot(NotAllowed):
+    """Not a snapshot, or not whole."""
+
+    kind = "bad-snapshot"
+
+
+@dataclass(frozen=True, slots=True)
+class StoredSetup:
+    """A named set-up; ``modified`` in epoch seconds."""
+
+    name: str
+    modified: float
+    content: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class StoredSnapshot:
+    """A snapshot of the list; ``header`` is empty where the file is not usable."""
+
+    name: str
+    modified: float
+    bytes: int
+    header: dict[str, Any]
+
+
+def snapshot_header(data: bytes, name: str = "the file") -> dict[str, Any]:
+    """The header of a snapshot whose length agrees with it.
+
+    Raises:
+        BadSnapshot: anything else.
+    """
+    return _checked_header(data, len(data), name)
+
+
+def _checked_header(head: bytes, total_bytes: int, name: str) -> dict[str, Any]:
+    begin = len(MAGIC) + _LENGTH.size
+    try:
+        (length,) = _LENGTH.unpack_from(head, len(MAGIC))
+        header: dict[str, Any] = json.loads(head[begin : begin + min(length, MAX_HEADER_BYTES)])
+        rows = [int(trace["rows"]) for trace in header["traces"]]
+    except (ValueError, KeyError, TypeError, struct.error) as error:
+        raise _bad(name, "its header cannot be read") from error
+    expected = begin + length + 16 * sum(rows)
+    if not head.startswith(MAGIC) or min(rows, default=0) < 0 or total_bytes != expected:
+        raise _bad(name, f"it has {total_bytes} bytes, and {expected} were to be expected")
+    return header
+
+
+def _bad(name: str, why: str) -> BadSnapshot:
+    return BadSnapshot(
+        f"{name} is no snapshot of the scope: {why}", value=name,
+        remedy="choose a file that the Scope page wrote",
+    )  # fmt: skip
+
+
+class ScopeStore:
+    """The folder of set-ups and snapshots. All methods block."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    # --- set-ups ----------------------------------------------------------------------
+
+    def setups(self) -> list[StoredSetup]:
+        """All set-ups by name; files that are damaged are left out."""
+        found = []
+        for path in sorted((self.folder / "setups").glob(f"*{SETUP_SUFFIX}")):
+            if path.name.startswith("."):
+                continue
+            try:
+                content = json.loads(path.read_text("utf-8"))
+            except (OSError, ValueError):
+                continue
+            name = path.name.removesuffix(SETUP_SUFFIX)
+            found.append(StoredSetup(name, path.stat().st_mtime, content))
+        return found
+
+    def save_setup(self, name: str, content: dict[str, Any]) -> None:
+        """Keep a set-up under a name, in place of an earlier one.
+
+        Raises:
+            NotAllowed: not a file name, or too many. StorageFailed: the disk.
+        """
+        path = self.folder / "setups" / checked_name(name, SETUP_SUFFIX)
+        _check_room(path, SETUP_SUFFIX, MOST_SETUPS)
+        write_atomically(path, json.dumps(content, ensure_ascii=False, indent=1).encode())
+
+    def delete_setup(self, name: str) -> None:
+        """Forget a set-up.
+
+        Raises:
+            NotAllowed: there is none of this name.
+        """
+        _existing(self.folder / "setups" / checked_name(name, SETUP_SUFFIX)).unlink()
+
+    # --- snapshots --------------------------------------------------------------------
+
+    def snapshots(self) -> list[StoredSnapshot]:
+        """All snapshots, newest first."""
+        found = []
+        for path in (self.folder / "snapshots").glob(f"*{SNAPSHOT_SUFFIX}"):
+            if path.name.startswith("."):
+                continue
+            status = path.stat()
+            try:
+                with path.open("rb") as file:
+                    head = file.read(MAX_HEADER_BYTES + 64)
+                header = _checked_header(head, status.st_size, path.name)
+            except (OSError, BadSnapshot):
+                header = {}
+            found.append(StoredSnapshot(path.name, status.st_mtime, status.st_size, header))
+        return sorted(found, key=lambda each: -each.modified)
+
+    def save_snapshot(self, name: str, data: bytes) -> str:
+        """Keep a snapshot; returns its file name, with a number where the name is taken.
+
+        Raises:
+            BadSnapshot: it is not whole. NotAllowed: not a file name, or too many.
+            StorageFailed: the disk is nearly full.
+        """
+        snapshot_header(data, name)
+        folder = self.folder / "snapshots"
+        stem = checked_name(name, SNAPSHOT_SUFFIX).removesuffix(SNAPSHOT_SUFFIX)
+        path, number = folder / (stem + SNAPSHOT_SUFFIX), 2
+        while path.exists():
+            path, number = folder / f"{stem} {number}{SNAPSHOT_SUFFIX}", number + 1
+        _check_room(path, SNAPSHOT_SUFFIX, MOST_SNAPSHOTS)
+        write_atomically(path, data)
+        return path.name
+
+    def snapshot(self, name: str) -> bytes:
+        """A snapshot's bytes.
+
+        Raises:
+            NotAllowed: there is none of this name.
+        """
+        return _existing(
+            self.folder / "snapshots" / checked_name(name, SNAPSHOT_SUFFIX)
+        ).read_bytes()
+
+    def delete_snapshot(self, name: str) -> None:
+        """Delete a snapshot.
+
+        Raises:
+            NotAllowed: there is none of this name.
+        """
+        _existing(self.folder / "snapshots" / checked_name(name, SNAPSHOT_SUFFIX)).unlink()
+
+
+def _existing(path: Path) -> Path:
+    if not path.is_file():
+        raise NotAllowed(f"there is no {path.name}", value=path.name, remedy="choose from the list")
+    return path
+
+
+def _check_room(path: Path, suffix: str, most: int) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.exists() and len(list(path.parent.glob(f"*{suffix}"))) >= most:
+        raise NotAllowed(
+            f"there are {most} already", value=path.name, limit=str(most),
+            remedy="delete some that are not needed",
+        )  # fmt: skip
+    free = free_bytes(path.parent)
+    if free < RESERVE_BYTES:
+        raise StorageFailed(
+            f"{path.name} was not stored: the disk is nearly full, {free >> 20} MiB are left",
+            value=free, limit=f"{RESERVE_BYTES >> 20} MiB stay free", remedy="free some space",
+        )  # fmt: skip
