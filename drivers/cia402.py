@@ -112,6 +112,16 @@ def decode_state(status_word: int, *, echoes_control: bool = False) -> State:
     return State.UNKNOWN
 
 
+def stops(control_word: int) -> bool:
+    """Whether this word only takes motion away: quick stop, disable voltage or halt.
+
+    Source: CiA 402-2 table 29 (commands); bit 8 is halt, bit 7 resets a fault.
+    """
+    if control_word & FAULT_RESET:
+        return False
+    return control_word & 0x06 != 0x06 or bool(control_word & HALT)
+
+
 def next_control_word(state: State, goal: State, previous: int = 0) -> int | None:
     """Control word of the next step from ``state`` towards ``goal``, or None when arrived.
 

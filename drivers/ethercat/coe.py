@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
-from drivers.errors import LinkTimeout, ProtocolError
-from drivers.ethercat.mailbox import COE, Mail, Mailbox, Steps
+from drivers.errors import DriveError, LinkTimeout, NotAllowed, ProtocolError, Rejected
+from drivers.ethercat.mailbox import COE, Mail, Mailbox, Overtaken, Pause, Steps
 from drivers.sdo_abort import rejected
 
 _REQUEST = 2 << 12
@@ -22,6 +22,8 @@ _RESPONSE = 3
 _INFO = 8
 _MAX_BYTES = 1 << 20
 _DROPPED_S = 0.1
+_OVERTAKEN_READS = 3
+_STOP_AGAIN_S = 0.002
 
 ABORT_COMMAND = 0x05040001
 ABORT_TOGGLE = 0x05030000
@@ -69,10 +71,28 @@ def upload(
 ) -> Steps[bytes]:
     """Read an object; with ``complete`` all of it, subindex 0 first.
 
+    What a stop overtakes is read again from its beginning.
+
     Raises:
         Rejected: the drive aborted.
         LinkTimeout, LinkLost, ProtocolError: see `Mailbox.request`.
     """
+    for _ in range(_OVERTAKEN_READS):
+        epoch = box.epoch
+        try:
+            return (
+                yield from _upload(box, index, subindex, complete=complete, timeout_s=timeout_s)
+            )
+        except DriveError:
+            # A stop in the middle ends a segmented transfer in the drive as well.
+            if box.epoch == epoch:
+                raise
+    return (yield from _upload(box, index, subindex, complete=complete, timeout_s=timeout_s))
+
+
+def _upload(
+    box: Mailbox, index: int, subindex: int, *, complete: bool, timeout_s: float | None
+) -> Steps[bytes]:
     yield from settle(box)
     command = 0x50 if complete else 0x40
     request = struct.pack("<HBHB4x", _REQUEST, command, index, subindex)
@@ -141,9 +161,16 @@ def download(
 
     Raises:
         Rejected: the drive aborted.
+        NotAllowed: a stop came first; nothing was sent.
         LinkTimeout, LinkLost, ProtocolError: see `Mailbox.request`.
     """
-    yield from settle(box)
+    epoch = box.epoch
+    try:
+        yield from settle(box)
+    except Overtaken as overtaken:
+        raise stopped_first() from overtaken
+    if box.epoch != epoch or box.stopping:
+        raise stopped_first()
     room = box.payload_size - 10
     if 1 <= len(data) <= 4 and not complete:
         command = 0x23 | (4 - len(data)) << 2
@@ -171,6 +198,50 @@ def download(
         if answer[2] & 0xE0 != 0x20 or answer[2] & 0x10 != toggle:
             yield from _give_up(box, index, subindex, ABORT_TOGGLE, "a segment went astray")
         toggle ^= 0x10
+
+
+def stop_write(box: Mailbox, index: int, subindex: int, data: bytes) -> Steps[None]:
+    """Write up to four bytes although another transaction may wait for its answer.
+
+    Nothing is drained or asked first. A mailbox that is still busy, and an abort that may belong
+    to what was overtaken, have it sent once more.
+
+    Raises:
+        Rejected: the drive aborted it.
+        LinkTimeout, LinkLost, ProtocolError: see `Mailbox.request`.
+    """
+    box.overtake()
+    command = 0x23 | (4 - len(data)) << 2
+    request = struct.pack("<HBHB", _REQUEST, command, index, subindex) + data.ljust(4, b"\0")
+    answers = _answer_to(index, subindex)
+
+    def matches(mail: Mail) -> bool:
+        return answers(mail) and mail.payload[2] & 0xE0 in (0x60, 0x80)
+
+    deadline = box.clock() + box.timeout_s
+    aborted = False
+    while True:
+        left_s = max(deadline - box.clock(), 0.0)
+        try:
+            answer = yield from box.request(COE, request, matches, left_s, keep=True)
+            _raise_abort(answer, index, subindex, writing=True)
+        except ProtocolError:
+            if box.clock() > deadline:
+                raise
+            yield Pause(_STOP_AGAIN_S)
+        except Rejected:
+            if aborted:
+                raise
+            aborted = True
+        else:
+            return
+
+
+def stopped_first() -> NotAllowed:
+    """The error of a write that a stop has overtaken before it was sent."""
+    return NotAllowed(
+        "a stop came first: this was not written", remedy="write it again if it is still wanted"
+    )
 
 
 def settle(box: Mailbox, *, force: bool = False) -> Steps[None]:
@@ -263,6 +334,15 @@ def describe_entry(box: Mailbox, index: int, subindex: int) -> Steps[EntryDescri
 
 def _info(box: Mailbox, opcode: int, data: bytes, answer_code: int) -> Steps[list[bytes]]:
     """One information request; the answer comes in as many mails as it needs."""
+    for _ in range(_OVERTAKEN_READS):
+        try:
+            return (yield from _info_once(box, opcode, data, answer_code))
+        except Overtaken:
+            continue
+    return (yield from _info_once(box, opcode, data, answer_code))
+
+
+def _info_once(box: Mailbox, opcode: int, data: bytes, answer_code: int) -> Steps[list[bytes]]:
     yield from settle(box)
 
     def matches(mail: Mail) -> bool:

@@ -3,6 +3,10 @@
 Every station has a lane for its mailbox and one for its registers. A lane runs one transaction
 at a time, different lanes interleave, so that a slow drive does not hold up a fast one, and
 process data go out between any two frames.
+
+Within a lane a write goes before reads that wait, and between two objects of a batch. A stop goes
+before everything: what is under way is suspended in the middle, after at most `GRACE_S`, and
+writes that wait are ended unsent, so that none of them follows the stop.
 """
 
 from __future__ import annotations
@@ -11,10 +15,15 @@ import struct
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import Any, Literal, Protocol
 
 from drivers.errors import DriveError, LinkLost, ProtocolError
-from drivers.ethercat.mailbox import Pause, Read, Steps
+from drivers.ethercat.coe import stopped_first
+from drivers.ethercat.mailbox import Gap, Pause, Read, Steps
+
+GRACE_S = 0.01
+"""How long a stop lets the answer under way come: most drives need 1 to 5 ms."""
 
 LaneName = Literal["mailbox", "register"]
 Done = Callable[[Any, DriveError | None], None]
@@ -31,14 +40,61 @@ class Wire(Protocol):
         """Whether somebody took it."""
 
 
+class Urgency(IntEnum):
+    """What goes before what in a lane."""
+
+    NORMAL = 0
+    WRITE = 1
+    STOP = 2
+
+
+@dataclass
+class _Job:
+    steps: Steps[Any]
+    done: Done
+    urgency: Urgency
+    asked_s: float
+    reply: bytes | None = None
+    wake_s: float = 0.0
+    calm: bool = True
+    """Nothing of it is under way."""
+
+
 @dataclass
 class _Lane:
     station: int
-    waiting: deque[tuple[Steps[Any], Done]] = field(default_factory=deque)
-    steps: Steps[Any] | None = None
-    done: Done | None = None
-    reply: bytes | None = None
-    wake_s: float = 0.0
+    waiting: list[_Job] = field(default_factory=list)
+    """The most urgent first, each kind in its order."""
+    running: list[_Job] = field(default_factory=list)
+    """The last one runs; those before it are suspended."""
+
+    def choose(self, now: float) -> _Job | None:
+        """What runs now: what waits may go before what runs."""
+        first = self.waiting[0] if self.waiting else None
+        top = self.running[-1] if self.running else None
+        if first is not None and (top is None or self._gives_way(top, first, now)):
+            self.running.append(self.waiting.pop(0))
+        return self.running[-1] if self.running else None
+
+    @staticmethod
+    def _gives_way(top: _Job, first: _Job, now: float) -> bool:
+        if first.urgency <= top.urgency:
+            return False
+        return top.calm or (first.urgency is Urgency.STOP and now >= first.asked_s + GRACE_S)
+
+    def due_s(self) -> float | None:
+        """When its next step is due; None when there is nothing to do."""
+        first = self.waiting[0] if self.waiting else None
+        if not self.running:
+            return None if first is None else 0.0
+        top = self.running[-1]
+        if first is None or first.urgency <= top.urgency:
+            return top.wake_s
+        if top.calm:
+            return 0.0
+        if first.urgency is Urgency.STOP:
+            return min(top.wake_s, first.asked_s + GRACE_S)
+        return top.wake_s
 
 
 class Lanes:
@@ -51,30 +107,40 @@ class Lanes:
         self._order: deque[_Lane] = deque()
         self.frames = 0
 
-    def submit(self, station: int, lane: LaneName, steps: Steps[Any], done: Done) -> None:
-        """Queue a transaction."""
+    def submit(
+        self,
+        station: int,
+        lane: LaneName,
+        steps: Steps[Any],
+        done: Done,
+        urgency: Urgency = Urgency.NORMAL,
+    ) -> None:
+        """Queue a transaction; a stop ends the writes that wait."""
         found = self._lanes.get((station, lane))
         if found is None:
             found = self._lanes[station, lane] = _Lane(station)
             self._order.append(found)
-        found.waiting.append((steps, done))
+        late = [] if urgency is not Urgency.STOP else [
+            job for job in found.waiting if job.urgency is Urgency.WRITE
+        ]  # fmt: skip
+        place = sum(job.urgency >= urgency for job in found.waiting)
+        found.waiting.insert(place, _Job(steps, done, urgency, self._clock()))
+        for job in late:
+            found.waiting.remove(job)
+            job.done(None, stopped_first())
 
     def busy(self, station: int, lane: LaneName) -> bool:
         """Whether a transaction runs or waits there."""
         found = self._lanes.get((station, lane))
-        return found is not None and (found.steps is not None or bool(found.waiting))
+        return found is not None and bool(found.running or found.waiting)
 
     def pending(self) -> bool:
         """Whether anything runs or waits."""
-        return any(lane.steps is not None or lane.waiting for lane in self._order)
+        return any(lane.running or lane.waiting for lane in self._order)
 
     def wake_s(self) -> float | None:
         """When the next step is due; None when there is nothing to do."""
-        due = [
-            lane.wake_s if lane.steps is not None else 0.0
-            for lane in self._order
-            if lane.steps is not None or lane.waiting
-        ]
+        due = [at for lane in self._order if (at := lane.due_s()) is not None]
         return min(due, default=None)
 
     def step(self) -> bool:
@@ -84,58 +150,51 @@ class Lanes:
         for _ in range(2 * len(self._order)):
             lane = self._order[0]
             self._order.rotate(-1)
-            if lane.steps is None:
-                if not lane.waiting:
-                    continue
-                lane.steps, lane.done = lane.waiting.popleft()
-                lane.reply, lane.wake_s = None, 0.0
-            if lane.wake_s > now:
-                continue
-            if self._advance(lane):
+            job = lane.choose(now)
+            if job is not None and job.wake_s <= now and self._advance(lane, job):
                 return True
         return False
 
     def drop(self, why: str) -> None:
         """End everything that runs or waits with an error."""
         for lane in tuple(self._order):
-            jobs = list(lane.waiting)
+            jobs = [*lane.running, *lane.waiting]
+            for job in lane.running:
+                job.steps.close()
+            lane.running.clear()
             lane.waiting.clear()
-            if lane.steps is not None and lane.done is not None:
-                lane.steps.close()
-                jobs.insert(0, (lane.steps, lane.done))
-            lane.steps = lane.done = None
-            for _, done in jobs:
-                done(None, LinkLost(why, remedy="it is tried again by itself; or scan again"))
+            for job in jobs:
+                job.done(None, LinkLost(why, remedy="it is tried again by itself; or scan again"))
 
-    def _advance(self, lane: _Lane) -> bool:
-        """Run the lane up to its next frame; True when a frame went out."""
-        assert lane.steps is not None
-        assert lane.done is not None
-        done = lane.done
+    def _advance(self, lane: _Lane, job: _Job) -> bool:
+        """Run a transaction up to its next frame; True when a frame went out."""
         try:
-            step = lane.steps.send(lane.reply)
+            step = job.steps.send(job.reply)
         except StopIteration as stop:
-            lane.steps = lane.done = None
-            done(stop.value, None)
+            lane.running.remove(job)
+            job.done(stop.value, None)
             return False
         except DriveError as error:
-            lane.steps = lane.done = None
-            done(None, error)
+            lane.running.remove(job)
+            job.done(None, error)
             return False
         except (struct.error, ValueError, IndexError) as error:
             # Whatever a slave sends, the process that moves axes goes on.
-            lane.steps = lane.done = None
-            done(None, ProtocolError(f"the drive sent something that cannot be read ({error})"))
+            lane.running.remove(job)
+            told = ProtocolError(f"the drive sent something that cannot be read ({error})")
+            job.done(None, told)
+            return False
+        job.calm = isinstance(step, Gap)
+        job.wake_s, job.reply = 0.0, b""
+        if isinstance(step, Gap):
             return False
         if isinstance(step, Pause):
-            lane.wake_s = self._clock() + step.seconds
-            lane.reply = b""
+            job.wake_s = self._clock() + step.seconds
             return False
-        lane.wake_s = 0.0
         self.frames += 1
         if isinstance(step, Read):
-            lane.reply = self._wire.read(lane.station, step.register, step.size)
+            job.reply = self._wire.read(lane.station, step.register, step.size)
         else:
             taken = self._wire.write(lane.station, step.register, step.data)
-            lane.reply = b"" if taken else None
+            job.reply = b"" if taken else None
         return True

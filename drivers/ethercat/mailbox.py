@@ -10,6 +10,7 @@ Source: ETG.1000.4 clause 5.6 (mailbox header, counter, repeat), ETG.1000.6 clau
 from __future__ import annotations
 
 import struct
+from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, TypeVar
@@ -39,7 +40,11 @@ class Pause(NamedTuple):
     seconds: float
 
 
-Step = Read | Write | Pause
+class Gap(NamedTuple):
+    """Nothing is under way: here more urgent transactions of the station may come in between."""
+
+
+Step = Read | Write | Pause | Gap
 Steps = Generator[Step, bytes | None, T]
 
 MAILBOX_ERROR = 0
@@ -68,6 +73,13 @@ _ERRORS = {
 _RESEND_S = 0.02
 _DEAD_READS = 5
 _WORTH_WAITING_S = 0.0003
+
+
+class Overtaken(LinkTimeout):
+    """A stop was sent while this transaction waited for its answer.
+
+    What was read can be read again; a write is never repeated, its outcome is unknown.
+    """
 
 
 class Mail(NamedTuple):
@@ -124,6 +136,12 @@ class Mailbox:
     repeats: int = field(default=0, init=False)
     usual_s: float = field(default=0.0, init=False)
     """How long answers take as a rule: asking earlier only disturbs."""
+    epoch: int = field(default=0, init=False)
+    """Raised by `overtake`: what began before ends with its answer, or is `Overtaken`."""
+    stopping: bool = field(default=False, init=False)
+    """A stop waits its short while: nothing may be sent again before it."""
+    _aside: deque[Mail] = field(default_factory=lambda: deque(maxlen=8), init=False)
+    """Answers to what was overtaken, that came while the stop waited for its own."""
 
     @property
     def payload_size(self) -> int:
@@ -136,29 +154,46 @@ class Mailbox:
         payload: bytes,
         matches: Callable[[Mail], bool],
         timeout_s: float | None = None,
+        *,
+        keep: bool = False,
     ) -> Steps[bytes]:
         """Send a mail and wait for the one that ``matches``; others are dropped.
+
+        With ``keep`` others are kept for the transaction that this one has overtaken.
 
         Raises:
             LinkLost: the station answers no frame at all.
             LinkTimeout: the mailbox stays mute.
+            Overtaken: a stop came in between, and the answer did not come before it.
             ProtocolError: the slave answers with a mailbox error.
         """
         deadline = self.clock() + (self.timeout_s if timeout_s is None else timeout_s)
+        epoch = self.epoch
         self._next_counter()
         mail = frame(protocol, self.counter, payload, self.out_size)
-        delivered = yield from self._send(mail)
-        return (yield from self._wait(mail, delivered, matches, deadline))
+        delivered = yield from self._send(mail, epoch)
+        return (yield from self._wait(mail, delivered, matches, deadline, epoch=epoch, keep=keep))
+
+    def overtake(self) -> None:
+        """From here on nothing that is under way is sent again (ETG.1000.4 clause 5.6).
+
+        Without this an enabling control word whose frame was lost would follow the stop.
+        """
+        self.epoch += 1
+        self.stopping = False
+        self.unsettled = True
+        self._aside.clear()
 
     def post(self, protocol: int, payload: bytes) -> Steps[None]:
         """Send a mail that nobody answers."""
         self._next_counter()
         mail = frame(protocol, self.counter, payload, self.out_size)
-        yield from self._send(mail)
+        yield from self._send(mail, self.epoch)
 
     def receive(self, matches: Callable[[Mail], bool], timeout_s: float) -> Steps[bytes]:
         """Wait for one more mail, as within a file transfer."""
-        return (yield from self._wait(b"", True, matches, self.clock() + timeout_s))
+        deadline = self.clock() + timeout_s
+        return (yield from self._wait(b"", True, matches, deadline, epoch=self.epoch))
 
     def drain(self) -> Steps[None]:
         """Read what lies in the mailbox: emergencies are reported, everything else dropped."""
@@ -173,7 +208,7 @@ class Mailbox:
     def _next_counter(self) -> None:
         self.counter = self.counter + 1 if self.counter < 7 else 2
 
-    def _send(self, mail: bytes) -> Steps[bool]:
+    def _send(self, mail: bytes, epoch: int) -> Steps[bool]:
         """True when the slave certainly has the mail.
 
         False where a lost frame or a mailbox that is still full leaves it open: `_wait` sends it
@@ -184,10 +219,19 @@ class Mailbox:
                 return True
             if (yield Read(SM0_STATUS, 1)) is not None:
                 return False
+            if self.epoch != epoch or self.stopping:
+                raise _overtaken()
         raise _lost()
 
     def _wait(
-        self, mail: bytes, delivered: bool, matches: Callable[[Mail], bool], deadline: float
+        self,
+        mail: bytes,
+        delivered: bool,
+        matches: Callable[[Mail], bool],
+        deadline: float,
+        *,
+        epoch: int,
+        keep: bool = False,
     ) -> Steps[bytes]:
         asked = self.clock()
         resend_at = asked + _RESEND_S
@@ -198,6 +242,8 @@ class Mailbox:
         polls = 0
         while True:
             status = yield Read(SM1_STATUS, 1)
+            if self.epoch != epoch:
+                return self._kept(matches)
             polls += 1
             dead = dead + 1 if status is None else 0
             if dead >= _DEAD_READS:
@@ -205,6 +251,8 @@ class Mailbox:
                 raise _lost()
             if status is not None and status[0] & _FULL:
                 answer = yield from self._fetch()
+                if self.epoch != epoch:
+                    return self._kept(matches, answer)
                 if answer is None or self._is_emergency(answer):
                     continue
                 if answer.protocol == MAILBOX_ERROR:
@@ -212,6 +260,8 @@ class Mailbox:
                 if matches(answer):
                     self._learn(self.clock() - asked, polls)
                     return answer.payload
+                if keep:
+                    self._aside.append(answer)
                 continue
             now = self.clock()
             if now > deadline:
@@ -220,13 +270,20 @@ class Mailbox:
                     "the drive did not answer in time",
                     remedy="read again; if it stays mute, switch the drive off and on",
                 )
-            if not delivered and now > resend_at:
+            if not delivered and now > resend_at and not self.stopping:
                 # The same counter: a slave that did get the mail drops the copy.
                 delivered = (yield Write(self.out_address, mail)) is not None
                 resend_at = now + _RESEND_S
             if pause_s:
                 yield Pause(pause_s)
             pause_s = min(pause_s + 0.00002, 0.0005)
+
+    def _kept(self, matches: Callable[[Mail], bool], last: Mail | None = None) -> bytes:
+        """The answer that came before the stop's own: a slave answers in order."""
+        for mail in (*self._aside, *(() if last is None else (last,))):
+            if mail.protocol != MAILBOX_ERROR and matches(mail):
+                return mail.payload
+        raise _overtaken()
 
     def _learn(self, took_s: float, polls: int) -> None:
         """An answer that was there at the first look may have been waited for too long."""
@@ -237,10 +294,13 @@ class Mailbox:
 
     def _fetch(self) -> Steps[Mail | None]:
         """Read the full mailbox, asking for a repeat when the frame with it was lost."""
+        epoch = self.epoch
         for _ in range(4):
             data = yield Read(self.in_address, self.in_size)
             if data is not None:
                 return parse(data)
+            if self.epoch != epoch:
+                return None
             yield from self._ask_again()
         return None
 
@@ -272,6 +332,13 @@ class Mailbox:
         code = int.from_bytes(payload[2:4], "little")
         text = _ERRORS.get(code, f"mailbox error {code:#06x}")
         raise ProtocolError(f"the drive refused the mail: {text}")
+
+
+def _overtaken() -> Overtaken:
+    return Overtaken(
+        "a stop was sent first: whether this arrived before it is unknown",
+        remedy="read the value back",
+    )
 
 
 def _lost() -> LinkLost:

@@ -8,13 +8,14 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
+from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed, OutOfRange, ProtocolError
 from drivers.ethercat import coe, esc, foe, sii
 from drivers.ethercat import station as transactions
 from drivers.ethercat.al_status import AlState, state_name
 from drivers.ethercat.cyclic import CyclicLoop
-from drivers.ethercat.lanes import Done, Lanes
+from drivers.ethercat.lanes import Done, Lanes, Urgency
 from drivers.ethercat.protocol import Message, error_to_wire
 from drivers.ethercat.realtime import RealTime
 from drivers.ethercat.ring import Ring
@@ -22,6 +23,7 @@ from drivers.ethercat.roster import Roster, Send
 from drivers.ethercat.segment import Segment
 from drivers.ethercat.station import Station
 
+_CONTROL_WORD = 0x6040
 _MAX_STEPS_PER_CYCLE = 16
 _STARVED_CYCLES = 8
 
@@ -37,6 +39,7 @@ class Operations:
         self._ring = ring
         self._send = send
         self._starved = 0
+        self._loading: set[int] = set()
         self._handlers: dict[str, Callable[[Message, Done], None]] = {
             "scan": self._scan, "read": self._read, "read_many": self._read_many,
             "write": self._write, "enumerate": self._enumerate, "state": self._state,
@@ -164,8 +167,18 @@ class Operations:
         if self.roster.exchange.route_write(station.number, index, subindex, data):
             done(None, None)
             return
+        if station.number in self._loading:
+            raise Busy(
+                f"station {station.number} is being loaded with firmware and cannot move",
+                remedy="wait for the end of the download",
+            )
+        if (index, subindex) == (_CONTROL_WORD, 0) and cia402.stops(_word(data)):
+            station.box.stopping = True
+            steps = coe.stop_write(station.box, index, subindex, data)
+            self.lanes.submit(station.number, "mailbox", steps, done, Urgency.STOP)
+            return
         steps = coe.download(station.box, index, subindex, data)
-        self.lanes.submit(station.number, "mailbox", steps, done)
+        self.lanes.submit(station.number, "mailbox", steps, done, Urgency.WRITE)
 
     def _enumerate(self, message: Message, done: Done) -> None:
         station = self.roster.station(message)
@@ -279,7 +292,13 @@ class Operations:
         steps = foe.write_file(
             station.box, message["name"], data, password=message["password"], on_progress=progress
         )
-        self.lanes.submit(station.number, "mailbox", steps, done)
+
+        def ended(result: object, error: DriveError | None) -> None:
+            self._loading.discard(station.number)
+            done(result, error)
+
+        self._loading.add(station.number)
+        self.lanes.submit(station.number, "mailbox", steps, ended)
 
     # Cyclic --------------------------------------------------------------------------------
 
@@ -329,6 +348,10 @@ class Operations:
     def status(self) -> Message:
         """The state of everything, sent several times a second."""
         return self.roster.status()
+
+
+def _word(data: bytes) -> int:
+    return int.from_bytes(data, "little")
 
 
 def _ignore(_result: object, _error: DriveError | None) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError, Rejected
 from drivers.ethercat import coe, esc
 from drivers.ethercat.al_status import ERROR_BIT, AlState, al_status_text, state_name
-from drivers.ethercat.mailbox import Mailbox, Pause, Read, Steps, Write
+from drivers.ethercat.mailbox import Gap, Mailbox, Pause, Read, Steps, Write
 
 AL_CONTROL, AL_STATUS = 0x120, 0x130
 _NO_COMPLETE_ACCESS = {0x05040001, 0x06010000, 0x06010004}
@@ -259,6 +259,7 @@ def read_items(
     for index, members in groups.items():
         sizes = _sizes_of_whole(station, index, members) if dead is None else {}
         if sizes:
+            yield Gap()
             whole = yield from _read_whole(station, index, sizes)
             results.update({item: whole[item[1]] for item in members if item[1] in whole})
         for item in members:
@@ -267,6 +268,7 @@ def read_items(
             if dead is not None:
                 results[item] = dead
                 continue
+            yield Gap()
             try:
                 results[item] = yield from coe.upload(station.box, index, item[1])
             except DriveError as error:
@@ -336,6 +338,7 @@ def enumerate_objects(
             continue
         found.append(info)
         for sub in range(info.max_subindex + 1):
+            yield Gap()
             try:
                 found.append((yield from coe.describe_entry(station.box, index, sub)))
             except Rejected:

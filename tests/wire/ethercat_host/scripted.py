@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from drivers.ethercat.mailbox import Mailbox, Pause, Read, Step, Write
+from drivers.ethercat.mailbox import Gap, Mailbox, Pause, Read, Step, Write
 
 T = TypeVar("T")
 OUT, IN = 0x1000, 0x1100
@@ -64,6 +64,8 @@ class ScriptedSlave:
     def _do(self, step: Step) -> bytes | None:
         if isinstance(step, Pause):
             self.now += step.seconds
+            return b""
+        if isinstance(step, Gap):
             return b""
         self.now += 50e-6
         number, self.frames = self.frames, self.frames + 1
