@@ -15,6 +15,7 @@ from drivers.link import (
     KnowsFamilies,
     Link,
     OwnsPowerState,
+    RecoversByItself,
     ScopeBlock,
     Unsubscribe,
 )
@@ -93,6 +94,11 @@ class CyclicSession:
         if self.state is None:
             return False
         return not isinstance(self.cyclic, OwnsPowerState) or self.cyclic.running
+
+    @property
+    def trouble(self) -> str:
+        """Why a wanted exchange does not run, while it is set up again by itself; else empty."""
+        return self.cyclic.trouble if isinstance(self.cyclic, RecoversByItself) else ""
 
     def power(self) -> OwnsPowerState | None:
         """The loop, where it owns the control words."""

@@ -232,6 +232,15 @@ class KnowsFamilies(Protocol):
 
 
 @runtime_checkable
+class RecoversByItself(Protocol):
+    """A cyclic exchange that is set up again by itself after it broke off, axes disabled."""
+
+    @property
+    def trouble(self) -> str:
+        """Why it does not run although it is wanted, in words; else empty."""
+
+
+@runtime_checkable
 class OwnsPowerState(Protocol):
     """A cyclic exchange whose loop writes the control word, so that nobody else may."""
 

@@ -103,6 +103,10 @@ class CyclicInfo(Message):
     """The running cyclic exchange of a bus."""
 
     running: bool
+    problem: str = Field(
+        default="",
+        description="why it does not run although it is wanted; it is set up again by itself",
+    )
     cycle_us: float
     dc: bool | None = Field(description="distributed clocks in use; None where there are none")
     channels: list[str] = Field(description="drive/key of what comes with every cycle")

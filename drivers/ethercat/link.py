@@ -11,6 +11,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from drivers import cia402
 from drivers.codec import size_of
 from drivers.errors import DriveError, NotAllowed, ProtocolError
 from drivers.ethercat import coe, permissions
@@ -62,7 +63,7 @@ class EthercatLink:
         self._host = HostProcess(
             interface, launcher, self._received, self._restarted, _options(lockstep)
         )
-        self.process_data = EthercatCyclic(self._host, self._profiles)
+        self.process_data = EthercatCyclic(self._host, self._profiles, self._exchange_changed)
         self.cyclic: Cyclic | None = self.process_data
 
     # Link ----------------------------------------------------------------------------------
@@ -78,7 +79,7 @@ class EthercatLink:
 
     async def close(self) -> None:
         """Brake, leave OP, end the host. Calling again does nothing."""
-        self.process_data.shut_down()
+        await self.process_data.close()
         await self._host.stop()
 
     async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
@@ -126,9 +127,20 @@ class EthercatLink:
         """Write one value; never repeated. A mapped output is set in the process data.
 
         Raises:
-            NotAllowed: control word or setpoint while the cyclic exchange owns it.
+            NotAllowed: control word or setpoint while the cyclic exchange owns it; an enabling
+                control word while it is being set up again, which resets the drives.
         """
         index, subindex = _object(address)
+        if (
+            self.process_data.trouble
+            and (index, subindex) == (0x6040, 0)
+            and not cia402.stops(int.from_bytes(data, "little"))
+        ):
+            raise NotAllowed(
+                "the cyclic exchange broke off and is being set up again: no axis can be enabled"
+                f" before that ({self.process_data.trouble})",
+                remedy="wait until it runs again, or end the cyclic exchange",
+            )
         await self._call(
             {"op": "write", "station": station, "index": index, "subindex": subindex, "data": data},
             _ANSWER_S,
@@ -269,16 +281,26 @@ class EthercatLink:
     def _received(self, message: Message) -> None:
         if message["event"] == "status":
             self._status = message
-            self.process_data.update(message["cyclic"])
+            self.process_data.update(message["cyclic"], reachable=bool(message["open"]))
         elif message["event"] == "link":
-            self._tell(
-                LinkEvent(message["kind"], message["station"], message["text"], message["code"])
-            )
+            kind, station = message["kind"], message["station"]
+            if kind == "back" and station is None and self.process_data.trouble:
+                # Who reads everything anew on "back" waits until the drives have been set up.
+                kind = "state"
+            self._tell(LinkEvent(kind, station, message["text"], message["code"]))
 
     def _restarted(self, why: str) -> None:
         self._status = {}
-        self.process_data.host_gone()
         self._tell(LinkEvent("lost", None, why))
+        self.process_data.host_gone(why)
+
+    def _exchange_changed(self, text: str, well: bool) -> None:
+        if not well:
+            self._tell(LinkEvent("fault", None, text))
+            return
+        self._tell(LinkEvent("state", None, text))
+        for station in self.process_data.stations:
+            self._tell(LinkEvent("back", station, f"station {station} is in OP again, disabled"))
 
     def _tell(self, event: LinkEvent) -> None:
         for listener in tuple(self._listeners):

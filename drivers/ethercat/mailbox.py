@@ -282,7 +282,8 @@ class Mailbox:
         """The answer that came before the stop's own: a slave answers in order."""
         for mail in (*self._aside, *(() if last is None else (last,))):
             if mail.protocol != MAILBOX_ERROR and matches(mail):
-                return mail.payload
+                payload: bytes = mail.payload
+                return payload
         raise _overtaken()
 
     def _learn(self, took_s: float, polls: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -310,7 +310,10 @@ class Operations:
                     f"there is no station {number}: {len(self.roster.stations)} were found"
                 )
         self.roster.exchange.prepare(self.roster.stations)
-        done(self.roster.exchange.configure(self.roster.stations, message), None)
+        identities = {n: self.roster.stations[n - 1].identity for n in message["stations"]}
+        _require_same(message.get("identities"), identities)
+        answer = self.roster.exchange.configure(self.roster.stations, message)
+        done(answer | {"identities": identities}, None)
 
     def _start(self, _message: Message, done: Done) -> None:
         self.roster.exchange.start(done)
@@ -348,6 +351,22 @@ class Operations:
     def status(self) -> Message:
         """The state of everything, sent several times a second."""
         return self.roster.status()
+
+
+def _require_same(
+    before: Mapping[int, Sequence[int | None]] | None, now: Mapping[int, Sequence[int | None]]
+) -> None:
+    """After a break the very same drives must be there: a swapped one has other values.
+
+    Raises:
+        NotAllowed: another drive answers at a station.
+    """
+    for number, identity in (before or {}).items():
+        if list(now[number]) != list(identity):
+            raise NotAllowed(
+                f"another drive than before answers at station {number}",
+                remedy="end the cyclic exchange, scan, and check the cables",
+            )
 
 
 def _word(data: bytes) -> int:

@@ -15,6 +15,7 @@ from drivers.errors import LinkLost, NotAllowed, OutOfRange
 from drivers.ethercat.hostprocess import HostProcess
 from drivers.ethercat.mapping import TARGETS, Entry, Pdo, StationPlan, plan_station
 from drivers.ethercat.protocol import Message
+from drivers.ethercat.recovery import Recovery
 from drivers.ethercat.ring import VALID, RingReader
 from drivers.link import Address, CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
 from profiles.schema import INTEGER_RANGE, Profile
@@ -45,8 +46,21 @@ class EthercatCyclic:
     ``renew_s`` from `play` and from every `renew`; `run` plays and renews while its task lives.
     """
 
-    def __init__(self, host: HostProcess, profiles: Mapping[int, Profile]) -> None:
+    def __init__(
+        self,
+        host: HostProcess,
+        profiles: Mapping[int, Profile],
+        tell: Callable[[str, bool], None],
+    ) -> None:
+        """``tell`` gets a sentence when the exchange breaks off (False) or runs again (True)."""
         self._host = host
+        self._tell = tell
+        self._setup: Message = {}
+        self._wanted = False
+        self._generation = 0
+        self._played: dict[int, int] = {}
+        self._last_ns = 0
+        self._recovery = Recovery(lambda: self._host.running, self._set_up_again, tell)
         self._profiles = profiles
         self._plans: tuple[StationPlan, ...] = ()
         self._cycle_s = 0.001
@@ -71,6 +85,7 @@ class EthercatCyclic:
         Raises:
             NotAllowed: cycle time, an output that does not fit, or a drive that refuses.
         """
+        await self._forget()
         self._check_names([*inputs, *outputs])
         stations = sorted({signal.station for signal in [*inputs, *outputs]})
         plans = tuple(
@@ -84,16 +99,15 @@ class EthercatCyclic:
         )
         for plan in plans:
             self._check_cycle(plan.station, cycle_s)
-        answer: Message = await self._host.call(
-            {
-                "op": "configure",
-                "cycle_ns": round(cycle_s * 1e9),
-                "dc": True,
-                "watchdog_ms": self._watchdog_ms,
-                "stations": {p.station: {"rx": _wire(p.rx), "tx": _wire(p.tx)} for p in plans},
-            },
-            _CONFIGURE_S,
-        )
+        message: Message = {
+            "op": "configure",
+            "cycle_ns": round(cycle_s * 1e9),
+            "dc": True,
+            "watchdog_ms": self._watchdog_ms,
+            "stations": {p.station: {"rx": _wire(p.rx), "tx": _wire(p.tx)} for p in plans},
+        }
+        answer: Message = await self._host.call(message, _CONFIGURE_S)
+        self._setup = message | {"identities": answer["identities"]}
         self._plans, self._cycle_s, self.dc = plans, cycle_s, bool(answer["dc"])
         self._fields = _fields(plans)
         self.left_over = tuple(item for plan in plans for item in plan.left_over)
@@ -105,17 +119,20 @@ class EthercatCyclic:
         Raises:
             NotAllowed: a drive refuses; the reason is its AL status code in words.
         """
-        await self._host.call({"op": "start"}, _START_S)
-        ring = self._host.ring
-        if ring is None:
-            raise LinkLost("the EtherCAT process ended")
-        reader = ring.reader(self._fields)
-        self._draining = asyncio.get_running_loop().create_task(self._drain(reader))
+        await self._start()
+        self._last_ns = 0
+        self._wanted = True
 
     async def stop(self) -> None:
-        """Brake whatever moves, disable, leave Operational."""
+        """Brake whatever moves, disable, leave Operational; from now on it is not wanted."""
+        broken = self._recovery.active
+        await self._forget()
         try:
             await self._host.call({"op": "stop"}, _STOP_S)
+        except LinkLost:
+            # Nothing is exchanged any more: the drives' watchdogs have stopped them.
+            if not broken:
+                raise
         finally:
             self.shut_down()
 
@@ -127,11 +144,22 @@ class EthercatCyclic:
             NotAllowed: not enabled, not mapped, a limit that cannot be watched, or a jump.
         """
         messages = [self._message(trajectory) for trajectory in trajectories]
+        generation = self._generation
         number: int = await self._host.call({"op": "play", "trajectories": messages}, _ANSWER_S)
+        self._played |= {trajectory.station: generation for trajectory in trajectories}
         return number
 
     async def renew(self, station: int) -> None:
-        """Extend the life of the setpoints of ``station`` by its renewal time."""
+        """Extend the life of the setpoints of ``station`` by its renewal time.
+
+        Raises:
+            LinkLost: the exchange broke off meanwhile; the motion ended with it.
+        """
+        if self._played.get(station, self._generation) != self._generation:
+            raise LinkLost(
+                f"station {station}: the cyclic exchange broke off, the motion has ended",
+                remedy="see the log for the reason; begin the motion again",
+            )
         await self._host.call({"op": "renew", "station": station}, _ANSWER_S)
 
     async def halt(self, station: int | None = None) -> None:
@@ -201,22 +229,69 @@ class EthercatCyclic:
             raise
         return number
 
-    def update(self, status: Message) -> None:
-        """Newest figures of the loop, from the host."""
-        self._status = status
+    @property
+    def stations(self) -> tuple[int, ...]:
+        """Whose process data are exchanged."""
+        return tuple(plan.station for plan in self._plans)
 
-    def host_gone(self) -> None:
+    @property
+    def trouble(self) -> str:
+        """Why the exchange does not run although it is wanted, in words; else empty."""
+        return self._recovery.trouble
+
+    def update(self, status: Message, *, reachable: bool) -> None:
+        """Newest figures of the loop, from the host; ``reachable``: the interface is open."""
+        self._status = status
+        if self._wanted and reachable and not status["running"] and not self._recovery.active:
+            self._broke_off("the exchange ended by itself")
+
+    def host_gone(self, why: str) -> None:
         """The host ended: so did the exchange."""
+        if self._wanted and not self._recovery.active:
+            self._broke_off(why)
+        else:
+            self.shut_down()
+
+    async def close(self) -> None:
+        """The bus is being closed: nothing is wanted any more."""
+        await self._forget()
         self.shut_down()
 
     def shut_down(self) -> None:
         """Stop delivering samples."""
+        self._generation += 1
         if self._draining is not None:
             self._draining.cancel()
             self._draining = None
         self._status = {}
 
     # Parts ---------------------------------------------------------------------------------
+
+    async def _start(self) -> None:
+        await self._host.call({"op": "start"}, _START_S)
+        ring = self._host.ring
+        if ring is None:
+            raise LinkLost("the EtherCAT process ended")
+        reader = ring.reader(self._fields)
+        self._draining = asyncio.get_running_loop().create_task(self._drain(reader))
+
+    def _broke_off(self, why: str) -> None:
+        self.shut_down()
+        self._tell(
+            f"the cyclic exchange broke off: {why}; every axis stops, and the exchange is set up"
+            " again by itself",
+            False,
+        )
+        self._recovery.begin(why)
+
+    async def _set_up_again(self) -> None:
+        """As `configure` and `start`, with the very same drives; they all end up disabled."""
+        await self._host.call(self._setup, _CONFIGURE_S)
+        await self._start()
+
+    async def _forget(self) -> None:
+        self._wanted = False
+        await self._recovery.end()
 
     def _raise_if_halted(self, station: int) -> None:
         if reason := self.axis_state(station)[2]:
@@ -280,10 +355,17 @@ class EthercatCyclic:
                     first = int(part["cycle"][0])
                     if expected >= 0 and not lost:
                         dropped += max(first - expected, 0)
+                    elif expected < 0 and self._last_ns:
+                        dropped += self._missed(int(part["time_ns"][0]))
                     self._deliver(names, part, dropped)
                     expected, dropped, lost = int(part["cycle"][-1]) + 1, 0, 0
+                    self._last_ns = int(part["time_ns"][-1])
         finally:
             reader.release()
+
+    def _missed(self, first_ns: int) -> int:
+        """Cycles between the end of an exchange that broke off and the beginning of the next."""
+        return max(round((first_ns - self._last_ns) / (self._cycle_s * 1e9)) - 1, 0)
 
     def _deliver(self, names: tuple[str, ...], part: npt.NDArray[np.void], dropped: int) -> None:
         samples = np.empty((len(part), len(names)), np.float64)

@@ -59,6 +59,11 @@ class Station:
     """Of the reference clock; None without distributed clock."""
 
     @property
+    def identity(self) -> list[int | None]:
+        """What tells this drive from any other."""
+        return [self.vendor_id, self.product_code, self.serial]
+
+    @property
     def box(self) -> Mailbox:
         """The mailbox.
 

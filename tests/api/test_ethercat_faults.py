@@ -53,6 +53,10 @@ class Segment:
     def end_cyclic(self) -> None:
         self.station.http.delete("/buses/cyclic", params={"url": URL})
 
+    def exchange(self) -> Any:
+        """What the interface tells of the exchange."""
+        return self.station.ok(self.station.http.get("/buses"))[0]["cyclic"]
+
     def view(self) -> Any:
         answer = self.station.http.get("/ethercat/segment", params={"url": URL})
         return self.station.ok(answer)
@@ -327,12 +331,38 @@ def test_killed_host_ends_the_motion_and_is_replaced(running: Segment) -> None:
     assert reason(ended).strip()
     running.responsive()
     running.told("the EtherCAT process died", after=before)
+    running.told("the cyclic exchange broke off: the EtherCAT process died", after=before)
     running.told("the EtherCAT process runs again", after=before)
-    assert not running.station.ok(running.station.http.get("/buses"))[0]["cyclic"]["running"]
-    running.settled()
+    running.told(
+        "the cyclic exchange runs again; every axis is disabled until you enable it",
+        after=before, within_s=20,
+    )  # fmt: skip
+    assert running.exchange()["running"]
+    assert not running.exchange()["problem"]
     running.stands()
+    assert running.station.state(running.b)["state"] != "Operation enabled"
+    running.settled()
     assert host_process() != first
     assert running.view()["host_restarts"] >= 1
+    running.jogs()
+
+
+def test_an_exchange_that_is_being_set_up_again_can_be_ended(running: Segment) -> None:
+    before = running.lines()
+    running.trouble("refuse", slave=B, state="SAFEOP", code=0x001D)
+    os.kill(host_process(), signal.SIGKILL)
+    running.told("could not be set up again", "invalid output configuration", after=before)
+    running.responsive()
+    assert not running.exchange()["running"]
+    assert "refuses SAFEOP" in running.exchange()["problem"]
+    enabling = {"goal": "Operation enabled", "mode": 1}
+    refused = running.station.http.post(f"/drives/{running.a}/transition", json=enabling)
+    assert refused.status_code == 409, "it would be reset in the middle of a motion"
+    assert "is being set up again" in refused.json()["detail"]
+    running.end_cyclic()
+    assert running.exchange() is None
+    running.trouble("refuse", slave=B, state="SAFEOP", code=None)
+    running.settled()
     running.start_cyclic()
     running.jogs()
 
@@ -353,6 +383,4 @@ def test_killed_segment_ends_the_motion_and_is_found_again(running: Segment) -> 
     running.told("station 2 is in OP again", after=before, within_s=20)
     running.settled()
     running.stands()
-    running.end_cyclic()
-    running.start_cyclic()
     running.jogs()

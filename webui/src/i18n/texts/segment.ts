@@ -85,4 +85,9 @@ export const segment = {
     'EtherCAT needs raw frames. Restart servodeck afterwards. The virtual bench needs none of this.',
     'EtherCAT 需要原始帧权限。执行后请重启 servodeck。虚拟台架无需这些权限。',
   ],
+  'segment.recovering': [
+    'The exchange broke off and is being set up again by itself; every axis stays disabled until you enable it. Reason:',
+    '周期通信中断，正在自动恢复；恢复后所有轴保持禁用，需手动使能。原因：',
+  ],
+  'segment.endRecovery': ['Do not set it up again', '不再恢复'],
 } satisfies Texts

@@ -44,6 +44,15 @@ export function CyclicExchange({ bus, onChange }: { bus: Bus; onChange: () => Pr
               {t('cyclic.stop')}
             </Button>
           </>
+        ) : now?.problem ? (
+          <>
+            <span className="grow warn-text" role="status">
+              {t('segment.recovering')} {now.problem}
+            </span>
+            <Button loading={act.busy} onClick={() => void stop()}>
+              {t('segment.endRecovery')}
+            </Button>
+          </>
         ) : (
           <>
             <span className="grow dim">{t('cyclic.off')}</span>

@@ -1,0 +1,83 @@
+"""Setting the cyclic exchange up again after it broke off, without anybody asking.
+
+An exchange that somebody started stays wanted until somebody ends it. When its process died, its
+interface vanished or the loop gave up, it is configured and started anew as soon as the segment
+can be reached, with growing pauses. Every axis comes back disabled: nothing here enables, and
+motions that ran before have ended.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable
+
+from drivers.errors import DriveError
+
+PAUSES_S = (0.3, 1.0, 3.0, 10.0)
+
+
+class Recovery:
+    """Calls ``set_up`` until it succeeds; ``tell`` gets a sentence at every change."""
+
+    def __init__(
+        self,
+        ready: Callable[[], bool],
+        set_up: Callable[[], Awaitable[None]],
+        tell: Callable[[str, bool], None],
+    ) -> None:
+        """``ready`` says whether an attempt makes sense, ``tell`` whether all is well again."""
+        self._ready = ready
+        self._set_up = set_up
+        self._tell = tell
+        self._task: asyncio.Task[None] | None = None
+        self.trouble = ""
+        """Why the exchange does not run although it is wanted, in words; else empty."""
+
+    @property
+    def active(self) -> bool:
+        """Whether the exchange is being set up again, or waits for that."""
+        return self._task is not None
+
+    def begin(self, why: str) -> None:
+        """Start trying; does nothing while that goes on already."""
+        if self._task is None:
+            self.trouble = why
+            self._task = asyncio.get_running_loop().create_task(self._run())
+
+    async def end(self) -> None:
+        """Give up, because the exchange is no longer wanted."""
+        task, self._task = self._task, None
+        self.trouble = ""
+        if task is not None and task is not asyncio.current_task():
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
+
+    async def _run(self) -> None:
+        last = ""
+        attempt = 0
+        while True:
+            await asyncio.sleep(PAUSES_S[min(attempt, len(PAUSES_S) - 1)])
+            if not self._ready():
+                continue
+            attempt += 1
+            try:
+                await self._set_up()
+            except DriveError as error:
+                self.trouble = error.message
+                if error.message != last:
+                    last = error.message
+                    self._tell(
+                        f"the cyclic exchange could not be set up again: {last};"
+                        " it is tried again by itself",
+                        False,
+                    )
+                continue
+            self._task = None
+            self.trouble = ""
+            self._tell(
+                "the cyclic exchange runs again; every axis is disabled until you enable it",
+                True,
+            )
+            return
