@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import re
 from collections.abc import Awaitable, Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 from backend.access import Leases
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.drive import Drive, Port, Reading
-from backend.files import write_atomically
+from backend.drive_list import DriveList, SavedDrive, SavedPort
 from backend.jobs import Job, JobRunner, Progress
 from backend.journal import Journal
 from backend.library import SetLibrary
@@ -26,41 +24,8 @@ from drivers.errors import Busy, DriveError, NotAllowed
 from drivers.link import Found, Link, LinkEvent, NeedsProfile
 from drivers.modbus.link import RegisterLink
 from drivers.urls import link_for
-from profiles import load_all, load_profile
-from profiles.schema import Profile
-
-
-@dataclass(frozen=True, slots=True)
-class Match:
-    """A profile that fits a found drive. Confidence: certain, likely or possible."""
-
-    profile: Profile
-    confidence: Literal["certain", "likely", "possible"]
-    why: str
-
-
-def match_profiles(kind: str, found: Found) -> list[Match]:
-    """Profiles that fit what a scan saw, best first."""
-    matches: list[Match] = []
-    for profile in load_all().values():
-        if profile.link(kind) is None:
-            continue
-        identity = profile.identity
-        if identity.vendor_id is not None and found.vendor_id is not None:
-            if identity.vendor_id != found.vendor_id:
-                continue
-            if identity.product_code is not None and identity.product_code == found.product_code:
-                matches.append(Match(profile, "certain", "vendor and product code agree"))
-            else:
-                matches.append(Match(profile, "likely", "the vendor agrees"))
-            continue
-        if any(re.search(p, found.name, re.IGNORECASE) for p in identity.name_patterns):
-            matches.append(Match(profile, "likely", f"its name {found.name!r} fits"))
-        else:
-            text = f"it answers over {kind}; the manual prints no identity to compare"
-            matches.append(Match(profile, "possible", text))
-    order = ("certain", "likely", "possible")
-    return sorted(matches, key=lambda m: order.index(m.confidence))
+from profiles import load_profile
+from profiles.loader import ProfileError
 
 
 class Member:
@@ -100,7 +65,7 @@ class Bench:
         self.leases = Leases(lambda _drive: self._drives_changed())
         self.scope = ScopeHub(lambda drive: self.member(drive).axis)
         self.state_folder = state_folder
-        self._config = state_folder / "bench.json"
+        self._list = DriveList(state_folder / "bench.json")
         self._opening = asyncio.Lock()
 
     # --- buses ------------------------------------------------------------------------
@@ -500,42 +465,35 @@ class Bench:
     # --- over restarts ----------------------------------------------------------------
 
     def _save(self) -> None:
-        drives = [
-            {
-                "name": m.drive.name,
-                "notes": m.drive.notes,
-                "profile": m.drive.profile.drive,
-                "ports": [{"url": self.url_of(p), "station": p.station} for p in m.drive.ports],
-                "serial": m.drive.found.serial if m.drive.found else None,
-            }
+        self._list.store(
+            SavedDrive(
+                name=m.drive.name,
+                notes=m.drive.notes,
+                profile=m.drive.profile.drive,
+                ports=tuple(SavedPort(self.url_of(p), p.station) for p in m.drive.ports),
+                serial=m.drive.found.serial if m.drive.found else None,
+            )
             for m in self.members.values()
-        ]
-        text = json.dumps({"version": 1, "drives": drives}, indent=2, ensure_ascii=False)
-        write_atomically(self._config, text.encode())
+        )
 
     async def restore(self) -> None:
         """Connect the drives of the last session; those that cannot be are logged and kept out."""
-        try:
-            content = json.loads(self._config.read_text("utf-8"))
-        except FileNotFoundError:
-            return
-        except (OSError, ValueError) as error:
-            self.journal.add(f"{self._config.name} cannot be read: {error}", level="error")
-            return
-        for item in content.get("drives", []):
+        saved, problems = self._list.load()
+        for problem in problems:
+            self.journal.add(problem, level="error")
+        for item in saved:
             try:
-                port = item["ports"][0]
-                member = await self.connect(
-                    port["url"], port["station"], item["profile"], item["name"]
-                )
-                member.drive.notes = item.get("notes", "")
-                for other in item["ports"][1:]:
-                    await self.add_port(member.drive.id, other["url"], other["station"])
-                if isinstance(serial := item.get("serial"), int):
-                    member.drive.found = Found(port["station"], serial=serial)
-                    self._returned(member.drive.id)
-            except (DriveError, KeyError, IndexError, TypeError) as error:
-                self.journal.add(f"{item}: not connected: {error}", level="warning")
+                first, *others = item.ports
+                member = await self.connect(first.url, first.station, item.profile, item.name)
+                member.drive.notes = item.notes
+                for other in others:
+                    await self.add_port(member.drive.id, other.url, other.station)
+            except (DriveError, ProfileError) as error:
+                self.journal.add(f"{item.name}: not connected: {error}", level="warning")
+                continue
+            if item.serial is not None:
+                member.drive.found = Found(first.station, serial=item.serial)
+                self._returned(member.drive.id)
 
     async def close(self) -> None:
         """Stop what moves, then let go of every bus."""

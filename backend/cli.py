@@ -13,12 +13,13 @@ from typing import Annotated
 
 import typer
 
-from backend.bench import Bench, match_profiles
+from backend.bench import Bench
 from backend.commands import measure, params, profile
 from backend.commands.serve import serve as run_server
 from backend.commands.serve import state_folder
 from backend.commands.session import opened, run, show_progress
 from backend.demo import DemoBench
+from backend.matching import match_profiles
 from drivers.errors import NotAllowed
 from drivers.urls import parse_url
 from drivers.virtual.mechanics.spec import load_mechanics, standard_mechanics

@@ -6,10 +6,11 @@ from datetime import UTC, datetime
 
 from backend.api import models
 from backend.api.errors import problem_of
-from backend.bench import Bench, Member, match_profiles
+from backend.bench import Bench, Member
 from backend.drive import Drive, Reading
 from backend.jobs import Job
 from backend.journal import Entry
+from backend.matching import match_profiles
 from backend.monitor import Snapshot
 from backend.parameter_set import Difference
 from backend.tools.procedures import describe

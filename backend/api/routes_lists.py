@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 
-from backend.api.context import TheBench, TheMember
+from backend.api.context import TheBench
 from backend.api.errors import NotFound
 from backend.api.models_description import ImportedList
 from backend.parameter_list import export_list, import_list
@@ -15,8 +15,17 @@ from backend.parameter_set import MAX_BYTES, BadSet
 from drivers.errors import NotAllowed
 from profiles import load_profile
 from profiles.loader import ProfileError
+from profiles.schema import Profile
 
 router = APIRouter()
+
+
+def _family(name: str) -> Profile:
+    try:
+        return load_profile(name)
+    except ProfileError as error:
+        raise NotFound(str(error), value=name) from error
+
 
 _MEDIA = {"csv": "text/csv; charset=utf-8", "dcf": "application/octet-stream"}
 
@@ -35,11 +44,11 @@ async def export_set(
     """
     try:
         content = bench.sets.load(file)
-        profile = load_profile(content.profile)
     except BadSet:
         raise
-    except (NotAllowed, ProfileError) as error:
-        raise NotFound(str(error), value=file) from error
+    except NotAllowed as error:
+        raise NotFound(error.message, value=file) from error
+    profile = _family(content.profile)
     stem = file.removesuffix(".sdset").encode("ascii", "replace").decode().replace("?", "_")
     name = f"{stem}.{kind}"
     return Response(
@@ -50,7 +59,7 @@ async def export_set(
 
 
 @router.post(
-    "/drives/{drive_id}/sets/list",
+    "/sets/list",
     status_code=201,
     openapi_extra={
         "requestBody": {
@@ -61,12 +70,12 @@ async def export_set(
 )
 async def store_list(
     bench: TheBench,
-    member: TheMember,
     request: Request,
+    profile: Annotated[str, Query(description="drive family that the list is of")],
     file: Annotated[str, Query(pattern=r"^[\w][\w .\-]{0,100}$", description="of the new set")],
     overwrite: bool = False,
 ) -> ImportedList:
-    """Store a CSV list or a DCF as a parameter set of this drive's family.
+    """Store a CSV list or a DCF as a parameter set of a drive family.
 
     Nothing is written to a drive: compare it first, as any other set.
     """
@@ -75,7 +84,7 @@ async def store_list(
         data += chunk
         if len(data) > MAX_BYTES:
             raise BadSet(f"{file} is larger than {MAX_BYTES} bytes", remedy="choose another file")
-    text, found = import_list(bytes(data), member.drive.profile, file, datetime.now(UTC))
+    text, found = import_list(bytes(data), _family(profile), file, datetime.now(UTC))
     stored = bench.sets.store(file, text, overwrite=overwrite)
     bench.journal.add(f"imported {stored}: {len(found.readings)} parameters")
     return ImportedList(

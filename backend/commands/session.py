@@ -10,8 +10,8 @@ from typing import TypeVar
 
 import typer
 
-from backend.bench import match_profiles
 from backend.drive import Drive, Port
+from backend.matching import match_profiles
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link, NeedsProfile
 from drivers.urls import link_for

@@ -24,10 +24,11 @@ from backend.analysis.design import (
     measured_plant,
     speed_loop,
 )
-from backend.axis import CLEANUP_TIMEOUT_S, Axis, Envelope, shielded
+from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.jobs import Progress
+from backend.restoring import CLEANUP_TIMEOUT_S, shielded
 from backend.tools import gains as gain_tool
 from backend.tools import inertia as inertia_tool
 from backend.tools import notch as notch_tool

@@ -17,10 +17,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis import Axis, Envelope, shielded
+from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.drive import Drive, address_of
 from backend.jobs import JobResult, Progress
+from backend.restoring import shielded
 from backend.tools.jog import Hold, JogSettings, require_scale
 from drivers import link as bus
 from drivers.cia402 import Mode, State

@@ -15,10 +15,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis import Axis, Envelope, shielded
+from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession, channel
 from backend.drive import address_of
 from backend.jobs import Progress
+from backend.restoring import shielded
 from drivers import link as bus
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 
-from backend.axis import CLEANUP_TIMEOUT_S, Axis, RestoreFailed, shielded
+from backend.axis import Axis
 from backend.jobs import Progress
+from backend.restoring import CLEANUP_TIMEOUT_S, RestoreFailed, shielded
 from backend.tools.procedures import run_procedure
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed

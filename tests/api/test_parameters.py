@@ -184,15 +184,19 @@ def test_a_set_goes_to_other_tools_and_comes_back(station: Station, x: str) -> N
         assert f'filename="for export.{kind}"' in exported.headers["content-disposition"]
         stored = station.ok(
             station.http.post(
-                f"/drives/{x}/sets/list", params={"file": f"as {kind}"}, content=exported.content
+                "/sets/list",
+                params={"file": f"as {kind}", "profile": "mms7"},
+                content=exported.content,
             )
         )
         assert (stored["parameters"], stored["problems"]) == (saved["count"], [])
         diff = station.ok(station.http.get(f"/drives/{x}/diff", params={"file": stored["file"]}))
         assert not [row["key"] for row in diff["rows"] if row["status"] != "same"]
     refused = station.http.post(
-        f"/drives/{x}/sets/list", params={"file": "none"}, content=b"hello,world\n"
+        "/sets/list", params={"file": "none", "profile": "mms7"}, content=b"hello,world\n"
     )
     assert refused.status_code == 409
     assert "has no value of" in refused.json()["detail"]
     assert station.http.get("/sets/missing.sdset/list").status_code == 404
+    unknown = station.http.post("/sets/list", params={"file": "n", "profile": "x"}, content=b"")
+    assert unknown.status_code == 404

@@ -7,8 +7,8 @@ import asyncio
 import pytest
 
 from backend.access import Leases
-from backend.axis import shielded
 from backend.jobs import JobRunner, Progress
+from backend.restoring import shielded
 from drivers.errors import Busy, LinkTimeout, OutOfRange
 
 

@@ -124,10 +124,12 @@ export function UploadSet({
       setList(null)
       if (drive && LIST.test(file.name)) {
         const stored = await ask(
-          api.POST('/api/v1/drives/{drive_id}/sets/list', {
+          api.POST('/api/v1/sets/list', {
             params: {
-              path: { drive_id: drive.id },
-              query: { file: file.name.replace(LIST, '').replace(/[^\w .-]/g, '_') },
+              query: {
+                profile: drive.profile,
+                file: file.name.replace(LIST, '').replace(/[^\w .-]/g, '_'),
+              },
             },
             body: file as never,
             bodySerializer: (body: unknown) => body as BodyInit,

@@ -1,0 +1,73 @@
+"""The list of a bench's drives in a file, so that a restarted server knows them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from backend.files import write_atomically
+
+VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class SavedPort:
+    """Where a drive is reached: bus URL and station address on it."""
+
+    url: str
+    station: int
+
+
+@dataclass(frozen=True, slots=True)
+class SavedDrive:
+    """A drive as it stands in the list; the first port is the one it was connected by."""
+
+    name: str
+    profile: str
+    ports: tuple[SavedPort, ...]
+    notes: str = ""
+    serial: int | None = None
+
+    def __post_init__(self) -> None:
+        if not self.ports:
+            raise ValueError("a drive needs at least one port")
+
+
+_DRIVE = TypeAdapter(SavedDrive)
+
+
+class DriveList:
+    """The file of this list."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def store(self, drives: Iterable[SavedDrive]) -> None:
+        """Replace the file, whole or not at all."""
+        content = {"version": VERSION, "drives": [asdict(drive) for drive in drives]}
+        text = json.dumps(content, indent=2, ensure_ascii=False)
+        write_atomically(self._path, text.encode())
+
+    def load(self) -> tuple[list[SavedDrive], list[str]]:
+        """The drives, and a sentence for each entry that is of no use; nothing where no file is."""
+        try:
+            content = json.loads(self._path.read_text("utf-8"))
+            entries = content["drives"]
+        except FileNotFoundError:
+            return [], []
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            return [], [f"{self._path.name} cannot be read: {error}"]
+        drives: list[SavedDrive] = []
+        problems: list[str] = []
+        for number, entry in enumerate(entries if isinstance(entries, list) else [], start=1):
+            try:
+                drives.append(_DRIVE.validate_python(entry))
+            except ValidationError as error:
+                first = error.errors()[0]
+                place = ".".join(str(part) for part in first["loc"])
+                problems.append(f"{self._path.name}, drive {number}: {place}: {first['msg']}")
+        return drives, problems

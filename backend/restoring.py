@@ -1,0 +1,113 @@
+"""Parameters that must be put back, and cleanups that nothing may interrupt."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+
+from backend.drive import Drive
+from drivers.errors import DriveError, LinkTimeout
+from profiles.schema import Raw
+
+#: Deadline of a cleanup.
+CLEANUP_TIMEOUT_S = 5.0
+
+
+class RestoreFailed(DriveError):
+    """A cleanup could not put something back; the message lists what."""
+
+    kind = "restore-failed"
+
+
+@asynccontextmanager
+async def restoring(drive: Drive, *keys: str) -> AsyncIterator[dict[str, Raw]]:
+    """Put these parameters back to what they are now, on every exit.
+
+    Raises:
+        RestoreFailed: on leaving, naming what could not be put back.
+    """
+    before: dict[str, Raw] = {}
+    for key in keys:
+        reading = await drive.read(key)
+        if reading.raw is not None:
+            before[key] = reading.raw
+    try:
+        yield before
+    except BaseException as error:
+        await _put_back(drive, before, error)
+        raise
+    else:
+        await _put_back(drive, before, None)
+
+
+async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException | None) -> None:
+    """Restore; what failed before is told as well, it may be an inner restore."""
+    name = drive.name
+    try:
+        await shielded(lambda: _restore(drive, before), CLEANUP_TIMEOUT_S, name)
+    except DriveError as error:
+        if not isinstance(error, RestoreFailed):
+            values = ", ".join(f"{key} (was {raw})" for key, raw in before.items())
+            error = RestoreFailed(
+                f"{name}: perhaps not restored: {values}: {error.message}",
+                drive=name,
+                remedy="compare these values before the next motion",
+            )
+        if isinstance(earlier, DriveError):
+            error.message = f"{earlier.message}; {error.message}"
+            error.args = (error.message,)
+        raise error from earlier
+
+
+async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
+    failed: list[str] = []
+    same = False
+    for key, raw in before.items():
+        try:
+            if (await drive.read(key)).raw != raw:
+                if not same:
+                    # The link may have been lost in between, and another drive be there now.
+                    await drive.confirm_identity()
+                    same = True
+                await drive.write(key, raw)
+        except DriveError as error:
+            failed.append(f"{key} (was {raw}): {error.message}")
+    if failed:
+        raise RestoreFailed(
+            f"{drive.name}: not restored: {'; '.join(failed)}",
+            drive=drive.name,
+            remedy="write these values by hand before the next motion",
+        )
+
+
+async def shielded(cleanup: Callable[[], Awaitable[None]], timeout_s: float, drive: str) -> None:
+    """Run a cleanup to its end even when the surrounding task is cancelled again.
+
+    Raises:
+        LinkTimeout: the cleanup itself took longer than ``timeout_s``.
+    """
+
+    async def bounded() -> None:
+        try:
+            async with asyncio.timeout(timeout_s):
+                await cleanup()
+        except TimeoutError as error:
+            raise LinkTimeout(
+                f"{drive}: restoring took longer than {timeout_s:g} s and was given up",
+                drive=drive,
+                remedy="check the axis: mode, torque limit and power state may not be restored",
+            ) from error
+
+    task = asyncio.create_task(bounded())
+    cancelled: asyncio.CancelledError | None = None
+    while not task.done():
+        try:
+            await asyncio.shield(task)
+        except asyncio.CancelledError as error:
+            cancelled = error
+        except DriveError:
+            break
+    if cancelled is not None and task.exception() is None:
+        raise cancelled
+    task.result()

@@ -1,0 +1,44 @@
+"""The list of drives over restarts: nothing lost, one bad entry spoils only itself."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from backend.drive_list import DriveList, SavedDrive, SavedPort
+
+X = SavedDrive("X", "mms7", (SavedPort("mlink:///dev/ttyUSB0", 1),), "left", 77)
+Z = SavedDrive(
+    "Z 轴", "ds_c", (SavedPort("canopen://can0", 3), SavedPort("modbus:///dev/ttyUSB1", 3))
+)
+
+
+def test_what_is_stored_is_loaded(tmp_path: Path) -> None:
+    drives = DriveList(tmp_path / "bench.json")
+    assert drives.load() == ([], [])
+    drives.store([X, Z])
+    assert DriveList(tmp_path / "bench.json").load() == ([X, Z], [])
+
+
+def test_a_bad_entry_spoils_only_itself(tmp_path: Path) -> None:
+    path = tmp_path / "bench.json"
+    drives = DriveList(path)
+    drives.store([X, Z])
+    content = json.loads(path.read_text("utf-8"))
+    content["drives"][0]["ports"][0]["station"] = "one"
+    content["drives"].insert(0, {"name": "no ports", "profile": "mms7", "ports": []})
+    content["drives"].append("what")
+    path.write_text(json.dumps(content), "utf-8")
+    loaded, problems = drives.load()
+    assert loaded == [Z]
+    assert len(problems) == 3
+    assert "drive 2: ports.0.station" in problems[1]
+
+
+def test_a_damaged_file_is_told_and_not_fatal(tmp_path: Path) -> None:
+    path = tmp_path / "bench.json"
+    for text in ("", "[1]", '{"version": 1}', "\x00"):
+        path.write_text(text, "utf-8")
+        loaded, problems = DriveList(path).load()
+        assert (loaded, len(problems)) == ([], 1)
+        assert "bench.json cannot be read" in problems[0]
