@@ -4,30 +4,79 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
-from drivers.errors import Busy
+from drivers.errors import Busy, NotAllowed
+
+#: A request that the holder does not answer passes control on after this long, if nothing moves.
+ANSWER_WITHIN_S = 30.0
+LONGEST_HAND_OVER_S = 8 * 3600.0
 
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """Who controls an axis. ``connection`` is the live websocket, ``since`` epoch seconds."""
+    """Who controls an axis. ``connection`` is the live websocket, ``since`` epoch seconds.
+
+    ``until`` ends a hand-over for a time (epoch seconds); then the axis goes back to ``giver``.
+    """
 
     connection: str
     person: str
     since: float
+    until: float | None = None
+    giver: Holder | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A request for control; epoch seconds. ``until`` is when silence counts as consent."""
+
+    connection: str
+    person: str
+    since: float
+    until: float
+
+
+NoticeKind = Literal["asked", "refused", "given", "overridden", "returned", "expired", "lost"]
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something that the person at ``connection`` must be told of. ``person`` is the other one."""
+
+    connection: str
+    drive: str
+    kind: NoticeKind
+    person: str
 
 
 class Leases:
     """Who may write to and move which axis. STOP never asks here."""
 
-    def __init__(self, changed: Callable[[str], None] = lambda _drive: None) -> None:
+    def __init__(
+        self,
+        changed: Callable[[str], None] = lambda _drive: None,
+        clock: Callable[[], float] = time.time,
+    ) -> None:
         self._holders: dict[str, Holder] = {}
+        self._asked: dict[str, Asked] = {}
         self._changed = changed
+        self._clock = clock
+        #: Called with what somebody must be told of.
+        self.on_notice: list[Callable[[Notice], None]] = []
 
     def holder(self, drive: str) -> Holder | None:
         """The present holder, or None while the axis is free."""
         return self._holders.get(drive)
+
+    def asked(self, drive: str) -> Asked | None:
+        """Who asks for control and waits for an answer, or None."""
+        return self._asked.get(drive)
+
+    def held_by(self, connection: str) -> list[str]:
+        """Axes that this connection holds."""
+        return [d for d, h in self._holders.items() if h.connection == connection]
 
     def take(self, drive: str, connection: str, person: str) -> Holder:
         """Take a free axis; taking again is fine.
@@ -38,17 +87,22 @@ class Leases:
         self.require(drive, connection)
         holder = self._holders.get(drive)
         if holder is None:
-            holder = Holder(connection, person, time.time())
-            self._holders[drive] = holder
-            self._changed(drive)
+            holder = self._set(drive, Holder(connection, person, self._clock()))
         return holder
 
     def give(self, drive: str, connection: str) -> None:
         """Give an axis back; does nothing for one that is not held by this connection."""
         holder = self._holders.get(drive)
-        if holder is not None and holder.connection == connection:
-            del self._holders[drive]
-            self._changed(drive)
+        if holder is None or holder.connection != connection:
+            return
+        asked = self._asked.get(drive)
+        if asked is not None:
+            self._set(drive, Holder(asked.connection, asked.person, self._clock()))
+            self._tell(asked.connection, drive, "given", holder.person)
+        elif holder.giver is not None:
+            self._return(drive, holder)
+        else:
+            self._free(drive)
 
     def require(self, drive: str, connection: str | None) -> None:
         """A change is allowed on a free axis and on one's own.
@@ -64,10 +118,134 @@ class Leases:
                 remedy="ask for control; STOP works for everyone",
             )
 
-    def drop(self, connection: str) -> list[str]:
-        """The connection is gone: its axes are free. Returns their ids."""
-        dropped = [d for d, h in self._holders.items() if h.connection == connection]
-        for drive in dropped:
-            del self._holders[drive]
+    # --- asking and handing over ------------------------------------------------------
+
+    def ask(self, drive: str, connection: str, person: str) -> None:
+        """Ask the holder for control; a free axis is taken at once.
+
+        Raises:
+            Busy: somebody else is asking already.
+        """
+        holder = self._holders.get(drive)
+        if holder is None:
+            self.take(drive, connection, person)
+            return
+        if holder.connection == connection:
+            return
+        other = self._asked.get(drive)
+        if other is not None and other.connection != connection:
+            raise Busy(
+                f"{other.person} is already asking for control",
+                drive=drive,
+                remedy="wait for the answer",
+            )
+        if other is None:
+            now = self._clock()
+            self._asked[drive] = Asked(connection, person, now, now + ANSWER_WITHIN_S)
+            self._tell(holder.connection, drive, "asked", person)
             self._changed(drive)
+
+    def refuse(self, drive: str, connection: str) -> None:
+        """The holder keeps control."""
+        holder, asked = self._holders.get(drive), self._asked.get(drive)
+        if holder is not None and asked is not None and holder.connection == connection:
+            del self._asked[drive]
+            self._tell(asked.connection, drive, "refused", holder.person)
+            self._changed(drive)
+
+    def hand(
+        self, drive: str, connection: str, to: str, person: str, time_s: float | None = None
+    ) -> None:
+        """Hand control to another connection, for a time or for good.
+
+        Raises:
+            NotAllowed: one does not hold it, or the time is none.
+        """
+        holder = self._holders.get(drive)
+        if holder is None or holder.connection != connection:
+            raise NotAllowed(
+                "only who has control can hand it over", drive=drive, remedy="take control first"
+            )
+        if time_s is not None and not 1.0 <= time_s <= LONGEST_HAND_OVER_S:
+            raise NotAllowed(
+                "a hand-over lasts 1 s to 8 h", value=time_s, limit=f"{LONGEST_HAND_OVER_S:.0f} s"
+            )
+        if to == connection:
+            return
+        now = self._clock()
+        until = None if time_s is None else now + time_s
+        # Back to whoever gave it first: a chain of loans would end nobody knows where.
+        giver = None if time_s is None else holder.giver or holder
+        self._set(drive, Holder(to, person, now, until, giver))
+        self._tell(to, drive, "given", holder.person)
+
+    def override(self, drive: str, connection: str, person: str) -> None:
+        """Take control from whoever has it. The caller has the right and has stopped the axis."""
+        before = self._holders.get(drive)
+        if before is not None and before.connection == connection:
+            return
+        self._set(drive, Holder(connection, person, self._clock()))
+        if before is not None:
+            self._tell(before.connection, drive, "overridden", person)
+
+    # --- what ends by itself ----------------------------------------------------------
+
+    def drop(self, connection: str) -> list[str]:
+        """The connection is gone: what it held is free, or goes back. Returns those ids."""
+        dropped = self.held_by(connection)
+        for drive, asked in list(self._asked.items()):
+            if asked.connection == connection:
+                del self._asked[drive]
+                self._changed(drive)
+        for drive, holder in list(self._holders.items()):
+            if holder.giver is not None and holder.giver.connection == connection:
+                self._holders[drive] = replace(holder, giver=None)
+        for drive in dropped:
+            self.give(drive, connection)
         return dropped
+
+    def lose(self, connection: str) -> list[str]:
+        """Like `drop`, for a connection that is silent but not closed; it is told."""
+        dropped = self.drop(connection)
+        for drive in dropped:
+            self._tell(connection, drive, "lost", "")
+        return dropped
+
+    def tick(self, moves: Callable[[str], bool]) -> None:
+        """Let hand-overs and requests end whose time has come, where nothing moves."""
+        now = self._clock()
+        for drive, holder in list(self._holders.items()):
+            if holder.until is not None and now >= holder.until and not moves(drive):
+                self._tell(holder.connection, drive, "expired", "")
+                if holder.giver is None:
+                    self._free(drive)
+                else:
+                    self._return(drive, holder)
+        for drive, asked in list(self._asked.items()):
+            held = self._holders.get(drive)
+            if held is not None and now >= asked.until and not moves(drive):
+                self._set(drive, Holder(asked.connection, asked.person, now))
+                self._tell(held.connection, drive, "overridden", asked.person)
+                self._tell(asked.connection, drive, "given", held.person)
+
+    def _return(self, drive: str, holder: Holder) -> None:
+        giver = holder.giver
+        if giver is None:
+            raise ValueError("nobody to return it to")
+        self._set(drive, Holder(giver.connection, giver.person, self._clock()))
+        self._tell(giver.connection, drive, "returned", holder.person)
+
+    def _set(self, drive: str, holder: Holder) -> Holder:
+        self._holders[drive] = holder
+        self._asked.pop(drive, None)
+        self._changed(drive)
+        return holder
+
+    def _free(self, drive: str) -> None:
+        del self._holders[drive]
+        self._asked.pop(drive, None)
+        self._changed(drive)
+
+    def _tell(self, connection: str, drive: str, kind: NoticeKind, person: str) -> None:
+        for listener in self.on_notice:
+            listener(Notice(connection, drive, kind, person))

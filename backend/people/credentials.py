@@ -1,0 +1,67 @@
+"""Secrets and names: what is made, what is kept of it, and how it is compared."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import secrets
+import unicodedata
+
+from drivers.errors import NotAllowed
+
+#: Letters and digits that are not taken for one another when read aloud or copied by hand.
+_CLEAR = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
+
+
+def new_secret(prefix: str = "") -> str:
+    """32 random bytes, as text."""
+    return prefix + secrets.token_urlsafe(32)
+
+
+def digest(secret: str) -> str:
+    """What is kept of a cookie or token: both are 32 random bytes, so one hash is enough."""
+    return hashlib.sha256(secret.encode()).hexdigest()
+
+
+def csrf_of(secret: str) -> str:
+    """The token that a page sends with every change; it follows from the cookie, not vice versa."""
+    return hmac.new(secret.encode(), b"servodeck csrf", hashlib.sha256).hexdigest()
+
+
+def spoken_code(groups: int) -> str:
+    """A code to be read aloud: groups of four clear signs, 19.8 bits each."""
+    parts = ("".join(secrets.choice(_CLEAR) for _ in range(4)) for _ in range(groups))
+    return "-".join(parts)
+
+
+def same_code(given: str, code: str) -> bool:
+    """Whether somebody typed this code, however they wrote dashes, spaces and case."""
+
+    def plain(text: str) -> bytes:
+        return "".join(sign for sign in text.upper() if sign.isalnum()).encode()
+
+    return hmac.compare_digest(plain(given), plain(code))
+
+
+def name_key(name: str) -> str:
+    """Names that look the same are the same."""
+    return unicodedata.normalize("NFKC", name).casefold()
+
+
+def checked_person(name: str) -> str:
+    """A name of 1 to 60 printable signs, no spaces around it.
+
+    Raises:
+        NotAllowed: anything else.
+    """
+    name = unicodedata.normalize("NFC", name).strip()
+    if not 1 <= len(name) <= 60 or not name.isprintable():
+        raise NotAllowed(
+            "this is not a name", limit="1 to 60 printable signs", remedy="choose another name"
+        )
+    return name
+
+
+def same_text(given: str, kept: str) -> bool:
+    """Comparison whose time tells nothing."""
+    return hmac.compare_digest(given.encode(), kept.encode())

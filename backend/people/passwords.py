@@ -1,0 +1,53 @@
+"""Passwords: what is accepted, and how they are kept (argon2id)."""
+
+from __future__ import annotations
+
+from argon2 import PasswordHasher
+from argon2.exceptions import InvalidHashError, VerificationError
+
+from drivers.errors import NotAllowed
+
+MIN_LENGTH = 10
+MAX_LENGTH = 200
+
+#: One lane: hashing must not take both cores from a cyclic exchange. 64 MiB and three passes
+#: are the second choice of RFC 9106 clause 4, which asks for four lanes.
+DEFAULT = PasswordHasher(time_cost=3, memory_cost=64 * 1024, parallelism=1)
+
+
+class Passwords:
+    """Hashes and verifies. Both take tens of milliseconds and belong on a thread."""
+
+    def __init__(self, hasher: PasswordHasher = DEFAULT) -> None:
+        self._hasher = hasher
+        #: Verified where no such account exists, so that the answer takes as long.
+        self.decoy = hasher.hash("no account has this password")
+
+    def hash(self, password: str) -> str:
+        """The string to keep."""
+        return self._hasher.hash(password)
+
+    def verify(self, kept: str, password: str) -> bool:
+        """Whether this is the password."""
+        try:
+            return self._hasher.verify(kept, password)
+        except (VerificationError, InvalidHashError):
+            return False
+
+
+def require_good(password: str, name: str) -> None:
+    """Length, and not the name; no rules about character classes (NIST SP 800-63B 5.1.1.2).
+
+    Raises:
+        NotAllowed: too short, too long, the name, or one sign over and over.
+    """
+    if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
+        raise NotAllowed(
+            f"a password needs {MIN_LENGTH} to {MAX_LENGTH} characters",
+            limit=f"{MIN_LENGTH} to {MAX_LENGTH} characters",
+            remedy="several words make a good one",
+        )
+    if name and name.casefold() in password.casefold() and len(password) < len(name) + 6:
+        raise NotAllowed("the password is the name", remedy="choose something else")
+    if len(set(password)) < 4:
+        raise NotAllowed("the password repeats itself", remedy="several words make a good one")

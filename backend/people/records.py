@@ -1,0 +1,95 @@
+"""What is kept of people, and reading it from the database."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from sqlalchemy import select
+
+from backend.people.rights import Right, Role
+from backend.people.tables import AccountRow, SessionRow, TokenRow
+from backend.store import Store
+
+#: A session ends this long after its last use, and at the latest this long after the log-in.
+IDLE = timedelta(hours=2)
+LONGEST = timedelta(hours=12)
+#: A session that has ended can still press STOP for so long (its page may not know yet).
+REMEMBERED = timedelta(hours=24)
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """Somebody who may log in."""
+
+    id: int
+    name: str
+    role: Role
+    password: str
+    created: datetime
+
+
+@dataclass(frozen=True, slots=True)
+class LoginSession:
+    """A log-in; ``id`` is the hash of the cookie."""
+
+    id: str
+    account: int
+    created: datetime
+    used: datetime
+    client: str
+
+    @property
+    def expires(self) -> datetime:
+        """When it ends if it is not used any more."""
+        return min(self.used + IDLE, self.created + LONGEST)
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """A token for scripts; ``id`` is the hash of the token."""
+
+    id: str
+    account: int
+    name: str
+    scopes: frozenset[Right]
+    created: datetime
+    expires: datetime
+
+
+@dataclass(frozen=True, slots=True)
+class Records:
+    """Everything that is kept, by its key."""
+
+    accounts: dict[int, Account]
+    sessions: dict[str, LoginSession]
+    tokens: dict[str, Token]
+
+
+def read(store: Store) -> Records:
+    """All records. Blocks.
+
+    Raises:
+        DatabaseFailed: the database cannot be read.
+    """
+    with store.reading() as database:
+        accounts = {
+            row.id: Account(row.id, row.name, Role(row.role), row.password, row.created)
+            for row in database.scalars(select(AccountRow))
+        }
+        sessions = {
+            row.id: LoginSession(row.id, row.account_id, row.created, row.used, row.client)
+            for row in database.scalars(select(SessionRow))
+        }
+        tokens = {
+            row.id: Token(
+                row.id,
+                row.account_id,
+                row.name,
+                frozenset(Right(scope) for scope in row.scopes.split()),
+                row.created,
+                row.expires,
+            )
+            for row in database.scalars(select(TokenRow))
+        }
+    return Records(accounts, sessions, tokens)

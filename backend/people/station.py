@@ -1,0 +1,112 @@
+"""The people of one station together: who a request comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from backend.people.accounts import Accounts
+from backend.people.identity import LOCAL, Identity
+from backend.people.passwords import Passwords
+from backend.people.records import Account, LoginSession
+from backend.people.rights import RIGHTS
+from backend.people.support import Support
+from backend.store import Store
+from drivers.errors import NotAllowed
+
+
+class People:
+    """Accounts and guests. Without ``accounts_needed`` whoever reaches the server is the one user.
+
+    That is right only on the machine's own loopback; `backend.commands.serve` sees to it.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        accounts_needed: bool = False,
+        passwords: Passwords | None = None,
+    ) -> None:
+        self.accounts_needed = accounts_needed
+        self._store = Store(folder)
+        #: Called with the id of a session, token or guest that is over.
+        self.on_ended: list[Callable[[str], None]] = []
+        self.accounts = Accounts(self._store, passwords or Passwords(), ended=self._ended)
+        self.support = Support()
+        self.support.on_ended.append(self._ended)
+
+    async def open(self) -> None:
+        """Read the accounts, where there are any to be asked for."""
+        if self.accounts_needed:
+            await self.accounts.open()
+
+    def close(self) -> None:
+        """Let go of the database."""
+        self._store.close()
+
+    @property
+    def setup_needed(self) -> bool:
+        """Whether the first administrator is still to be made."""
+        return self.accounts_needed and not self.accounts.is_set_up
+
+    def identify(self, cookie: str | None, bearer: str | None) -> Identity | None:
+        """Who has this cookie or token, with the rights of this moment; None for nobody."""
+        if not self.accounts_needed:
+            return LOCAL
+        if bearer is not None:
+            known = self.accounts.token(bearer)
+            if known is None:
+                return None
+            owner, token = known
+            rights = token.scopes & RIGHTS[owner.role]
+            return Identity(f"{owner.name} ({token.name})", owner.role, "token", token.id, rights)
+        if cookie is None:
+            return None
+        found = self.accounts.session(cookie)
+        if found is not None:
+            account, session, alive = found
+            if not alive:
+                return None
+            self.accounts.use(session)
+            return _of_session(account, session)
+        return self.support.guest(cookie)
+
+    def renewed(self, identity: Identity) -> Identity | None:
+        """The same person with the rights of this moment; None when their session is over."""
+        match identity.kind:
+            case "local":
+                return identity
+            case "guest":
+                found = self.support.of_session(identity.session)
+                return None if found is None else self.support.identity(found)
+            case "session" | "token":
+                return self.accounts.renewed(identity)
+
+    def may_stop(self, cookie: str | None) -> Identity | None:
+        """Somebody who was logged in until lately: their page still shows STOP, and it works."""
+        found = None if cookie is None else self.accounts.session(cookie)
+        if found is None:
+            return None
+        account, session, _ = found
+        return Identity(account.name, account.role, "session", session.id, frozenset())
+
+    def require_accounts(self) -> None:
+        """Whoever may come from afar must be told apart.
+
+        Raises:
+            NotAllowed: this station has no accounts.
+        """
+        if not self.accounts_needed:
+            raise NotAllowed(
+                "this station runs without accounts, so that a guest could not be told from you",
+                remedy="start it with `servodeck serve --accounts`",
+            )
+
+    def _ended(self, session: str) -> None:
+        for listener in self.on_ended:
+            listener(session)
+
+
+def _of_session(account: Account, session: LoginSession) -> Identity:
+    return Identity(account.name, account.role, "session", session.id, RIGHTS[account.role])

@@ -1,0 +1,399 @@
+"""Remote support: invitations, guests, grants for minutes, and the enabling button on site.
+
+Nothing here outlives the server: a restart ends every invitation. A guest looks; more only while
+a grant of the person on site runs, and nothing that moves metal unless that person holds the
+enabling button at that moment.
+"""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from backend.people.credentials import checked_person, digest, new_secret, same_code, spoken_code
+from backend.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
+from backend.people.identity import Identity
+from backend.people.rights import GRANTABLE, MOVING, RIGHTS, Right, Role
+from backend.people.throttle import Throttle
+from drivers.errors import NotAllowed
+
+#: The enabling button counts as released this long after the last sign of life. With the 20 ms
+#: between looks (`backend.api.live_people`) a silent page stops the motion within 200 ms.
+ENABLING_TIMEOUT_S = 0.17
+LONGEST_INVITATION_S = 24 * 3600.0
+LONGEST_GRANT_S = 8 * 3600.0
+#: Wrong codes that end an invitation.
+CODE_TRIES = 5
+MOST_OPEN = 20
+CHAT_KEPT = 200
+CHAT_LENGTH = 500
+
+State = Literal["open", "joined", "ended"]
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """What a guest may do beyond looking, until when (epoch seconds), and on which axis.
+
+    ``drive`` None is every axis.
+    """
+
+    rights: frozenset[Right]
+    until: float
+    drive: str | None
+    by: str
+
+
+@dataclass(slots=True)
+class Invitation:
+    """One guest. ``expires`` in epoch seconds; ``allowed`` bounds what grants may give."""
+
+    id: str
+    guest: str
+    allowed: frozenset[Right]
+    by: str
+    created: float
+    expires: float
+    code: str
+    link: str
+    """Hash of the secret in the link."""
+    state: State = "open"
+    session: str = ""
+    """Hash of the guest's cookie, once joined."""
+    grant: Grant | None = None
+    tries: int = 0
+    why_ended: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A line of the chat; epoch seconds."""
+
+    number: int
+    time: float
+    person: str
+    guest: bool
+    text: str
+
+
+class Support:
+    """Invitations of a station. ``clock`` is epoch seconds, ``ticks`` the monotonic clock."""
+
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.time,
+        ticks: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._clock, self._ticks = clock, ticks
+        self._invitations: dict[str, Invitation] = {}
+        self._throttle = Throttle(10, ticks)
+        #: Invitation to the on-site connection that holds the button, and when it was last heard.
+        self._holds: dict[str, tuple[str, float]] = {}
+        self._chat: deque[Said] = deque(maxlen=CHAT_KEPT)
+        self._said = 0
+        #: Called after any change that a list of invitations shows.
+        self.on_change: list[Callable[[], None]] = []
+        #: Called with a guest's session when it is over, and when their grant or hold is.
+        self.on_ended: list[Callable[[str], None]] = []
+        self.on_disabled: list[Callable[[Invitation, str], None]] = []
+
+    # --- invitations ------------------------------------------------------------------
+
+    def all(self) -> list[Invitation]:
+        """Invitations of this session of the server, newest first."""
+        return sorted(self._invitations.values(), key=lambda i: i.created, reverse=True)
+
+    def find(self, invitation_id: str) -> Invitation:
+        """The invitation of this id.
+
+        Raises:
+            NoSuchPerson: there is none.
+        """
+        found = self._invitations.get(invitation_id)
+        if found is None:
+            raise NoSuchPerson("there is no such invitation", value=invitation_id)
+        return found
+
+    def invite(
+        self, by: str, guest: str, allowed: frozenset[Right], lifetime_s: float
+    ) -> tuple[str, Invitation]:
+        """A new invitation. Returns the secret of its link, which is not kept.
+
+        Raises:
+            NotAllowed: too long a life, something that no guest may do, or too many are open.
+        """
+        guest = checked_person(guest)
+        if not 60.0 <= lifetime_s <= LONGEST_INVITATION_S:
+            raise NotAllowed(
+                "an invitation lasts a minute to a day",
+                value=lifetime_s,
+                limit=f"60 to {LONGEST_INVITATION_S:.0f} s",
+            )
+        if beyond := allowed - GRANTABLE:
+            raise NotAllowed(
+                f"no guest may have {', '.join(sorted(beyond))}", limit=", ".join(sorted(GRANTABLE))
+            )
+        if sum(i.state != "ended" for i in self._invitations.values()) >= MOST_OPEN:
+            raise NotAllowed(
+                f"{MOST_OPEN} invitations are open", remedy="end those that are not needed"
+            )
+        secret, now = new_secret(), self._clock()
+        made = Invitation(
+            id=secrets.token_hex(6),
+            guest=guest,
+            allowed=allowed,
+            by=by,
+            created=now,
+            expires=now + lifetime_s,
+            code=spoken_code(2),
+            link=digest(secret),
+        )
+        self._invitations[made.id] = made
+        self._drop_old()
+        self._changed()
+        return secret, made
+
+    def join(self, link: str, code: str, address: str) -> tuple[str, Invitation]:
+        """Come in by a link and its code. Returns the cookie and the invitation.
+
+        Raises:
+            NotLoggedIn: link or code is wrong, used or over. TooOften: too many tries.
+        """
+        wait = self._throttle.wait_s(address)
+        if wait > 0:
+            raise TooOften("too many wrong tries", wait)
+        self.tick()
+        hashed = digest(link)
+        found = next((i for i in self._invitations.values() if i.link == hashed), None)
+        if found is None or found.state != "open":
+            self._throttle.failed(address)
+            raise NotLoggedIn(
+                "this invitation is not valid, or was used already", remedy="ask for a new one"
+            )
+        if not same_code(code, found.code):
+            self._throttle.failed(address)
+            found.tries += 1
+            if found.tries >= CODE_TRIES:
+                self._end(found, "too many wrong codes")
+            raise NotLoggedIn("the code is wrong", remedy="ask the person on site for it")
+        secret = new_secret()
+        found.state, found.session = "joined", digest(secret)
+        self._changed()
+        return secret, found
+
+    def revoke(self, invitation_id: str, why: str) -> Invitation:
+        """End an invitation; its guest is out at once."""
+        found = self.find(invitation_id)
+        self._end(found, why)
+        return found
+
+    # --- guests -----------------------------------------------------------------------
+
+    def guest(self, secret: str) -> Identity | None:
+        """Who has this cookie, with the rights of this moment."""
+        found = self.of_session(digest(secret))
+        return None if found is None else self.identity(found)
+
+    def of_session(self, session: str) -> Invitation | None:
+        """The joined invitation of a guest's session, None once it is over."""
+        return next(
+            (
+                i
+                for i in self._invitations.values()
+                if i.session == session and i.state == "joined" and self._clock() < i.expires
+            ),
+            None,
+        )
+
+    def identity(self, found: Invitation) -> Identity:
+        """A guest with the rights of this moment; without the button nothing that moves."""
+        grant = self._running(found)
+        rights = RIGHTS[Role.GUEST] | (grant.rights if grant is not None else frozenset())
+        return Identity(f"{found.guest} (guest)", Role.GUEST, "guest", found.session, rights)
+
+    def require(self, identity: Identity, right: Right, drive: str | None) -> None:
+        """A guest may do this now: granted, for this axis, and the button held if it moves.
+
+        Raises:
+            Forbidden: says what is missing.
+        """
+        found = self.of_session(identity.session)
+        grant = None if found is None else self._running(found)
+        if found is None or grant is None or right not in grant.rights:
+            raise Forbidden(
+                f"a guest may not do this without a grant ({right})",
+                drive=drive,
+                remedy="ask the person on site to grant control",
+            )
+        if grant.drive is not None and drive != grant.drive:
+            raise Forbidden(
+                "the grant is for another axis", drive=drive, remedy="ask for this axis too"
+            )
+        if right in MOVING and not self.enabled(found.id):
+            raise Forbidden(
+                "the person on site does not hold the enabling button",
+                drive=drive,
+                remedy="ask them to hold it, then try again",
+            )
+
+    # --- grants -----------------------------------------------------------------------
+
+    def grant(
+        self,
+        invitation_id: str,
+        by: str,
+        rights: frozenset[Right],
+        time_s: float,
+        drive: str | None,
+    ) -> Invitation:
+        """Let a guest do more for a while; replaces an earlier grant.
+
+        Raises:
+            NotAllowed: the guest is not here, or the invitation does not allow it.
+        """
+        found = self.find(invitation_id)
+        if found.state != "joined":
+            raise NotAllowed(f"{found.guest} is not here", remedy="wait until they have joined")
+        if beyond := rights - found.allowed:
+            raise NotAllowed(
+                f"the invitation does not allow {', '.join(sorted(beyond))}",
+                limit=", ".join(sorted(found.allowed)) or "look only",
+                remedy="end it and make one that does",
+            )
+        if not rights or not 10.0 <= time_s <= LONGEST_GRANT_S:
+            raise NotAllowed(
+                "a grant names a right and lasts 10 s to 8 h",
+                value=time_s,
+                limit=f"10 to {LONGEST_GRANT_S:.0f} s",
+            )
+        found.grant = Grant(rights, self._clock() + time_s, drive, by)
+        self._changed()
+        return found
+
+    def withdraw(self, invitation_id: str, why: str) -> Invitation:
+        """End a grant; what the guest moves is stopped."""
+        found = self.find(invitation_id)
+        if found.grant is not None:
+            found.grant = None
+            self._disable(found, why)
+            self._changed()
+        return found
+
+    def _running(self, found: Invitation) -> Grant | None:
+        grant = found.grant
+        return grant if grant is not None and self._clock() < grant.until else None
+
+    # --- the enabling button ----------------------------------------------------------
+
+    def press(self, invitation_id: str, connection: str) -> None:
+        """The person on site presses the button for this guest.
+
+        Raises:
+            NotAllowed: no grant runs that moves something.
+        """
+        found = self.find(invitation_id)
+        grant = self._running(found)
+        if grant is None or not grant.rights & MOVING:
+            raise NotAllowed(
+                f"{found.guest} has no grant to move anything", remedy="grant measure or motion"
+            )
+        self._holds[invitation_id] = (connection, self._ticks())
+        self._changed()
+
+    def renew(self, invitation_id: str, connection: str) -> None:
+        """The button is still held. What has expired is not revived."""
+        hold = self._holds.get(invitation_id)
+        if hold is not None and hold[0] == connection and self.enabled(invitation_id):
+            self._holds[invitation_id] = (connection, self._ticks())
+
+    def release(self, invitation_id: str, connection: str, why: str) -> None:
+        """The button was let go, or what amounts to it."""
+        hold = self._holds.get(invitation_id)
+        if hold is not None and hold[0] == connection:
+            self._drop_hold(invitation_id, why)
+
+    def release_all(self, connection: str, why: str) -> None:
+        """The on-site page is gone."""
+        for invitation_id, (holder, _) in list(self._holds.items()):
+            if holder == connection:
+                self._drop_hold(invitation_id, why)
+
+    def enabled(self, invitation_id: str) -> bool:
+        """Whether the button is held at this moment."""
+        hold = self._holds.get(invitation_id)
+        return hold is not None and self._ticks() - hold[1] <= ENABLING_TIMEOUT_S
+
+    @property
+    def any_hold(self) -> bool:
+        """Whether a button is held, so that somebody must watch it."""
+        return bool(self._holds)
+
+    def watch(self) -> None:
+        """Every 20 ms while a button is held: notice that its page has fallen silent."""
+        for invitation_id in list(self._holds):
+            if not self.enabled(invitation_id):
+                self._drop_hold(invitation_id, "no sign of life from the page on site")
+
+    def _drop_hold(self, invitation_id: str, why: str) -> None:
+        if self._holds.pop(invitation_id, None) is not None:
+            self._disable(self._invitations[invitation_id], why)
+            self._changed()
+
+    # --- chat -------------------------------------------------------------------------
+
+    def say(self, identity: Identity, text: str) -> Said:
+        """A line for everybody on the station.
+
+        Raises:
+            NotAllowed: nothing, or too long.
+        """
+        text = text.strip()
+        if not 1 <= len(text) <= CHAT_LENGTH:
+            raise NotAllowed("a line has 1 to 500 signs", limit=f"{CHAT_LENGTH} signs")
+        self._said += 1
+        said = Said(self._said, self._clock(), identity.person, identity.is_guest, text)
+        self._chat.append(said)
+        return said
+
+    def chat(self) -> list[Said]:
+        """The last lines, oldest first."""
+        return list(self._chat)
+
+    # --- what ends by itself ----------------------------------------------------------
+
+    def tick(self) -> None:
+        """Let invitations and grants end whose time has come."""
+        now = self._clock()
+        for found in list(self._invitations.values()):
+            if found.state != "ended" and now >= found.expires:
+                self._end(found, "expired")
+            elif found.grant is not None and now >= found.grant.until:
+                self.withdraw(found.id, "the grant is over")
+
+    def _end(self, found: Invitation, why: str) -> None:
+        if found.state == "ended":
+            return
+        session, found.state, found.why_ended, found.grant = found.session, "ended", why, None
+        if self._holds.pop(found.id, None) is not None or session:
+            self._disable(found, why)
+        if session:
+            for listener in self.on_ended:
+                listener(session)
+        self._changed()
+
+    def _disable(self, found: Invitation, why: str) -> None:
+        for listener in self.on_disabled:
+            listener(found, why)
+
+    def _drop_old(self) -> None:
+        ended = [i for i in self.all() if i.state == "ended"]
+        for old in ended[50:]:
+            del self._invitations[old.id]
+
+    def _changed(self) -> None:
+        for listener in self.on_change:
+            listener()

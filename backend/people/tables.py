@@ -1,0 +1,56 @@
+"""Tables of people. Passwords and tokens are kept only as hashes.
+
+They lie in the station's own file, also where library and audit are shared on a server: nobody
+who can write to that server gets to move axes here, and log-in works when it is away.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from sqlalchemy import ForeignKey, Integer, String
+from sqlalchemy.orm import Mapped, mapped_column
+
+from backend.store.base import Base, UtcDateTime
+
+
+class AccountRow(Base):
+    """Somebody who may log in. ``name_key`` is the name without its case, for comparison."""
+
+    __tablename__ = "people_account"
+
+    id: Mapped[int] = mapped_column(Integer, primary_key=True)
+    name: Mapped[str] = mapped_column(String(60))
+    name_key: Mapped[str] = mapped_column(String(120), unique=True)
+    role: Mapped[str] = mapped_column(String(20))
+    password: Mapped[str] = mapped_column(String(200))
+    created: Mapped[datetime] = mapped_column(UtcDateTime)
+
+
+class SessionRow(Base):
+    """A log-in. ``id`` is the SHA-256 of the cookie, which only the browser has."""
+
+    __tablename__ = "people_session"
+
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    account_id: Mapped[int] = mapped_column(
+        ForeignKey("people_account.id", ondelete="CASCADE"), index=True
+    )
+    created: Mapped[datetime] = mapped_column(UtcDateTime)
+    used: Mapped[datetime] = mapped_column(UtcDateTime)
+    client: Mapped[str] = mapped_column(String(200))
+
+
+class TokenRow(Base):
+    """A token for scripts. ``id`` is the SHA-256 of the token, which is shown once."""
+
+    __tablename__ = "people_token"
+
+    id: Mapped[str] = mapped_column(String(64), primary_key=True)
+    account_id: Mapped[int] = mapped_column(
+        ForeignKey("people_account.id", ondelete="CASCADE"), index=True
+    )
+    name: Mapped[str] = mapped_column(String(60))
+    scopes: Mapped[str] = mapped_column(String(200))
+    created: Mapped[datetime] = mapped_column(UtcDateTime)
+    expires: Mapped[datetime] = mapped_column(UtcDateTime)
