@@ -49,6 +49,24 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True)
+class WriteRecord:
+    """A value that was sent to the drive; raw values.
+
+    ``before`` is what was known before, ``after`` what was read back; ``problem`` says why that
+    is not known, and then the drive may hold either.
+    """
+
+    drive: str
+    name: str
+    key: str
+    parameter: str
+    before: Raw | None
+    wanted: Raw
+    after: Raw | None
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Port:
     """One way to reach a drive."""
 
@@ -109,6 +127,7 @@ class Drive:
         self.readings: dict[str, Reading] = {}
         self._changes = _Changes()
         self._listeners: list[Callable[[list[Reading]], None]] = []
+        self._write_listeners: list[Callable[[WriteRecord], None]] = []
         self._transient = {
             signal.key for signal in profile.signals if signal.role in _COMMAND_ROLES
         } | {step.key for proc in profile.procedures for step in proc.steps if step.do == "write"}
@@ -126,6 +145,10 @@ class Drive:
         """Call ``listener`` with every batch of new readings."""
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener)
+
+    def listen_writes(self, listener: Callable[[WriteRecord], None]) -> None:
+        """Call ``listener`` after everything that `write` sent, whatever came of it."""
+        self._write_listeners.append(listener)
 
     def parameter(self, key: str) -> Parameter:
         """The parameter of this key or maker's number.
@@ -413,6 +436,19 @@ class Drive:
         if parameter.settable == "stopped":
             await self._require_stopped(parameter)
         await self._before_change(parameter)
+        known = self.readings.get(parameter.key)
+        before = known.raw if known else None
+        try:
+            reading = await self._send_and_read(port, parameter, value)
+        except BaseException as error:
+            # A cancelled write may have reached the drive as well.
+            problem = error.message if isinstance(error, DriveError) else "interrupted"
+            self._tell_write(parameter, before, value, None, problem)
+            raise
+        self._tell_write(parameter, before, value, reading.raw)
+        return reading
+
+    async def _send_and_read(self, port: Port, parameter: Parameter, value: Raw) -> Reading:
         try:
             await self._send(port, parameter, value)
         except DriveError as error:
@@ -424,6 +460,20 @@ class Drive:
         if parameter.effective not in ("now", "stopped") and parameter.key not in self._transient:
             self._changes.pending[parameter.key] = parameter.effective
         return await self.read(parameter.key)
+
+    def _tell_write(
+        self,
+        parameter: Parameter,
+        before: Raw | None,
+        wanted: Raw,
+        after: Raw | None,
+        problem: str = "",
+    ) -> None:
+        record = WriteRecord(
+            self.id, self.name, parameter.key, parameter.name, before, wanted, after, problem
+        )
+        for listener in self._write_listeners:
+            listener(record)
 
     def require_identity(self) -> None:
         """The drive at this place is the one that was connected.

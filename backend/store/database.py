@@ -99,13 +99,15 @@ class Store:
     # --- transactions -----------------------------------------------------------------
 
     @contextmanager
-    def reading(self) -> Iterator[Session]:
-        """A transaction that changes nothing.
+    def reading(self, *, snapshot: bool = False) -> Iterator[Session]:
+        """A transaction that changes nothing; with ``snapshot`` all its queries see one moment.
 
         Raises:
             DatabaseFailed: see `open`.
         """
         engine = self.open()
+        if snapshot and not self._is_sqlite:  # which reads that way always
+            engine = engine.execution_options(isolation_level="REPEATABLE READ")
         with self._translated(), Session(engine, expire_on_commit=False) as session:
             yield session
 

@@ -13,6 +13,7 @@ from alembic.migration import MigrationContext
 from sqlalchemy import select, text
 from sqlalchemy.exc import DBAPIError
 
+import backend.people.tables
 import backend.store.audit_tables
 import backend.store.library_tables  # noqa: F401 - registers its tables
 from backend.store import Base, DatabaseFailed, Store

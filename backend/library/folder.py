@@ -1,4 +1,4 @@
-"""The folder of parameter sets: list, read, store, delete."""
+"""A plain folder of parameter sets, as the command line uses it: list, read, store, delete."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from backend import parameter_set
 from backend.files import checked_name, write_atomically
-from backend.parameter_set import SUFFIX, BadSet, ParameterSet
+from backend.parameter_set import SUFFIX, ParameterSet
 from drivers.errors import NotAllowed
 
 
@@ -74,6 +74,3 @@ class SetLibrary:
         """
         self.read(name)
         self._path(name).unlink()
-
-
-__all__ = ["BadSet", "SetLibrary"]

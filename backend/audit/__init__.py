@@ -1,0 +1,6 @@
+"""The audit trail: who did what to which axis, in a chain that shows any later change."""
+
+from backend.audit.facts import Fact
+from backend.audit.log import AuditLog
+
+__all__ = ["AuditLog", "Fact"]

@@ -1,0 +1,121 @@
+"""The chain: each entry's hash covers its text and the hash before it.
+
+Changing, removing, inserting or reordering entries breaks it at the first entry concerned. Who
+can rewrite the whole database can compute a new chain; against that serves an anchor, a number
+and hash noted elsewhere (a printed report, a colleague's mail).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from sqlalchemy import insert, select
+from sqlalchemy.orm import Session
+
+from backend.store.audit_tables import AuditEntry, AuditHead
+
+#: What stands for the hash before the first entry.
+ZERO = "0" * 64
+#: Parts of the body that are columns too, and how long the column is.
+COLUMNS = {"time": 32, "station": 100, "person": 200, "kind": 30, "axis": 200, "target": 300}
+
+
+@dataclass(frozen=True, slots=True)
+class Anchor:
+    """An entry's number and hash."""
+
+    number: int
+    hash: str
+
+    def __str__(self) -> str:
+        return f"{self.number}:{self.hash}"
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Outcome of a check. ``broken`` is the first wrong entry's number, None where all is well."""
+
+    entries: int
+    head: Anchor
+    broken: int | None = None
+    why: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the chain is whole."""
+        return self.broken is None
+
+
+def link(previous: str, body: str) -> str:
+    """Hash of an entry: SHA-256 of the hash before it (as text) and its body, in UTF-8."""
+    return hashlib.sha256(previous.encode("ascii") + body.encode()).hexdigest()
+
+
+def append(session: Session, bodies: Sequence[str]) -> Anchor:
+    """Add entries; the head is locked until the transaction ends, so that writers queue up."""
+    head = session.execute(
+        select(AuditHead).where(AuditHead.id == 1).with_for_update()
+    ).scalar_one()
+    number, previous = head.number, head.hash
+    rows = []
+    for body in bodies:
+        number += 1
+        digest = link(previous, body)
+        rows.append(
+            {"number": number, "body": body, "previous": previous, "hash": digest, **columns(body)}
+        )
+        previous = digest
+    if rows:
+        session.execute(insert(AuditEntry), rows)
+        head.number, head.hash = number, previous
+    return Anchor(number, previous)
+
+
+def columns(body: str) -> dict[str, str]:
+    """The searchable parts of a body."""
+    content = json.loads(body)
+    return {name: str(content[name])[:length] for name, length in COLUMNS.items()}
+
+
+def verify(
+    entries: Iterable[AuditEntry], head: Anchor | None, anchor: Anchor | None = None
+) -> Verdict:
+    """Check entries in the order of their numbers against each other, the head and an anchor."""
+    number, previous = 0, ZERO
+    for entry in entries:
+        why = _wrong(entry, number + 1, previous)
+        if not why and anchor and entry.number == anchor.number and entry.hash != anchor.hash:
+            why = f"its hash is not that of the anchor, {anchor.hash}: history was rewritten"
+        if why:
+            return Verdict(number, Anchor(number, previous), min(entry.number, number + 1), why)
+        number, previous = entry.number, entry.hash
+    end = Anchor(number, previous)
+    if head is None:
+        return Verdict(number, end, number + 1, "the head of the chain is gone")
+    if head != end:
+        why = f"the chain ended with entry {head.number}; the last that is here is {number}"
+        return Verdict(number, end, number + 1, why)
+    if anchor is not None and anchor.number > number:
+        why = f"the anchor names entry {anchor.number}; the last that is here is {number}"
+        return Verdict(number, end, number + 1, why)
+    return Verdict(number, end)
+
+
+def _wrong(entry: AuditEntry, number: int, previous: str) -> str:
+    if entry.number != number:
+        return f"entry {number} is missing"
+    if entry.previous != previous:
+        return "it does not follow the entry before it"
+    if link(previous, entry.body) != entry.hash:
+        return "its contents are not those that were written"
+    try:
+        parts = columns(entry.body)
+    except (ValueError, KeyError, TypeError):
+        return "its contents are unreadable"
+    for name, value in parts.items():
+        if getattr(entry, name) != value:
+            return f"its column {name} is not what its contents say"
+    return ""

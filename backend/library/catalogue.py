@@ -1,0 +1,323 @@
+"""The library in the database: named entries with versions that are never changed.
+
+Everything here blocks and belongs on a thread (`Store.call`). Contents up to `INLINE` bytes lie in
+the database, so that they and their row appear together; larger ones are blobs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from datetime import UTC, datetime
+
+from sqlalchemy import Select, func, select
+from sqlalchemy.orm import Session, selectinload
+
+from backend.audit.facts import Fact as AuditFact
+from backend.audit.facts import Value
+from backend.library import rows
+from backend.library.entries import (
+    MAX_NOTES,
+    MAX_TAG,
+    MAX_TAGS,
+    Addition,
+    Entry,
+    Kind,
+    Query,
+    Version,
+)
+from backend.store.blobs import BlobFailed, Blobs
+from backend.store.database import Store
+from backend.store.library_tables import Content, Item, Tag
+from backend.store.library_tables import Version as VersionRow
+from drivers.errors import NotAllowed
+
+INLINE = 1_000_000
+
+
+class NotInLibrary(NotAllowed):
+    """There is no such entry or version."""
+
+    kind = "not-found"
+
+
+class Library:
+    """The library of a store. ``record`` is told of every change (see backend.audit)."""
+
+    def __init__(
+        self,
+        store: Store,
+        blobs: Blobs,
+        record: Callable[[AuditFact], None] = lambda _fact: None,
+    ) -> None:
+        self.store = store
+        self.blobs = blobs
+        self._record = record
+
+    # --- finding ----------------------------------------------------------------------
+
+    def search(self, query: Query) -> tuple[list[Entry], int]:
+        """A page of entries, newest first, and how many there are in all.
+
+        Raises:
+            DatabaseFailed: the database.
+        """
+        wanted = rows.matching(query)
+        with self.store.reading(snapshot=True) as session:
+            total = session.scalar(select(func.count()).select_from(wanted.subquery())) or 0
+            page = wanted.order_by(Item.changed.desc(), Item.id.desc())
+            found = self._entries(session, page.limit(query.limit).offset(query.offset))
+        return found, total
+
+    def entry(self, entry_id: int) -> Entry:
+        """One entry, also a deleted one.
+
+        Raises:
+            NotInLibrary: there is none.
+        """
+        with self.store.reading() as session:
+            return _loaded(self._item(session, entry_id))
+
+    def named(self, kind: Kind, name: str, station: str = "") -> Entry | None:
+        """The entry of this name that is not deleted, or None."""
+        with self.store.reading() as session:
+            item = _by_name(session, kind, name, station)
+            return _loaded(item) if item is not None and item.deleted is None else None
+
+    def versions(self, entry_id: int) -> list[Version]:
+        """All versions, newest first.
+
+        Raises:
+            NotInLibrary: there is no such entry.
+        """
+        with self.store.reading() as session:
+            return [rows.version(row) for row in reversed(self._item(session, entry_id).versions)]
+
+    def tags(self) -> dict[str, int]:
+        """Tags in use and how many entries have each."""
+        count = select(Tag.tag, func.count()).join(Item).where(Item.deleted.is_(None))
+        with self.store.reading() as session:
+            found = session.execute(count.group_by(Tag.tag).order_by(Tag.tag))
+            return {row[0]: row[1] for row in found}
+
+    def content(self, entry_id: int, number: int | None = None) -> bytes:
+        """Contents of a version, the latest by default, compared with their SHA-256.
+
+        Raises:
+            NotInLibrary: no such entry or version, or its file lies on another station.
+            BlobFailed: missing or damaged.
+        """
+        with self.store.reading() as session:
+            item = self._item(session, entry_id)
+            row = _version(item, number)
+            place, name = row.place, row.sha256
+            inline = session.get(Content, name) if place == "database" else None
+            data = inline.data if inline else None
+            label = f"{item.name} version {row.number}"
+        if place == "file":
+            raise NotInLibrary(
+                f"{label} lies in a folder of station {item.station}",
+                value=item.name,
+                remedy="open it on that station, or put it into the shared library there",
+            )
+        if place == "blob":
+            return self.blobs.get(name)
+        if data is None or hashlib.sha256(data).hexdigest() != name:
+            raise BlobFailed(
+                f"the contents of {label} are missing or damaged",
+                value=name,
+                remedy="restore them from a backup",
+            )
+        return data
+
+    # --- changing ---------------------------------------------------------------------
+
+    def add(self, kind: Kind, name: str, data: bytes, addition: Addition) -> Entry:
+        """Store a new version: of the entry of this name, or of a new one.
+
+        What equals the latest version makes no new one. A deleted entry of this name comes back.
+
+        Raises:
+            StorageFailed: nothing was stored.
+        """
+        digest = hashlib.sha256(data).hexdigest()
+        place = "database" if len(data) <= INLINE else "blob"
+        if place == "blob":
+            self.blobs.put(data)
+        now = datetime.now(UTC)
+        with self.store.writing() as session:
+            item = _by_name(session, kind, name, lock=True)
+            if item is None:
+                item = Item(kind=kind, name=name, station="", changed=now, notes="", words="")
+                session.add(item)
+            item.deleted = None
+            latest = item.versions[-1] if item.versions else None
+            known = {tag.tag for tag in item.tags}
+            item.tags += [Tag(tag=tag) for tag in addition.tags if tag not in known]
+            fresh = latest is None or latest.sha256 != digest
+            if fresh:
+                if place == "database" and session.get(Content, digest) is None:
+                    session.add(Content(sha256=digest, data=data))
+                number = latest.number + 1 if latest else 1
+                item.versions.append(
+                    rows.new_version(number, place, digest, len(data), addition, now)
+                )
+                item.changed = now
+            item.words = rows.words(item)
+            session.flush()
+            entry = _loaded(item)
+        if fresh:
+            self._tell("saved", entry, bytes=len(data))
+        return entry
+
+    def annotate(
+        self, entry_id: int, *, notes: str | None = None, tags: tuple[str, ...] | None = None
+    ) -> Entry:
+        """Change notes or tags; None leaves them.
+
+        Raises:
+            NotInLibrary: no such entry. NotAllowed: too long or too many.
+        """
+        if notes is not None and len(notes) > MAX_NOTES:
+            raise NotAllowed("the notes are too long", limit=f"{MAX_NOTES} characters")
+        if tags is not None:
+            tags = _clean(tags)
+        with self.store.writing() as session:
+            item = self._item(session, entry_id)
+            if notes is not None:
+                item.notes = notes
+            if tags is not None:
+                have = {tag.tag: tag for tag in item.tags}
+                item.tags = [have.get(tag) or Tag(tag=tag) for tag in tags]
+            item.words = rows.words(item)
+            session.flush()
+            entry = _loaded(item)
+        self._tell("annotated", entry, tags=", ".join(entry.tags))
+        return entry
+
+    def delete(self, entry_id: int) -> Entry:
+        """Put an entry aside; its versions stay until `purge`.
+
+        Raises:
+            NotInLibrary: no such entry.
+        """
+        with self.store.writing() as session:
+            item = self._item(session, entry_id)
+            item.deleted = item.deleted or datetime.now(UTC)
+            session.flush()
+            entry = _loaded(item)
+        self._tell("deleted", entry)
+        return entry
+
+    def undelete(self, entry_id: int) -> Entry:
+        """Take an entry back that was put aside.
+
+        Raises:
+            NotInLibrary: no such entry.
+        """
+        with self.store.writing() as session:
+            item = self._item(session, entry_id)
+            item.deleted = None
+            session.flush()
+            entry = _loaded(item)
+        self._tell("taken back", entry)
+        return entry
+
+    def purge(self, before: datetime) -> list[Entry]:
+        """Delete for good what was put aside before this time, with contents nothing else names.
+
+        Raises:
+            DatabaseFailed, BlobFailed: some may remain; calling again goes on.
+        """
+        with self.store.writing() as session:
+            wanted = select(Item).where(Item.deleted < before)
+            gone = [_loaded(item) for item in session.scalars(wanted)]
+            for item in session.scalars(wanted):
+                session.delete(item)
+            session.flush()
+            used = select(VersionRow.sha256)
+            for content in session.scalars(select(Content).where(Content.sha256.not_in(used))):
+                session.delete(content)
+        for entry in gone:
+            self._tell("purged", entry)
+        self.sweep_blobs()
+        return gone
+
+    def sweep_blobs(self) -> int:
+        """Delete blobs that no version names (left by a crash, or purged); how many."""
+        with self.store.reading() as session:
+            used = set(session.scalars(select(VersionRow.sha256).where(VersionRow.place == "blob")))
+        unused = [name for name in self.blobs.names() if name not in used]
+        for name in unused:
+            self.blobs.delete(name)
+        return len(unused)
+
+    # --- within a transaction -----------------------------------------------------------
+
+    def _entries(self, session: Session, query: Select[Item]) -> list[Entry]:
+        with_all = query.options(selectinload(Item.versions), selectinload(Item.tags))
+        return [_loaded(item) for item in session.scalars(with_all)]
+
+    def _item(self, session: Session, entry_id: int) -> Item:
+        item = session.get(Item, entry_id)
+        if item is None:
+            raise NotInLibrary(
+                f"there is no entry {entry_id} in the library",
+                value=entry_id,
+                remedy="choose one from the Files page",
+            )
+        return item
+
+    def _tell(self, action: str, entry: Entry, **detail: Value) -> None:
+        facts: dict[str, Value] = {
+            "kind": entry.kind, "version": entry.latest.number, "sha256": entry.latest.sha256,
+        }  # fmt: skip
+        self._record(
+            AuditFact(
+                "file",
+                action,
+                axis=entry.latest.axis.name,
+                target=entry.name,
+                detail=facts | detail,
+            )
+        )
+
+
+def _by_name(
+    session: Session, kind: Kind, name: str, station: str = "", *, lock: bool = False
+) -> Item | None:
+    query = select(Item).where(Item.kind == kind, Item.name == name, Item.station == station)
+    return session.scalar(query.with_for_update() if lock else query)
+
+
+def _version(item: Item, number: int | None) -> VersionRow:
+    row = next((v for v in reversed(item.versions) if number in (None, v.number)), None)
+    if row is None:
+        raise NotInLibrary(
+            f"{item.name} has no version {number}",
+            value=number,
+            limit=f"1 to {len(item.versions)}",
+            remedy="choose one of its versions",
+        )
+    return row
+
+
+def _loaded(item: Item) -> Entry:
+    return rows.entry(item)
+
+
+def _clean(tags: tuple[str, ...]) -> tuple[str, ...]:
+    """Tags without blanks around and without doubles.
+
+    Raises:
+        NotAllowed: too many or too long.
+    """
+    found = dict.fromkeys(" ".join(tag.split()) for tag in tags)
+    found.pop("", None)
+    if len(found) > MAX_TAGS or any(len(tag) > MAX_TAG for tag in found):
+        raise NotAllowed(
+            "too many tags, or one is too long",
+            limit=f"{MAX_TAGS} tags of {MAX_TAG} characters",
+            remedy="use fewer or shorter tags",
+        )
+    return tuple(found)

@@ -1,0 +1,90 @@
+"""What the library says of the things in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Literal
+
+Kind = Literal["set", "recording", "measurement", "report"]
+KINDS: tuple[Kind, ...] = ("set", "recording", "measurement", "report")
+
+#: JSON values that a list shows.
+Fact = int | float | str | bool | None
+MAX_TAGS = 20
+MAX_TAG = 60
+MAX_NOTES = 4000
+
+
+@dataclass(frozen=True, slots=True)
+class AxisIdentity:
+    """The drive that something was made with. ``name`` is the axis's name at that time."""
+
+    profile: str = ""
+    name: str = ""
+    vendor_id: int | None = None
+    product_code: int | None = None
+    revision: int | None = None
+    serial: int | None = None
+    firmware: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Version:
+    """One state of an entry; never changed. ``number`` counts from 1."""
+
+    number: int
+    saved: datetime
+    author: str
+    notes: str
+    bytes: int
+    sha256: str
+    axis: AxisIdentity
+    facts: Mapping[str, object]
+    place: str
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """Something with a name. ``station`` is empty where every station of the database has it."""
+
+    id: int
+    kind: Kind
+    station: str
+    name: str
+    notes: str
+    tags: tuple[str, ...]
+    changed: datetime
+    deleted: datetime | None
+    latest: Version
+    versions: int
+
+
+@dataclass(frozen=True, slots=True)
+class Addition:
+    """A new version to be stored: what it is of, by whom, and what a list shows of it."""
+
+    axis: AxisIdentity = AxisIdentity()
+    author: str = ""
+    notes: str = ""
+    saved: datetime | None = None
+    facts: Mapping[str, object] = field(default_factory=dict)
+    tags: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """A search; what is empty does not restrict. ``words`` must all occur, in whatever case."""
+
+    words: str = ""
+    kinds: tuple[Kind, ...] = ()
+    tag: str = ""
+    axis: str = ""
+    serial: int | None = None
+    profile: str = ""
+    since: datetime | None = None
+    until: datetime | None = None
+    deleted: bool = False
+    limit: int = 200
+    offset: int = 0

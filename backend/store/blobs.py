@@ -1,0 +1,129 @@
+"""Large contents outside the database, by their SHA-256: a folder, or an S3-compatible store.
+
+Written once, never changed; read back they are compared with their name, so that a damaged one is
+noticed. A blob is stored before the row that names it: a crash between leaves a blob too many,
+never a row too many.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import fsspec
+from fsspec.implementations.local import LocalFileSystem
+
+from backend.files import StorageFailed, write_atomically
+
+_NAME = re.compile(r"^[0-9a-f]{64}$")
+
+
+class BlobFailed(StorageFailed):
+    """Contents could not be stored or fetched, or are damaged."""
+
+
+class Blobs:
+    """Contents at a place: a folder's path, ``s3://bucket/prefix``, or another fsspec URL.
+
+    Everything blocks and belongs on a thread.
+    """
+
+    def __init__(self, place: str) -> None:
+        self.place = place
+        try:
+            self._fs, self._root = fsspec.core.url_to_fs(place)
+        except (ImportError, ValueError) as error:
+            raise BlobFailed(
+                f"{place.split('://', 1)[0]}:// cannot be used for contents: {error}",
+                value=place,
+                limit="a folder, or s3:// with the extra servodeck[s3] installed",
+                remedy="install what is missing or choose a folder",
+            ) from error
+
+    def put(self, data: bytes) -> str:
+        """Store contents; returns their name. Storing the same again does nothing.
+
+        Raises:
+            BlobFailed: nothing was stored.
+        """
+        name = hashlib.sha256(data).hexdigest()
+        path = self._path(name)
+        try:
+            if self._fs.exists(path) and self._fs.size(path) == len(data):
+                return name
+            if isinstance(self._fs, LocalFileSystem):
+                write_atomically(Path(path), data)
+            else:
+                # An object store shows an object only when all of it has arrived.
+                self._fs.pipe_file(path, data)
+        except Exception as error:
+            raise self._failed("stored", error) from error
+        return name
+
+    def get(self, name: str) -> bytes:
+        """Contents of this name, compared with it.
+
+        Raises:
+            BlobFailed: missing, damaged, or the place cannot be reached.
+        """
+        path = self._path(name)
+        try:
+            data = self._fs.cat_file(path)
+        except FileNotFoundError as error:
+            raise BlobFailed(
+                f"the contents {name[:12]}… are missing at {self.place}",
+                value=name,
+                remedy="restore them from a backup",
+            ) from error
+        except Exception as error:
+            raise self._failed("fetched", error) from error
+        if not isinstance(data, bytes) or hashlib.sha256(data).hexdigest() != name:
+            raise BlobFailed(
+                f"the contents {name[:12]}… at {self.place} are damaged",
+                value=name,
+                remedy="restore them from a backup",
+            )
+        return data
+
+    def names(self) -> Iterator[str]:
+        """Names of everything that is stored.
+
+        Raises:
+            BlobFailed: the place cannot be reached.
+        """
+        try:
+            found = self._fs.find(self._root) if self._fs.exists(self._root) else []
+        except Exception as error:
+            raise self._failed("listed", error) from error
+        for path in found:
+            name = str(path).rsplit("/", 1)[-1]
+            if _NAME.match(name):
+                yield name
+
+    def delete(self, name: str) -> None:
+        """Delete contents that nothing names any more; does nothing where there are none.
+
+        Raises:
+            BlobFailed: the place cannot be reached.
+        """
+        path = self._path(name)
+        try:
+            if self._fs.exists(path):
+                self._fs.rm_file(path)
+        except Exception as error:
+            raise self._failed("deleted", error) from error
+
+    def _path(self, name: str) -> str:
+        if not _NAME.match(name):
+            raise BlobFailed(f"{name!r} is no name of contents", value=name)
+        return f"{self._root}/{name[:2]}/{name}"
+
+    def _failed(self, what: str, error: Exception) -> BlobFailed:
+        # Every kind of store has its own errors; a botocore error is no OSError.
+        return BlobFailed(
+            f"contents could not be {what} at {self.place}: {error}",
+            value=self.place,
+            remedy="check free space, permissions and, for S3, address and keys",
+        )
