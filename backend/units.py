@@ -121,8 +121,31 @@ async def read_units(drive: Drive) -> AxisUnits:
     if spec.feed is not None and spec.feed in raw:
         per_rev: float | None = of(spec.feed) / of(spec.feed_revolutions) or None
     else:
-        per_rev = spec.counts_per_rev
+        per_rev = await encoder_counts(drive) or spec.counts_per_rev
     return AxisUnits(spec, None if per_rev is None else per_rev / ratio)
+
+
+#: Encoders with fewer or more bits than these are a misread parameter.
+_ENCODER_BITS = range(10, 33)
+
+
+async def encoder_counts(drive: Drive) -> int | None:
+    """Increments per revolution of the encoder that is connected, where the drive tells them.
+
+    R6L motors come with 17 or 23 bits (002:589), and its gear counts in encoder increments.
+
+    Raises:
+        DriveError: the parameter cannot be read.
+    """
+    gear = drive.profile.functions.gear
+    for key in (gear.encoder_bits_key, gear.encoder_counts_key):
+        if key is None or drive.unreachable_why(drive.parameter(key)):
+            continue
+        raw = await drive.raw(key)
+        if key == gear.encoder_counts_key:
+            return raw or None
+        return 1 << raw if raw in _ENCODER_BITS else None
+    return None
 
 
 async def _check_unit_switches(drive: Drive) -> None:

@@ -206,6 +206,7 @@ class GearLimits(Frozen):
 
     min_ratio: float | None = None
     max_ratio: float | None = None
+    strict: bool = Field(default=True, description="False where the manual breaks its own bounds")
     fault: str = ""
     acts: str = Field(default="", description="when a change acts, in words")
     encoder_bits_key: str | None = Field(

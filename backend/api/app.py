@@ -17,6 +17,8 @@ from backend.api import (
     routes_description,
     routes_drive,
     routes_ethercat,
+    routes_functions,
+    routes_io,
     routes_lists,
     routes_recordings,
     routes_rerun,
@@ -27,7 +29,9 @@ from backend.api import (
 from backend.api.errors import NotFound, answer, problem_of
 from backend.api.live import LiveHub
 from backend.api.models import Problem
+from backend.axis_store import AxisStore
 from backend.bench import Bench
+from backend.forcing import ForcingSessions
 from backend.recording.rerun_assets import ViewerAssets
 from backend.recording.rerun_feed import RerunFeed
 from backend.recording.service import Recordings
@@ -89,6 +93,8 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
     )
     app.state.bench = bench
     app.state.recordings = recordings
+    app.state.axis_store = AxisStore(bench.state_folder / "axes")
+    app.state.forcing = ForcingSessions(bench.jobs, bench.leases)
     errors.install(app)
     live = LiveHub(bench)
     app.state.live = live
@@ -103,6 +109,8 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
         routes_recordings,
         routes_scope,
         routes_tune,
+        routes_functions,
+        routes_io,
     ):
         api.include_router(part.router)
     app.include_router(api)

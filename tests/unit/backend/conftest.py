@@ -90,3 +90,9 @@ def drive(profile: Profile, link: MemoryLink) -> Drive:
     drive = Drive("x", "X axis", profile, [Port(link, 1, SPEC)])
     drive.found = Found(1, serial=7, firmware="1.0")
     return drive
+
+
+def changed(profile: Profile, **fields: object) -> Profile:
+    """The profile with other fields, checked anew."""
+    old = {name: getattr(profile, name) for name in Profile.model_fields}
+    return Profile.model_validate({**old, **fields})

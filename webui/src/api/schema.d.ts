@@ -120,6 +120,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/calculate/braking": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Calculate Braking
+         * @description Energy of a braked mass and the resistor that takes it.
+         */
+        post: operations["calculate_braking"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/descriptions": {
         parameters: {
             query?: never;
@@ -254,6 +274,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/fault-history": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Fault History
+         * @description The drive's own record, read now where that takes no write; else how it is kept.
+         */
+        get: operations["fault_history"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/fault-history/read": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Read Fault History
+         * @description The drive's own record, read now; a selector is written and put back where it takes one.
+         */
+        post: operations["read_fault_history"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/fault-reset": {
         parameters: {
             query?: never;
@@ -294,6 +354,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/functions": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Describe Functions
+         * @description What the pages need of this family beyond its parameters; nothing is read from the drive.
+         */
+        get: operations["describe_functions"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/gains": {
         parameters: {
             query?: never;
@@ -318,6 +398,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/gear/plan": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Plan Gear
+         * @description What the gear would be for these mechanics. Nothing is written.
+         */
+        post: operations["plan_gear"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/gear/write": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Write Gear
+         * @description Write the gear for these mechanics, all or nothing, and keep the mechanics.
+         */
+        post: operations["write_gear"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/homing-methods": {
         parameters: {
             query?: never;
@@ -331,6 +451,74 @@ export interface paths {
          */
         get: operations["homing_methods"];
         put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/io": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Terminals
+         * @description All terminals with state, function and polarity, read now.
+         */
+        get: operations["terminals"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/io/forcing/{name}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Overrule
+         * @description Overrule or release terminals; also the sign of life of the page.
+         */
+        put: operations["overrule"];
+        /**
+         * Start Forcing
+         * @description Begin to overrule terminals; it ends when nobody renews it for five seconds.
+         */
+        post: operations["start_forcing"];
+        /**
+         * End Forcing
+         * @description Release everything; everybody may.
+         */
+        delete: operations["end_forcing"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/io/probes/{number}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Set Probe
+         * @description Set up a touch probe; returns 60B8h as read back.
+         */
+        put: operations["set_probe"];
         post?: never;
         delete?: never;
         options?: never;
@@ -580,6 +768,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/mechanics": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Keep Mechanics
+         * @description Keep the mechanics, so that pages show travel. Nothing is written to the drive.
+         */
+        put: operations["keep_mechanics"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/missing-ports": {
         parameters: {
             query?: never;
@@ -754,6 +962,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/record": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Axis Record
+         * @description Mechanics and watch list of an axis.
+         */
+        get: operations["axis_record"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/sets": {
         parameters: {
             query?: never;
@@ -868,6 +1096,29 @@ export interface paths {
          * @description Put back what a change returned as `before`; returns what was there until now.
          */
         post: operations["undo_tuning"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/watch": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Keep Watch
+         * @description Keep the watch list.
+         *
+         *     Raises:
+         *         NotFound: a key is not a parameter of this drive.
+         */
+        put: operations["keep_watch"];
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -1093,7 +1344,7 @@ export interface paths {
         };
         /**
          * Read Measurement
-         * @description One measurement, evaluated anew from its raw data.
+         * @description One measurement, evaluated anew from its raw data and compared with its first result.
          */
         get: operations["read_measurement"];
         put?: never;
@@ -1721,6 +1972,22 @@ export interface components {
             travel_limit: number;
         };
         /**
+         * AxisRecordInfo
+         * @description What the bench keeps of an axis: its mechanics and the watch list.
+         */
+        AxisRecordInfo: {
+            mechanics: components["schemas"]["Mechanics"] | null;
+            /** Travel Per Motor Turn */
+            travel_per_motor_turn: number | null;
+            /**
+             * Travel Unit
+             * @description mm or °, or empty without mechanics
+             */
+            travel_unit: string;
+            /** Watch */
+            watch: string[];
+        };
+        /**
          * AxisState
          * @description State of an axis, in engineering units where units are named.
          */
@@ -1799,6 +2066,138 @@ export interface components {
             };
             /** Velocity */
             velocity: number | null;
+        };
+        /**
+         * BrakeTiming
+         * @description Holding brake: which parameters hold the times of its course.
+         *
+         *     ``open_fixed_ms`` is a printed time that cannot be set.
+         */
+        BrakeTiming: {
+            /**
+             * Close Delay Key
+             * @description servo off while turning to brake output off, at the latest
+             */
+            close_delay_key?: string | null;
+            /**
+             * Close Speed Key
+             * @description below this speed it closes
+             */
+            close_speed_key?: string | null;
+            /**
+             * Command Delay Key
+             * @description brake output on to commands
+             */
+            command_delay_key?: string | null;
+            /**
+             * Fault
+             * @default
+             */
+            fault: string;
+            /**
+             * Hold Key
+             * @description brake output off to power off
+             */
+            hold_key?: string | null;
+            /**
+             * Keys
+             * @default []
+             */
+            keys: string[];
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /**
+             * Open Delay Key
+             * @description servo on to brake output on
+             */
+            open_delay_key?: string | null;
+            /** Open Fixed Ms */
+            open_fixed_ms?: number | null;
+            /**
+             * Output Functions
+             * @default []
+             */
+            output_functions: number[];
+            /** Present Key */
+            present_key?: string | null;
+            /** Source */
+            source: string;
+        };
+        /**
+         * BrakingInfo
+         * @description Energies of one stop in J, powers in W, resistances in Ω.
+         */
+        BrakingInfo: {
+            /** Average W */
+            average_w: number;
+            /** Excess J */
+            excess_j: number;
+            /** External W */
+            external_w: number | null;
+            /** Kinetic J */
+            kinetic_j: number;
+            /** Max Ohm */
+            max_ohm: number | null;
+            /** Min Ohm */
+            min_ohm: number | null;
+            /** Peak W */
+            peak_w: number;
+            /** Possible */
+            possible: boolean;
+            /** Returned J */
+            returned_j: number;
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "capacitor" | "built_in" | "external" | "beyond" | "unknown";
+        };
+        /**
+         * BrakingRequest
+         * @description What is braked, and with what. SI units; what is unknown is null.
+         */
+        BrakingRequest: {
+            /** Built In Ohm */
+            built_in_ohm?: number | null;
+            /** Built In W */
+            built_in_w?: number | null;
+            /**
+             * Capacitor J
+             * @default 0
+             */
+            capacitor_j: number;
+            /** Cycle S */
+            cycle_s: number;
+            /** Deceleration S */
+            deceleration_s: number;
+            /**
+             * Efficiency
+             * @default 1
+             */
+            efficiency: number;
+            /**
+             * Fall Energy J
+             * @default 0
+             */
+            fall_energy_j: number;
+            /** Inertia Kgm2 */
+            inertia_kgm2: number;
+            /** Max External W */
+            max_external_w?: number | null;
+            /** Min External Ohm */
+            min_external_ohm?: number | null;
+            /** On Voltage V */
+            on_voltage_v?: number | null;
+            /** Speed Rpm */
+            speed_rpm: number;
+            /**
+             * Stops Per Cycle
+             * @default 2
+             */
+            stops_per_cycle: number;
         };
         /**
          * BundleInfo
@@ -2177,6 +2576,194 @@ export interface components {
             url: string;
         };
         /**
+         * FaultHistory
+         * @description Where a drive keeps its past faults.
+         *
+         *     *slots*: each record has parameters of its own, newest first. *selected*: writing a number to
+         *     ``select_key`` brings one record to the same parameters. *unreadable*: the drive keeps
+         *     records for which the manual prints no object.
+         */
+        FaultHistory: {
+            /**
+             * Code Base
+             * @description added to a code before the fault table is asked
+             * @default 0
+             */
+            code_base: number;
+            /**
+             * Code Format
+             * @description code as the fault table writes it: AL.{:03d}
+             * @default
+             */
+            code_format: string;
+            /** Code Key */
+            code_key?: string | null;
+            /**
+             * Empty Codes
+             * @default [
+             *       0
+             *     ]
+             */
+            empty_codes: number[];
+            /**
+             * Fields
+             * @default []
+             */
+            fields: string[];
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "slots" | "selected" | "unreadable";
+            /**
+             * Newest First
+             * @description False where the order is not printed
+             * @default true
+             */
+            newest_first: boolean;
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /** Select Key */
+            select_key?: string | null;
+            /** Size */
+            size: number;
+            /**
+             * Slots
+             * @default []
+             */
+            slots: components["schemas"]["HistorySlot"][];
+            /** Source */
+            source: string;
+        };
+        /**
+         * FaultHistoryInfo
+         * @description How a drive keeps past faults, and those that were read.
+         */
+        FaultHistoryInfo: {
+            /**
+             * Clear
+             * @description name of the procedure that clears it, or empty
+             */
+            clear: string;
+            /** Entries */
+            entries: components["schemas"]["PastFaultInfo"][];
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "slots" | "selected" | "unreadable" | "unknown";
+            /** Newest First */
+            newest_first: boolean;
+            /** Notes */
+            notes: string;
+            /** Read At */
+            read_at: string | null;
+            /** Size */
+            size: number;
+            /** Source */
+            source: string;
+        };
+        /**
+         * Forcing
+         * @description A way to overrule terminals: outputs that are forced, or inputs that are simulated.
+         *
+         *     A terminal is overruled while its bit in ``enable`` is set, and then follows its bit in
+         *     ``value``. Without ``enable`` a set bit in ``value`` overrules by itself and only to "on".
+         */
+        Forcing: {
+            enable?: components["schemas"]["TerminalBits"] | null;
+            /** Help */
+            help: string;
+            /**
+             * Name
+             * @enum {string}
+             */
+            name: "outputs" | "simulation";
+            /**
+             * Needs Cyclic
+             * @description acts only while process data run
+             * @default false
+             */
+            needs_cyclic: boolean;
+            /**
+             * Needs Function
+             * @description function code that a terminal must have to be overruled
+             */
+            needs_function?: number | null;
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /** Source */
+            source: string;
+            /** Title */
+            title: string;
+            value: components["schemas"]["TerminalBits"];
+            /** Warning */
+            warning: string;
+        };
+        /**
+         * ForcingInfo
+         * @description A way to overrule terminals, and the session that does.
+         */
+        ForcingInfo: {
+            /** Help */
+            help: string;
+            /** Job */
+            job: string | null;
+            /**
+             * Name
+             * @enum {string}
+             */
+            name: "outputs" | "simulation";
+            /** Notes */
+            notes: string;
+            /** Running */
+            running: boolean;
+            /** Source */
+            source: string;
+            /** Terminals */
+            terminals: string[];
+            /** Title */
+            title: string;
+            /**
+             * Two Way
+             * @description a terminal can be overruled to off as well as to on
+             */
+            two_way: boolean;
+            /** Values */
+            values: {
+                [key: string]: boolean;
+            };
+            /** Warning */
+            warning: string;
+        };
+        /**
+         * ForcingStart
+         * @description Begin a session; the warning was agreed to.
+         */
+        ForcingStart: {
+            /**
+             * Confirmed
+             * @default false
+             */
+            confirmed: boolean;
+        };
+        /**
+         * ForcingValues
+         * @description Terminals to overrule (null releases). Empty: the page is alive.
+         */
+        ForcingValues: {
+            /** Values */
+            values?: {
+                [key: string]: boolean | null;
+            };
+        };
+        /**
          * FoundDrive
          * @description One drive seen by a scan.
          */
@@ -2212,6 +2799,79 @@ export interface components {
             url: string;
             /** Vendor Id */
             vendor_id: number | null;
+        };
+        /**
+         * Functions
+         * @description Everything a family's pages need beyond its parameters, faults and procedures.
+         */
+        Functions: {
+            brake?: components["schemas"]["BrakeTiming"] | null;
+            /**
+             * Gain Blocks
+             * @default []
+             */
+            gain_blocks: components["schemas"]["GainBlock"][];
+            /** @default {
+             *       "acts": "",
+             *       "also_one": [],
+             *       "fault": "",
+             *       "notes": "",
+             *       "source": "",
+             *       "strict": true
+             *     } */
+            gear: components["schemas"]["GearLimits"];
+            /**
+             * Groups
+             * @default []
+             */
+            groups: components["schemas"]["ParameterGroup"][];
+            /**
+             * Guides
+             * @default []
+             */
+            guides: components["schemas"]["Guide"][];
+            history?: components["schemas"]["FaultHistory"] | null;
+            probe?: components["schemas"]["TouchProbe"] | null;
+            regeneration?: components["schemas"]["Regeneration"] | null;
+            /** @default {
+             *       "brake_functions": [],
+             *       "forcing": [],
+             *       "notes": "",
+             *       "polarities": [],
+             *       "states": [],
+             *       "unused_inputs": [
+             *         0
+             *       ],
+             *       "unused_outputs": []
+             *     } */
+            terminals: components["schemas"]["TerminalFacts"];
+        };
+        /**
+         * GainBlock
+         * @description Parameters that sit at one place of the control loops.
+         *
+         *     ``set_number`` tells apart the gain sets between which a drive switches.
+         */
+        GainBlock: {
+            /**
+             * Block
+             * @enum {string}
+             */
+            block: "level" | "inertia" | "command_filter" | "position" | "speed_ff" | "speed" | "torque_ff" | "torque_filter" | "notch" | "adaptive" | "current" | "feedback_filter" | "switching" | "compensation" | "limits";
+            /**
+             * Help
+             * @default
+             */
+            help: string;
+            /** Keys */
+            keys: string[];
+            /** Set Number */
+            set_number?: number | null;
+            /**
+             * Source
+             * @default
+             */
+            source: string;
         };
         /**
          * GainInfo
@@ -2272,6 +2932,149 @@ export interface components {
             level?: number | null;
         };
         /**
+         * GearLimits
+         * @description Bounds on the electronic gear: encoder increments per user increment.
+         */
+        GearLimits: {
+            /**
+             * Acts
+             * @description when a change acts, in words
+             * @default
+             */
+            acts: string;
+            /**
+             * Also One
+             * @description gear parameters that are set to 1 because another holds the ratio
+             * @default []
+             */
+            also_one: string[];
+            /**
+             * Encoder Bits Key
+             * @description parameter with the bits of the encoder at hand
+             */
+            encoder_bits_key?: string | null;
+            /**
+             * Encoder Counts Key
+             * @description parameter with the increments per revolution of the encoder
+             */
+            encoder_counts_key?: string | null;
+            /**
+             * Fault
+             * @default
+             */
+            fault: string;
+            /** Max Ratio */
+            max_ratio?: number | null;
+            /** Min Ratio */
+            min_ratio?: number | null;
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /**
+             * Source
+             * @default
+             */
+            source: string;
+            /**
+             * Strict
+             * @description False where the manual breaks its own bounds
+             * @default true
+             */
+            strict: boolean;
+        };
+        /**
+         * GearPlanInfo
+         * @description What would be written, and what follows from it.
+         */
+        GearPlanInfo: {
+            /**
+             * Acts
+             * @description when a change acts, in words
+             */
+            acts: string;
+            /**
+             * Counted
+             * @description parameters whose numbers change their meaning
+             */
+            counted: string[];
+            /** Encoder Counts */
+            encoder_counts: number;
+            /**
+             * Encoder Travel
+             * @description travel of one encoder increment
+             */
+            encoder_travel: number;
+            /** Error Ppm */
+            error_ppm: number;
+            /**
+             * Max Speed
+             * @description travel per second at the greatest motor speed
+             */
+            max_speed: number | null;
+            /** Max Speed Rpm */
+            max_speed_rpm: number | null;
+            /** Notes */
+            notes: string;
+            /**
+             * Range Travel
+             * @description travel of 2^31 user increments
+             */
+            range_travel: number;
+            /** Reached */
+            reached: number;
+            /** Source */
+            source: string;
+            /** Travel Per Motor Turn */
+            travel_per_motor_turn: number;
+            /** Unit */
+            unit: string;
+            /** Values */
+            values: components["schemas"]["GearValueInfo"][];
+            /**
+             * Wanted
+             * @description user increments per motor revolution
+             */
+            wanted: number;
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * GearValueInfo
+         * @description One parameter of the gear: what it is and what it would be.
+         */
+        GearValueInfo: {
+            /** Key */
+            key: string;
+            /** Name */
+            name: string;
+            /** Now */
+            now: number | string | null;
+            /** Raw */
+            raw: number;
+        };
+        /**
+         * GearWritten
+         * @description The gear as written.
+         */
+        GearWritten: {
+            /**
+             * Before
+             * @description raw values that take it back
+             */
+            before: {
+                [key: string]: number;
+            };
+            /**
+             * Waits
+             * @description key to what must happen before it acts
+             */
+            waits: {
+                [key: string]: string;
+            };
+        };
+        /**
          * GenerateRequest
          * @description A test signal in a cyclic mode; amplitude in rev (CSP), rpm (CSV) or % (CST).
          */
@@ -2313,6 +3116,56 @@ export interface components {
             travel_limit: number;
         };
         /**
+         * Guide
+         * @description A course that a person goes through step by step.
+         */
+        Guide: {
+            /**
+             * Failures
+             * @description fault codes that report failure
+             * @default []
+             */
+            failures: string[];
+            /**
+             * Name
+             * @enum {string}
+             */
+            name: "pole_identification" | "identification";
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /** Source */
+            source: string;
+            /** Steps */
+            steps: components["schemas"]["GuideStep"][];
+            /** Title */
+            title: string;
+            /**
+             * Warning
+             * @default
+             */
+            warning: string;
+        };
+        /**
+         * GuideStep
+         * @description One step of a guide: text, parameters to look at, and a procedure to run.
+         */
+        GuideStep: {
+            /**
+             * Keys
+             * @default []
+             */
+            keys: string[];
+            /** Procedure */
+            procedure?: string | null;
+            /** Text */
+            text: string;
+            /** Title */
+            title: string;
+        };
+        /**
          * Health
          * @description The server is alive.
          */
@@ -2342,6 +3195,21 @@ export interface components {
             type: "hello";
             /** Version */
             version: string;
+        };
+        /**
+         * HistorySlot
+         * @description One remembered fault that has parameters of its own.
+         */
+        HistorySlot: {
+            /** Code Key */
+            code_key: string;
+            /**
+             * Fields
+             * @default []
+             */
+            fields: string[];
+            /** Name */
+            name: string;
         };
         /**
          * HomeRequest
@@ -2528,6 +3396,23 @@ export interface components {
              * @description buses of the running demo bench
              */
             virtual: string[];
+        };
+        /**
+         * IoInfo
+         * @description All terminals of a drive, read now.
+         */
+        IoInfo: {
+            /** Forcing */
+            forcing: components["schemas"]["ForcingInfo"][];
+            /** Notes */
+            notes: string;
+            /** Terminals */
+            terminals: components["schemas"]["TerminalInfo"][];
+            /**
+             * Time
+             * Format: date-time
+             */
+            time: string;
         };
         /**
          * JobChanged
@@ -2810,7 +3695,27 @@ export interface components {
          * @description Its settings, and its result evaluated anew from the raw data.
          */
         MeasurementContent: {
+            /**
+             * Agrees
+             * @description whether the result is the one that was concluded at the time; null: unknown
+             */
+            agrees: boolean | null;
+            /**
+             * Differences
+             * @description fields that differ, at most five
+             */
+            differences: string[];
             info: components["schemas"]["MeasurementInfo"];
+            /**
+             * Profile Version
+             * @description digest of the profile it was measured with
+             */
+            profile_version: string;
+            /**
+             * Program
+             * @description version of servodeck that measured; empty: not told
+             */
+            program: string;
             /** Result */
             result: {
                 [key: string]: unknown;
@@ -2842,6 +3747,54 @@ export interface components {
             saved: string | null;
             /** Serial */
             serial: number | null;
+        };
+        /**
+         * Mechanics
+         * @description What turns the motor's revolution into travel.
+         *
+         *     *screw*: ``lead_mm`` per turn. *belt*: ``diameter_mm``, or ``pitch_mm`` times ``teeth`` of the
+         *     pulley. *rack*: ``module_mm`` times ``teeth`` of the pinion, or its ``pitch_mm``. *rotary*: a
+         *     table of 360°. ``motor_turns`` to ``load_turns`` is the gearbox.
+         */
+        Mechanics: {
+            /** Diameter Mm */
+            diameter_mm?: number | null;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "screw" | "belt" | "rack" | "rotary";
+            /** Lead Mm */
+            lead_mm?: number | null;
+            /**
+             * Load Turns
+             * @default 1
+             */
+            load_turns: number;
+            /** Module Mm */
+            module_mm?: number | null;
+            /**
+             * Motor Turns
+             * @default 1
+             */
+            motor_turns: number;
+            /** Pitch Mm */
+            pitch_mm?: number | null;
+            /**
+             * Resolution
+             * @description mm or degrees of one user increment
+             * @default 0.001
+             */
+            resolution: number;
+            /** Teeth */
+            teeth?: number | null;
+        };
+        /**
+         * MechanicsUpdate
+         * @description Keep the mechanics of an axis; null forgets them.
+         */
+        MechanicsUpdate: {
+            mechanics: components["schemas"]["Mechanics"] | null;
         };
         /**
          * MissingPort
@@ -3007,6 +3960,33 @@ export interface components {
             notches: (components["schemas"]["NotchShape"] | null)[];
         };
         /**
+         * ParameterGroup
+         * @description Parameters that a person sets together, on one page.
+         */
+        ParameterGroup: {
+            /**
+             * Help
+             * @default
+             */
+            help: string;
+            /** Keys */
+            keys: string[];
+            /** Name */
+            name: string;
+            /**
+             * Page
+             * @enum {string}
+             */
+            page: "motion" | "gains" | "io" | "setup";
+            /**
+             * Source
+             * @default
+             */
+            source: string;
+            /** Title */
+            title: string;
+        };
+        /**
          * ParameterRow
          * @description Description and value.
          */
@@ -3128,6 +4108,41 @@ export interface components {
             };
         };
         /**
+         * PastFaultInfo
+         * @description One fault that the drive remembers, with what it froze.
+         */
+        PastFaultInfo: {
+            /** Causes */
+            causes: string[];
+            /** Code */
+            code: string;
+            /**
+             * Error
+             * @default
+             */
+            error: string;
+            /** Kind */
+            kind: ("fault" | "warning") | null;
+            /**
+             * Known
+             * @description False where the profile has no such fault
+             */
+            known: boolean;
+            /**
+             * Name
+             * @description which record: last fault, record 3 …
+             */
+            name: string;
+            /** Remedies */
+            remedies: string[];
+            /** Reset */
+            reset: string;
+            /** Title */
+            title: string;
+            /** Values */
+            values: components["schemas"]["ParameterValue"][];
+        };
+        /**
          * Ping
          * @description Round-trip measurement; answered by Pong.
          */
@@ -3223,6 +4238,48 @@ export interface components {
             step: number[];
             /** Step Time S */
             step_time_s: number[];
+        };
+        /**
+         * Probe
+         * @description One touch probe. ``sources``: value of the source bits of 60B8h to its meaning.
+         */
+        Probe: {
+            /** Falling Key */
+            falling_key?: string | null;
+            /** Rising Key */
+            rising_key?: string | null;
+            /** Sources */
+            sources: {
+                [key: string]: string;
+            };
+        };
+        /**
+         * ProbeRequest
+         * @description Set up a touch probe.
+         */
+        ProbeRequest: {
+            /**
+             * Continuous
+             * @default false
+             */
+            continuous: boolean;
+            /**
+             * Falling
+             * @default false
+             */
+            falling: boolean;
+            /** On */
+            on: boolean;
+            /**
+             * Rising
+             * @default true
+             */
+            rising: boolean;
+            /**
+             * Source
+             * @default 0
+             */
+            source: number;
         };
         /**
          * Problem
@@ -3619,6 +4676,70 @@ export interface components {
              * @constant
              */
             type: "refused";
+        };
+        /**
+         * Regeneration
+         * @description Braking resistor: table of the models and the parameters that describe one.
+         */
+        Regeneration: {
+            /**
+             * External Raw
+             * @description type that means: external
+             */
+            external_raw?: number | null;
+            /**
+             * Keys
+             * @default []
+             */
+            keys: string[];
+            /** Load Key */
+            load_key?: string | null;
+            /** Min Key */
+            min_key?: string | null;
+            /**
+             * Models
+             * @default []
+             */
+            models: components["schemas"]["ResistorModel"][];
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /** On Voltage Key */
+            on_voltage_key?: string | null;
+            /** Power Key */
+            power_key?: string | null;
+            /** Resistance Key */
+            resistance_key?: string | null;
+            /** Source */
+            source: string;
+            /** Type Key */
+            type_key?: string | null;
+        };
+        /**
+         * ResistorModel
+         * @description What a manual's table says of braking with one model; None where it prints nothing.
+         */
+        ResistorModel: {
+            /**
+             * Capacitor J
+             * @description energy that the DC bus takes up
+             */
+            capacitor_j?: number | null;
+            /** Max External W */
+            max_external_w?: number | null;
+            /** Min External Ohm */
+            min_external_ohm?: number | null;
+            /** Model */
+            model: string;
+            /**
+             * Power W
+             * @description power that it may dissipate for long
+             */
+            power_w?: number | null;
+            /** Resistance Ohm */
+            resistance_ohm?: number | null;
         };
         /**
          * RetentionBounds
@@ -4392,6 +5513,138 @@ export interface components {
             travel_limit: number;
         };
         /**
+         * TerminalBits
+         * @description A parameter with one bit per terminal.
+         */
+        TerminalBits: {
+            /**
+             * Bits
+             * @description terminal to bit
+             */
+            bits: {
+                [key: string]: number;
+            };
+            /** Key */
+            key: string;
+        };
+        /**
+         * TerminalFacts
+         * @description States, polarities and overruling of the terminals.
+         */
+        TerminalFacts: {
+            /**
+             * Brake Functions
+             * @description output functions that hold a load: such an output is never forced
+             * @default []
+             */
+            brake_functions: number[];
+            /**
+             * Forcing
+             * @default []
+             */
+            forcing: components["schemas"]["Forcing"][];
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /**
+             * Polarities
+             * @default []
+             */
+            polarities: components["schemas"]["TerminalBits"][];
+            /**
+             * States
+             * @default []
+             */
+            states: components["schemas"]["TerminalBits"][];
+            /**
+             * Unused Inputs
+             * @description codes that mean no function
+             * @default [
+             *       0
+             *     ]
+             */
+            unused_inputs: number[];
+            /**
+             * Unused Outputs
+             * @default []
+             */
+            unused_outputs: number[];
+        };
+        /**
+         * TerminalFunction
+         * @description A function that a terminal can be given.
+         */
+        TerminalFunction: {
+            /** Code */
+            code: number;
+            /** Help */
+            help: string;
+            /** Name */
+            name: string;
+        };
+        /**
+         * TerminalInfo
+         * @description One terminal: what it is at, and what it is for.
+         */
+        TerminalInfo: {
+            /**
+             * Direction
+             * @enum {string}
+             */
+            direction: "in" | "out";
+            /** Function */
+            function: number | null;
+            /** Function Key */
+            function_key: string | null;
+            /** Function Name */
+            function_name: string;
+            /** Functions */
+            functions: components["schemas"]["TerminalFunction"][];
+            /** Inverted */
+            inverted: boolean | null;
+            /** Name */
+            name: string;
+            /** Notes */
+            notes: string;
+            /** On */
+            on: boolean | null;
+            /**
+             * Polarity Bit
+             * @description bit of the polarity key; None: a value of its own
+             */
+            polarity_bit: number | null;
+            /** Polarity Key */
+            polarity_key: string | null;
+            /**
+             * Same Function
+             * @description other terminals with the same function
+             */
+            same_function: string[];
+            /** Source */
+            source: string;
+        };
+        /**
+         * TouchProbe
+         * @description Touch probes with the bits of CiA 402 (60B8h, 60B9h).
+         */
+        TouchProbe: {
+            /** Function Key */
+            function_key: string;
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /** Probes */
+            probes: components["schemas"]["Probe"][];
+            /** Source */
+            source: string;
+            /** Status Key */
+            status_key: string;
+        };
+        /**
          * TransitionRequest
          * @description Drive the CiA 402 state machine to a state.
          */
@@ -4448,6 +5701,14 @@ export interface components {
             type: "watch_state";
         };
         /**
+         * WatchUpdate
+         * @description The watch list of an axis, in order.
+         */
+        WatchUpdate: {
+            /** Keys */
+            keys: string[];
+        };
+        /**
          * WatchValues
          * @description Poll and send these parameters of one drive (replaces the earlier choice of that drive).
          */
@@ -4491,7 +5752,11 @@ export type ActiveFault = components['schemas']['ActiveFault'];
 export type AliasRequest = components['schemas']['AliasRequest'];
 export type ArmRequest = components['schemas']['ArmRequest'];
 export type AutotuneRequest = components['schemas']['AutotuneRequest'];
+export type AxisRecordInfo = components['schemas']['AxisRecordInfo'];
 export type AxisState = components['schemas']['AxisState'];
+export type BrakeTiming = components['schemas']['BrakeTiming'];
+export type BrakingInfo = components['schemas']['BrakingInfo'];
+export type BrakingRequest = components['schemas']['BrakingRequest'];
 export type BundleInfo = components['schemas']['BundleInfo'];
 export type BundleList = components['schemas']['BundleList'];
 export type BundleRequest = components['schemas']['BundleRequest'];
@@ -4511,13 +5776,28 @@ export type DriveUpdate = components['schemas']['DriveUpdate'];
 export type DrivesChanged = components['schemas']['DrivesChanged'];
 export type EthercatPermissions = components['schemas']['EthercatPermissions'];
 export type EthercatSegment = components['schemas']['EthercatSegment'];
+export type FaultHistory = components['schemas']['FaultHistory'];
+export type FaultHistoryInfo = components['schemas']['FaultHistoryInfo'];
+export type Forcing = components['schemas']['Forcing'];
+export type ForcingInfo = components['schemas']['ForcingInfo'];
+export type ForcingStart = components['schemas']['ForcingStart'];
+export type ForcingValues = components['schemas']['ForcingValues'];
 export type FoundDrive = components['schemas']['FoundDrive'];
+export type Functions = components['schemas']['Functions'];
+export type GainBlock = components['schemas']['GainBlock'];
 export type GainInfo = components['schemas']['GainInfo'];
 export type GainValues = components['schemas']['GainValues'];
 export type GainWrite = components['schemas']['GainWrite'];
+export type GearLimits = components['schemas']['GearLimits'];
+export type GearPlanInfo = components['schemas']['GearPlanInfo'];
+export type GearValueInfo = components['schemas']['GearValueInfo'];
+export type GearWritten = components['schemas']['GearWritten'];
 export type GenerateRequest = components['schemas']['GenerateRequest'];
+export type Guide = components['schemas']['Guide'];
+export type GuideStep = components['schemas']['GuideStep'];
 export type Health = components['schemas']['Health'];
 export type Hello = components['schemas']['Hello'];
+export type HistorySlot = components['schemas']['HistorySlot'];
 export type HomeRequest = components['schemas']['HomeRequest'];
 export type HomingMethodInfo = components['schemas']['HomingMethodInfo'];
 export type ImportFinding = components['schemas']['ImportFinding'];
@@ -4525,6 +5805,7 @@ export type ImportedDescription = components['schemas']['ImportedDescription'];
 export type ImportedList = components['schemas']['ImportedList'];
 export type InertiaRequest = components['schemas']['InertiaRequest'];
 export type Interfaces = components['schemas']['Interfaces'];
+export type IoInfo = components['schemas']['IoInfo'];
 export type JobChanged = components['schemas']['JobChanged'];
 export type JobInfo = components['schemas']['JobInfo'];
 export type JogEnded = components['schemas']['JogEnded'];
@@ -4542,6 +5823,8 @@ export type LogEntry = components['schemas']['LogEntry'];
 export type Logged = components['schemas']['Logged'];
 export type MeasurementContent = components['schemas']['MeasurementContent'];
 export type MeasurementInfo = components['schemas']['MeasurementInfo'];
+export type Mechanics = components['schemas']['Mechanics'];
+export type MechanicsUpdate = components['schemas']['MechanicsUpdate'];
 export type MissingPort = components['schemas']['MissingPort'];
 export type MoveRequest = components['schemas']['MoveRequest'];
 export type NamedSetup = components['schemas']['NamedSetup'];
@@ -4551,16 +5834,20 @@ export type NotchPreviewRequest = components['schemas']['NotchPreviewRequest'];
 export type NotchShape = components['schemas']['NotchShape'];
 export type NotchSlotInfo = components['schemas']['NotchSlotInfo'];
 export type NotchWrite = components['schemas']['NotchWrite'];
+export type ParameterGroup = components['schemas']['ParameterGroup'];
 export type ParameterRow = components['schemas']['ParameterRow'];
 export type ParameterValue = components['schemas']['ParameterValue'];
 export type ParameterWrite = components['schemas']['ParameterWrite'];
 export type ParameterWrites = components['schemas']['ParameterWrites'];
+export type PastFaultInfo = components['schemas']['PastFaultInfo'];
 export type Ping = components['schemas']['Ping'];
 export type Pong = components['schemas']['Pong'];
 export type PortInfo = components['schemas']['PortInfo'];
 export type PortRequest = components['schemas']['PortRequest'];
 export type PredictRequest = components['schemas']['PredictRequest'];
 export type PredictionInfo = components['schemas']['PredictionInfo'];
+export type Probe = components['schemas']['Probe'];
+export type ProbeRequest = components['schemas']['ProbeRequest'];
 export type Problem = components['schemas']['Problem'];
 export type ProcedureInfo = components['schemas']['ProcedureInfo'];
 export type ProcedureRequest = components['schemas']['ProcedureRequest'];
@@ -4580,6 +5867,8 @@ export type RecordingEvent = components['schemas']['RecordingEvent'];
 export type RecordingInfo = components['schemas']['RecordingInfo'];
 export type RecordingList = components['schemas']['RecordingList'];
 export type Refused = components['schemas']['Refused'];
+export type Regeneration = components['schemas']['Regeneration'];
+export type ResistorModel = components['schemas']['ResistorModel'];
 export type RetentionBounds = components['schemas']['RetentionBounds'];
 export type SaveSetRequest = components['schemas']['SaveSetRequest'];
 export type ScanRequest = components['schemas']['ScanRequest'];
@@ -4609,10 +5898,16 @@ export type StopAll = components['schemas']['StopAll'];
 export type StopRequest = components['schemas']['StopRequest'];
 export type StopResult = components['schemas']['StopResult'];
 export type SweepRequest = components['schemas']['SweepRequest'];
+export type TerminalBits = components['schemas']['TerminalBits'];
+export type TerminalFacts = components['schemas']['TerminalFacts'];
+export type TerminalFunction = components['schemas']['TerminalFunction'];
+export type TerminalInfo = components['schemas']['TerminalInfo'];
+export type TouchProbe = components['schemas']['TouchProbe'];
 export type TransitionRequest = components['schemas']['TransitionRequest'];
 export type Undo = components['schemas']['Undo'];
 export type ValuesChanged = components['schemas']['ValuesChanged'];
 export type WatchState = components['schemas']['WatchState'];
+export type WatchUpdate = components['schemas']['WatchUpdate'];
 export type WatchValues = components['schemas']['WatchValues'];
 export type WriteResult = components['schemas']['WriteResult'];
 export type $defs = Record<string, never>;
@@ -5242,6 +6537,84 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    calculate_braking: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BrakingRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BrakingInfo"];
+                };
             };
             /** @description No such thing */
             404: {
@@ -6013,6 +7386,160 @@ export interface operations {
             };
         };
     };
+    fault_history: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FaultHistoryInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_fault_history: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FaultHistoryInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     fault_reset: {
         parameters: {
             query?: never;
@@ -6109,6 +7636,82 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ActiveFault"][];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    describe_functions: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Functions"];
                 };
             };
             /** @description No such thing */
@@ -6325,6 +7928,168 @@ export interface operations {
             };
         };
     };
+    plan_gear: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Mechanics"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GearPlanInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    write_gear: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Mechanics"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["GearWritten"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     homing_methods: {
         parameters: {
             query?: never;
@@ -6343,6 +8108,408 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HomingMethodInfo"][];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    terminals: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["IoInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    overrule: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                name: "outputs" | "simulation";
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ForcingValues"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ForcingInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_forcing: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                name: "outputs" | "simulation";
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ForcingStart"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ForcingInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    end_forcing: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: "outputs" | "simulation";
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ForcingInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    set_probe: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                number: number;
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ProbeRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ParameterValue"];
                 };
             };
             /** @description No such thing */
@@ -7382,6 +9549,88 @@ export interface operations {
             };
         };
     };
+    keep_mechanics: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MechanicsUpdate"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AxisRecordInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     drive_missing_ports: {
         parameters: {
             query?: never;
@@ -8255,6 +10504,82 @@ export interface operations {
             };
         };
     };
+    axis_record: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AxisRecordInfo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     save_set: {
         parameters: {
             query?: never;
@@ -8679,6 +11004,88 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Undo"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    keep_watch: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["WatchUpdate"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AxisRecordInfo"];
                 };
             };
             /** @description No such thing */

@@ -1,0 +1,289 @@
+"""Routes of a family's functions: description, fault history, gear, watch list, braking."""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request
+
+from backend import gear, regeneration
+from backend.api import convert
+from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.errors import NotFound
+from backend.api.models import ParameterValue
+from backend.api.models_functions import (
+    AxisRecordInfo,
+    BrakingInfo,
+    BrakingRequest,
+    FaultHistoryInfo,
+    GearPlanInfo,
+    GearValueInfo,
+    GearWritten,
+    MechanicsUpdate,
+    PastFaultInfo,
+    WatchUpdate,
+)
+from backend.axis_store import AxisRecord, AxisStore
+from backend.bench import Member
+from backend.drive import Drive, Reading
+from backend.fault_history import PastFault, history_of, read_history
+from backend.functions import functions_of
+from backend.mechanics_calc import GearPlan, Mechanics
+from drivers.errors import DriveError
+from profiles.functions import FaultHistory, Functions
+
+router = APIRouter()
+_DRIVE = "/drives/{drive_id}"
+
+
+def store_of(request: Request) -> AxisStore:
+    """What this bench keeps of its axes."""
+    store = request.app.state.axis_store
+    if not isinstance(store, AxisStore):
+        raise TypeError("the application was made without an axis store")
+    return store
+
+
+TheStore = Annotated[AxisStore, Depends(store_of)]
+
+
+@router.get(f"{_DRIVE}/functions")
+async def describe_functions(member: TheMember) -> Functions:
+    """What the pages need of this family beyond its parameters; nothing is read from the drive."""
+    return functions_of(member.drive.profile)
+
+
+# --- fault history ----------------------------------------------------------------------
+
+
+@router.get(f"{_DRIVE}/fault-history")
+async def fault_history(member: TheMember) -> FaultHistoryInfo:
+    """The drive's own record, read now where that takes no write; else how it is kept."""
+    history = history_of(member.drive)
+    if history is None or history.kind != "slots":
+        return _history(member.drive, history, None)
+    return _history(member.drive, history, await read_history(member.axis))
+
+
+@router.post(f"{_DRIVE}/fault-history/read")
+async def read_fault_history(bench: TheBench, member: Controlled) -> FaultHistoryInfo:
+    """The drive's own record, read now; a selector is written and put back where it takes one."""
+    entries = await read_history(member.axis)
+    bench.journal.add(f"{member.drive.name}: fault history read", drive=member.drive.id)
+    return _history(member.drive, history_of(member.drive), entries)
+
+
+def _history(
+    drive: Drive, history: FaultHistory | None, entries: list[PastFault] | None
+) -> FaultHistoryInfo:
+    clear = drive.profile.procedure("clear_history")
+    return FaultHistoryInfo(
+        kind=history.kind if history else "unknown",
+        size=history.size if history else 0,
+        newest_first=history.newest_first if history else True,
+        source=history.source if history else "",
+        notes=history.notes if history else "",
+        clear=clear.name if clear else "",
+        read_at=None if entries is None else convert.moment(time.time()),
+        entries=[_past(entry) for entry in entries or []],
+    )
+
+
+def _past(past: PastFault) -> PastFaultInfo:
+    fault = past.fault
+    return PastFaultInfo(
+        name=past.name,
+        code=past.code_text,
+        known=fault is not None,
+        title=fault.name if fault else "",
+        kind=fault.kind if fault else None,
+        causes=list(fault.causes) if fault else [],
+        remedies=list(fault.remedies) if fault else [],
+        reset=fault.reset if fault else "",
+        # Frozen in the drive: a later read of the same selector would show another record.
+        values=[_frozen(reading) for reading in past.values],
+        error=past.error,
+    )
+
+
+def _frozen(reading: Reading) -> ParameterValue:
+    return ParameterValue(
+        key=reading.key,
+        raw=reading.raw,
+        value=reading.value,
+        time=convert.moment(reading.time) if reading.time else None,
+        error=reading.error,
+    )
+
+
+# --- mechanics and watch list -----------------------------------------------------------
+
+
+@router.get(f"{_DRIVE}/record")
+async def axis_record(member: TheMember, store: TheStore) -> AxisRecordInfo:
+    """Mechanics and watch list of an axis."""
+    return _record(store.get(member.drive.id))
+
+
+@router.put(f"{_DRIVE}/mechanics")
+async def keep_mechanics(
+    member: Controlled, store: TheStore, request: MechanicsUpdate
+) -> AxisRecordInfo:
+    """Keep the mechanics, so that pages show travel. Nothing is written to the drive."""
+    if request.mechanics is not None:
+        request.mechanics.travel_per_load_turn()
+    old = store.get(member.drive.id)
+    return _record(
+        store.put(member.drive.id, old.model_copy(update={"mechanics": request.mechanics}))
+    )
+
+
+@router.put(f"{_DRIVE}/watch")
+async def keep_watch(member: Controlled, store: TheStore, request: WatchUpdate) -> AxisRecordInfo:
+    """Keep the watch list.
+
+    Raises:
+        NotFound: a key is not a parameter of this drive.
+    """
+    keys: list[str] = []
+    for key in request.keys:
+        parameter = member.drive.profile.parameter(key)
+        if parameter is None:
+            raise NotFound(f"{member.drive.name} has no parameter {key}", drive=member.drive.name)
+        if parameter.key not in keys:
+            keys.append(parameter.key)
+    old = store.get(member.drive.id)
+    return _record(store.put(member.drive.id, old.model_copy(update={"watch": tuple(keys)})))
+
+
+def _record(record: AxisRecord) -> AxisRecordInfo:
+    mechanics = record.mechanics
+    return AxisRecordInfo(
+        mechanics=mechanics,
+        travel_unit=mechanics.unit if mechanics else "",
+        travel_per_motor_turn=float(mechanics.travel_per_motor_turn()) if mechanics else None,
+        watch=list(record.watch),
+    )
+
+
+@router.post(f"{_DRIVE}/gear/plan")
+async def plan_gear(member: TheMember, request: Mechanics) -> GearPlanInfo:
+    """What the gear would be for these mechanics. Nothing is written."""
+    plan = await gear.plan(member.axis, request)
+    readings = await member.drive.read_many([value.parameter.key for value in plan.values])
+    rpm = await _greatest_rpm(member)
+    limits = functions_of(member.drive.profile).gear
+    return GearPlanInfo(
+        unit=plan.unit,
+        values=[
+            GearValueInfo(
+                key=value.parameter.key,
+                name=value.parameter.name,
+                now=readings[value.parameter.key].raw,
+                raw=value.raw,
+            )
+            for value in plan.values
+        ],
+        wanted=plan.wanted,
+        reached=plan.reached,
+        error_ppm=plan.error_ppm,
+        travel_per_motor_turn=plan.travel_per_motor_turn,
+        encoder_counts=plan.encoder_counts,
+        encoder_travel=plan.encoder_travel,
+        range_travel=plan.range_travel,
+        max_speed=None if rpm is None else rpm / 60.0 * plan.travel_per_motor_turn,
+        max_speed_rpm=rpm,
+        acts=limits.acts,
+        notes=limits.notes,
+        source=limits.source,
+        warnings=list(plan.warnings),
+        counted=counted(member, plan),
+    )
+
+
+def counted(member: Member, plan: GearPlan) -> list[str]:
+    """Parameters that count in user increments, while the gear really changes."""
+    now = member.drive.readings
+    same = all(
+        (reading := now.get(value.parameter.key)) is not None and reading.raw == value.raw
+        for value in plan.values
+    )
+    return [] if same else gear.counted_in_increments(member.axis)
+
+
+async def _greatest_rpm(member: Member) -> float | None:
+    """Greatest motor speed, or the rated one, where the drive tells it in rpm."""
+    for role in ("max_speed", "rated_speed"):
+        parameter = member.drive.profile.by_role.get(role)
+        if parameter is None or parameter.unit != "rpm" or member.drive.key(role) is None:
+            continue
+        try:
+            value = (await member.drive.read(parameter.key)).value
+        except DriveError:
+            continue  # only a comfort of the calculator
+        if isinstance(value, (int, float)) and value > 0:
+            return float(value)
+    return None
+
+
+@router.post(f"{_DRIVE}/gear/write")
+async def write_gear(
+    bench: TheBench, member: Controlled, store: TheStore, request: Mechanics
+) -> GearWritten:
+    """Write the gear for these mechanics, all or nothing, and keep the mechanics."""
+    bench.require_idle(member)
+    plan = await gear.plan(member.axis, request)
+    change = await gear.write_gear(member.axis, plan.values)
+    old = store.get(member.drive.id)
+    store.put(member.drive.id, old.model_copy(update={"mechanics": request}))
+    for value in plan.values:
+        key = value.parameter.key
+        if key in change.before:
+            bench.journal.add(
+                f"{member.drive.name}: {key} {value.parameter.name}: "
+                f"{change.before[key]} → {value.raw}",
+                drive=member.drive.id,
+            )
+    return GearWritten(before=change.before, waits=change.waits)
+
+
+# --- braking ----------------------------------------------------------------------------
+
+
+@router.post("/calculate/braking")
+async def calculate_braking(request: BrakingRequest) -> BrakingInfo:
+    """Energy of a braked mass and the resistor that takes it."""
+    built_in = None
+    if request.built_in_ohm is not None and request.built_in_w is not None:
+        built_in = regeneration.Resistor(request.built_in_ohm, request.built_in_w)
+    result = regeneration.braking(
+        regeneration.BrakingCycle(
+            request.inertia_kgm2,
+            request.speed_rpm,
+            request.deceleration_s,
+            request.cycle_s,
+            request.stops_per_cycle,
+            request.efficiency,
+            request.fall_energy_j,
+        ),
+        regeneration.BrakingLimits(
+            request.capacitor_j,
+            built_in,
+            request.min_external_ohm,
+            request.max_external_w,
+            request.on_voltage_v,
+        ),
+    )
+    return BrakingInfo(
+        kinetic_j=result.kinetic_j,
+        returned_j=result.returned_j,
+        excess_j=result.excess_j,
+        average_w=result.average_w,
+        peak_w=result.peak_w,
+        verdict=result.verdict,
+        external_w=result.external_w,
+        min_ohm=result.min_ohm,
+        max_ohm=result.max_ohm,
+        possible=result.possible,
+    )

@@ -1,0 +1,180 @@
+"""Routes of the terminals: state, overruling, touch probes."""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Depends, Request
+
+from backend import io_functions
+from backend.api import convert
+from backend.api.context import Connection, Controlled, TheBench, TheMember
+from backend.api.errors import NotFound
+from backend.api.models import ParameterValue
+from backend.api.models_functions import (
+    ForcingInfo,
+    ForcingStart,
+    ForcingValues,
+    IoInfo,
+    ProbeRequest,
+    TerminalFunction,
+    TerminalInfo,
+)
+from backend.bench import Member
+from backend.forcing import ForcingSession, ForcingSessions
+from backend.functions import functions_of
+from backend.io_functions import ProbeSettings, TerminalState
+from profiles.functions import Forcing, TerminalFacts
+
+router = APIRouter(prefix="/drives/{drive_id}/io")
+Kind = Literal["outputs", "simulation"]
+
+
+def sessions_of(request: Request) -> ForcingSessions:
+    """The sessions that overrule terminals on this bench."""
+    sessions = request.app.state.forcing
+    if not isinstance(sessions, ForcingSessions):
+        raise TypeError("the application was made without forcing sessions")
+    return sessions
+
+
+TheSessions = Annotated[ForcingSessions, Depends(sessions_of)]
+
+
+@router.get("")
+async def terminals(member: TheMember, sessions: TheSessions) -> IoInfo:
+    """All terminals with state, function and polarity, read now."""
+    states = await io_functions.read_terminals(member.drive)
+    facts = functions_of(member.drive.profile).terminals
+    return IoInfo(
+        time=convert.moment(time.time()),
+        terminals=[_terminal(state, facts) for state in states],
+        forcing=[
+            _forcing(spec, sessions.get(member.drive.id, spec.name))
+            for spec in facts.forcing
+            if not member.drive.unreachable_why(member.drive.parameter(spec.value.key))
+        ],
+        notes=facts.notes,
+    )
+
+
+def _terminal(state: TerminalState, facts: TerminalFacts) -> TerminalInfo:
+    terminal = state.terminal
+    shared = next((p for p in facts.polarities if terminal.name in p.bits), None)
+    return TerminalInfo(
+        name=terminal.name,
+        direction=terminal.direction,
+        on=state.on,
+        function=state.function,
+        function_name=state.function_name,
+        function_key=terminal.function_key,
+        functions=[
+            TerminalFunction(code=f.code, name=f.name, help=f.help) for f in terminal.functions
+        ],
+        inverted=state.inverted,
+        polarity_key=shared.key if shared else terminal.polarity_key,
+        polarity_bit=shared.bits[terminal.name] if shared else None,
+        same_function=list(state.same_function),
+        source=terminal.source,
+        notes=terminal.notes,
+    )
+
+
+def _forcing(spec: Forcing, session: ForcingSession | None) -> ForcingInfo:
+    return ForcingInfo(
+        name=spec.name,
+        title=spec.title,
+        help=spec.help,
+        warning=spec.warning,
+        terminals=list(spec.value.bits),
+        two_way=spec.enable is not None or spec.name == "outputs",
+        source=spec.source,
+        notes=spec.notes,
+        running=session is not None,
+        job=session.job.id if session is not None and session.job is not None else None,
+        values=dict(session.values) if session is not None else {},
+    )
+
+
+@router.post("/forcing/{name}")
+async def start_forcing(
+    bench: TheBench,
+    member: Controlled,
+    sessions: TheSessions,
+    name: Kind,
+    request: ForcingStart,
+    connection: Connection = None,
+) -> ForcingInfo:
+    """Begin to overrule terminals; it ends when nobody renews it for five seconds."""
+    session = await sessions.start(
+        member.axis, name, confirmed=request.confirmed, connection=connection
+    )
+    bench.journal.add(
+        f"{member.drive.name}: {session.spec.title}: begun", level="warning", drive=member.drive.id
+    )
+    return _forcing(session.spec, session)
+
+
+@router.put("/forcing/{name}")
+async def overrule(
+    bench: TheBench, member: Controlled, sessions: TheSessions, name: Kind, request: ForcingValues
+) -> ForcingInfo:
+    """Overrule or release terminals; also the sign of life of the page."""
+    session = _running(member, sessions, name)
+    session.renew()
+    if request.values:
+        await session.set(request.values)
+        session.renew()
+        told = ", ".join(
+            f"{n} {'released' if v is None else 'on' if v else 'off'}"
+            for n, v in request.values.items()
+        )
+        bench.journal.add(
+            f"{member.drive.name}: {session.spec.title}: {told}",
+            level="warning",
+            drive=member.drive.id,
+        )
+    return _forcing(session.spec, session)
+
+
+@router.delete("/forcing/{name}")
+async def end_forcing(
+    bench: TheBench, member: TheMember, sessions: TheSessions, name: Kind
+) -> ForcingInfo:
+    """Release everything; everybody may."""
+    session = _running(member, sessions, name)
+    await sessions.end(member.drive.id, name)
+    bench.journal.add(f"{member.drive.name}: {session.spec.title}: ended", drive=member.drive.id)
+    return _forcing(session.spec, None)
+
+
+def _running(member: Member, sessions: ForcingSessions, name: str) -> ForcingSession:
+    session = sessions.get(member.drive.id, name)
+    if session is None:
+        raise NotFound(
+            f"{member.drive.name}: no terminals are overruled like this now",
+            drive=member.drive.name,
+            value=name,
+            remedy="begin again; a session ends when the page falls silent",
+        )
+    return session
+
+
+@router.put("/probes/{number}")
+async def set_probe(
+    bench: TheBench, member: Controlled, number: int, request: ProbeRequest
+) -> ParameterValue:
+    """Set up a touch probe; returns 60B8h as read back."""
+    reading = await io_functions.set_probe(
+        member.drive,
+        number,
+        ProbeSettings(
+            request.on, request.continuous, request.rising, request.falling, request.source
+        ),
+    )
+    bench.journal.add(
+        f"{member.drive.name}: touch probe {number} {'on' if request.on else 'off'}",
+        drive=member.drive.id,
+    )
+    return convert.reading(member.drive, reading.key)

@@ -1,0 +1,56 @@
+"""What the bench remembers of one axis beside its connection: mechanics and watch list.
+
+One small file per axis in the state folder, written whole or not at all.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from backend.files import write_atomically
+from backend.mechanics_calc import Mechanics
+
+
+class AxisRecord(BaseModel):
+    """What is kept of one axis."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    mechanics: Mechanics | None = None
+    watch: tuple[str, ...] = Field(default=(), description="parameter keys, in order")
+
+
+class AxisStore:
+    """Records by the id of the drive."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._known: dict[str, AxisRecord] = {}
+
+    def get(self, drive: str) -> AxisRecord:
+        """The record of an axis; an empty one where nothing (readable) is kept."""
+        if drive not in self._known:
+            try:
+                text = self._file(drive).read_text("utf-8")
+                self._known[drive] = AxisRecord.model_validate_json(text)
+            except (OSError, ValidationError):
+                # Convenience only: a broken file must not keep the axis from being used.
+                self._known[drive] = AxisRecord()
+        return self._known[drive]
+
+    def put(self, drive: str, record: AxisRecord) -> AxisRecord:
+        """Keep a record.
+
+        Raises:
+            StorageFailed: it cannot be written.
+        """
+        self._folder.mkdir(parents=True, exist_ok=True)
+        write_atomically(self._file(drive), record.model_dump_json(indent=1).encode())
+        self._known[drive] = record
+        return record
+
+    def _file(self, drive: str) -> Path:
+        return self._folder / f"{re.sub(r'[^a-z0-9-]', '_', drive)}.json"

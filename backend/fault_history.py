@@ -1,0 +1,120 @@
+"""The faults that a drive itself remembers, with the values that it froze at each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from backend.axis import Axis
+from backend.drive import Drive, Reading
+from backend.faults import integer
+from backend.functions import functions_of
+from drivers.errors import NotAllowed
+from profiles.functions import FaultHistory, HistorySlot
+from profiles.schema import Fault
+
+
+@dataclass(frozen=True, slots=True)
+class PastFault:
+    """One remembered fault. ``fault`` is None where the code is not in the profile."""
+
+    name: str
+    code: int | None
+    code_text: str
+    fault: Fault | None
+    values: tuple[Reading, ...]
+    error: str = ""
+
+
+def history_of(drive: Drive) -> FaultHistory | None:
+    """How this family keeps past faults, or None where nothing is known of it."""
+    return functions_of(drive.profile).history
+
+
+async def read_history(axis: Axis) -> list[PastFault]:
+    """All remembered faults, newest first where the manual says which that is.
+
+    A record that is reached through a selector is selected by a write; the selector is put back.
+
+    Raises:
+        NotAllowed: the drive keeps no record that can be read.
+        DriveError: the link is gone, or the selector could not be put back.
+    """
+    drive = axis.drive
+    history = history_of(drive)
+    if history is None or history.kind == "unreadable":
+        raise NotAllowed(
+            f"{drive.name}: {drive.profile.title} has no fault history that can be read",
+            drive=drive.name,
+            remedy="the tool's own log has what it saw itself",
+        )
+    if history.kind == "slots":
+        return await _slots(drive, history)
+    return await _selected(axis, history)
+
+
+async def _slots(drive: Drive, history: FaultHistory) -> list[PastFault]:
+    keys = [key for slot in history.slots for key in (slot.code_key, *slot.fields)]
+    readings = await drive.read_many(dict.fromkeys(keys))
+    found = [_past(drive.profile.faults, history, slot, readings) for slot in history.slots]
+    return [each for each in found if each is not None]
+
+
+async def _selected(axis: Axis, history: FaultHistory) -> list[PastFault]:
+    drive = axis.drive
+    select, code = history.select_key, history.code_key
+    if select is None or code is None:
+        raise ValueError(f"{drive.profile.drive}: a selected history needs select_key and code_key")
+    found: list[PastFault] = []
+    async with axis.restoring(select):
+        for number in range(history.size):
+            if (await drive.write(select, number)).raw != number:
+                raise NotAllowed(
+                    f"{drive.name}: record {number} cannot be selected",
+                    drive=drive.name,
+                    parameter=select,
+                    value=number,
+                    remedy="write the selector by hand on the Parameters page",
+                )
+            readings = await drive.read_many((code, *history.fields))
+            slot = HistorySlot(name=f"record {number}", code_key=code, fields=history.fields)
+            past = _past(drive.profile.faults, history, slot, readings)
+            if past is not None:
+                found.append(past)
+    return found
+
+
+def _past(
+    faults: Sequence[Fault],
+    history: FaultHistory,
+    slot: HistorySlot,
+    readings: dict[str, Reading],
+) -> PastFault | None:
+    """One record, or None for an empty one."""
+    reading = readings[slot.code_key]
+    code = integer(reading)
+    if code is None:
+        return PastFault(slot.name, None, "", None, (), reading.error or "it could not be read")
+    if code in history.empty_codes:
+        return None
+    fault = named_fault(faults, history, code)
+    text = fault.code if fault else _code_text(history, code)
+    return PastFault(slot.name, code, text, fault, tuple(readings[key] for key in slot.fields))
+
+
+def named_fault(faults: Sequence[Fault], history: FaultHistory, code: int) -> Fault | None:
+    """The fault of the profile that a remembered code means.
+
+    By the written code where the history says how it is written, else by the value of 603Fh.
+    """
+    if history.code_format:
+        text = _code_text(history, code)
+        return next((fault for fault in faults if fault.code == text), None)
+    raw = (code & 0xFFFF) + history.code_base
+    return next((fault for fault in faults if fault.code_raw == raw), None)
+
+
+def _code_text(history: FaultHistory, code: int) -> str:
+    if history.code_format:
+        return history.code_format.format(code + history.code_base)
+    return f"0x{code:04X}"

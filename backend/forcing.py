@@ -1,0 +1,330 @@
+"""Sessions that overrule terminals: forced outputs, simulated inputs.
+
+A session belongs to one person's page. It ends when that page falls silent, when control of the
+axis passes to somebody else, on STOP, and on request; and on every way out the parameters are
+put back to what they were.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from backend.access import Leases
+from backend.axis import Axis
+from backend.drive import Drive
+from backend.functions import functions_of
+from backend.jobs import Job, JobResult, JobRunner, Progress
+from backend.restoring import CLEANUP_TIMEOUT_S, shielded
+from drivers.cia402 import State
+from drivers.errors import NotAllowed, OutOfRange, Rejected
+from profiles.functions import Forcing, TerminalBits
+
+#: A session ends when its page has not renewed it for this long.
+SILENT_S = 5.0
+_LOOK_S = 0.05
+#: Pause after "write settings"; the procedure of the one family that has it waits as long.
+_APPLY_S = 0.1
+
+
+@dataclass(slots=True, eq=False)
+class ForcingSession:
+    """Terminals that a person overrules at present: ``values``, terminal to on or off."""
+
+    axis: Axis
+    spec: Forcing
+    connection: str | None
+    job: Job | None = None
+    values: dict[str, bool] = field(default_factory=dict)
+    renewed: float = field(default_factory=time.monotonic)
+    reason: str = ""
+    before: dict[str, int] = field(default_factory=dict)
+    lock: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    def renew(self) -> None:
+        """The page is alive."""
+        self.renewed = time.monotonic()
+
+    async def set(self, wanted: Mapping[str, bool | None]) -> None:
+        """Overrule terminals, or release them (None).
+
+        Raises:
+            OutOfRange: no such terminal.
+            NotAllowed: the terminal must not be overruled, or its function does not let it.
+            Rejected: the drive does not keep what was written.
+        """
+        for name, value in wanted.items():
+            self._require_known(name)
+            if value is not None:
+                await self._require_allowed(name)
+        async with self.lock:
+            await self._require_appliable()
+            values = {**self.values, **{n: v for n, v in wanted.items() if v is not None}}
+            for name in [n for n, v in wanted.items() if v is None]:
+                values.pop(name, None)
+            await self._write(values)
+            self.values = values
+
+    def _require_known(self, name: str) -> None:
+        if name not in self.spec.value.bits:
+            names = ", ".join(self.spec.value.bits)
+            raise OutOfRange(
+                f"{self.axis.drive.name}: {name} cannot be overruled",
+                drive=self.axis.drive.name,
+                value=name,
+                limit=names,
+                remedy=f"choose one of {names}",
+            )
+
+    async def _require_allowed(self, name: str) -> None:
+        """A brake output is never forced, and an output needs the function that lets it."""
+        drive = self.axis.drive
+        facts = drive.profile.functions.terminals
+        terminal = next((t for t in drive.profile.terminals if t.name == name), None)
+        if terminal is None or terminal.function_key is None:
+            return
+        code = await drive.raw(terminal.function_key)
+        if terminal.direction == "out" and code in facts.brake_functions:
+            raise NotAllowed(
+                f"{drive.name}: {name} has the function brake; forcing it could release a load",
+                drive=drive.name,
+                parameter=terminal.function_key,
+                value=code,
+                remedy="release a brake by hand only with the load held, as its maker says",
+            )
+        needed = self.spec.needs_function
+        if needed is not None and code != needed:
+            label = next((f.name for f in terminal.functions if f.code == needed), str(needed))
+            raise NotAllowed(
+                f"{drive.name}: {name} has function {code}, and only {needed} ({label}) lets it "
+                "be forced",
+                drive=drive.name,
+                parameter=terminal.function_key,
+                value=code,
+                limit=str(needed),
+                remedy=f"give {name} the function {needed} ({label}) first",
+            )
+
+    async def _write(self, values: Mapping[str, bool]) -> None:
+        """Released terminals let go first, and a value is there before a terminal follows it."""
+        enable = self.spec.enable
+        if enable is not None:
+            staying = dict.fromkeys(self.values.keys() & values.keys(), True)
+            await self._write_bits(enable, staying)
+        await self._write_bits(self.spec.value, values)
+        if enable is not None:
+            await self._write_bits(enable, dict.fromkeys(values, True))
+        await apply_settings(self.axis, self.keys)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Parameters of this session; the one that lets go of the terminals comes first."""
+        places = (self.spec.enable, self.spec.value)
+        return tuple(place.key for place in places if place is not None)
+
+    async def _require_appliable(self) -> None:
+        """Where "write settings" is needed, it must not make other changes act by the way.
+
+        Raises:
+            NotAllowed: other parameters wait for it, or the motor is enabled.
+        """
+        drive = self.axis.drive
+        if not needs_settings(drive, self.keys):
+            return
+        waiting = drive.pending.items()
+        others = [key for key, why in waiting if why == "write_settings" and key not in self.keys]
+        if others:
+            raise NotAllowed(
+                f"{drive.name}: {len(others)} changed parameters would begin to act with this: "
+                f"{', '.join(others[:5])}",
+                drive=drive.name,
+                remedy="run “Write settings” for them first, or put them back",
+            )
+        if await self.axis.state() is State.OPERATION_ENABLED:
+            raise NotAllowed(
+                f"{drive.name}: {self.spec.title} needs “write settings”, which is possible only "
+                "while the motor is not enabled",
+                drive=drive.name,
+                remedy="disable the axis first",
+            )
+
+    async def _write_bits(self, place: TerminalBits, wanted: Mapping[str, bool]) -> None:
+        drive = self.axis.drive
+        raw = self.before[place.key]
+        for name, value in wanted.items():
+            bit = 1 << place.bits[name]
+            raw = raw | bit if value else raw & ~bit
+        if drive.readings[place.key].raw == raw:
+            return
+        kept = (await drive.write(place.key, raw)).raw
+        if kept != raw:
+            raise Rejected(
+                f"{drive.name}: {place.key} is 0x{raw:X} as written, and 0x{kept:X} as read back"
+                if isinstance(kept, int)
+                else f"{drive.name}: {place.key} cannot be read back",
+                code=0,
+                drive=drive.name,
+                parameter=place.key,
+                value=kept,
+                remedy="perhaps process data of the running exchange hold this object; end it",
+            )
+
+
+class ForcingSessions:
+    """All sessions of a bench; one per drive and kind."""
+
+    def __init__(self, jobs: JobRunner, leases: Leases) -> None:
+        self._jobs = jobs
+        self._leases = leases
+        self._sessions: dict[tuple[str, str], ForcingSession] = {}
+
+    def get(self, drive: str, name: str) -> ForcingSession | None:
+        """The session that runs, or None."""
+        return self._sessions.get((drive, name))
+
+    async def start(
+        self, axis: Axis, name: str, *, confirmed: bool, connection: str | None
+    ) -> ForcingSession:
+        """Begin to overrule terminals; none is overruled yet.
+
+        Raises:
+            NotAllowed: the drive cannot, a warning was not agreed to, or a session runs already.
+        """
+        drive = axis.drive
+        spec = require_forcing(drive, name)
+        if not confirmed:
+            raise NotAllowed(
+                f"{drive.name}: {spec.title} needs your agreement: {spec.warning}",
+                drive=drive.name,
+                remedy="read the text and confirm",
+            )
+        if (drive.id, name) in self._sessions:
+            raise NotAllowed(
+                f"{drive.name}: {spec.title} is in use already",
+                drive=drive.name,
+                remedy="end it first",
+            )
+        if spec.needs_cyclic and (axis.session is None or not axis.session.running):
+            raise NotAllowed(
+                f"{drive.name}: {spec.title} acts only while process data are exchanged",
+                drive=drive.name,
+                remedy="start the exchange on the Connect page",
+            )
+        session = ForcingSession(axis, spec, connection)
+        ready: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._sessions[drive.id, name] = session
+        session.job = self._jobs.start(
+            "forcing",
+            f"{spec.title}: {drive.name}",
+            lambda progress: self._run(session, ready, progress),
+            drive=drive.id,
+        )
+        if (task := session.job.task) is None:
+            raise RuntimeError("a job that was started has a task")
+        task.add_done_callback(lambda _task: self._ended(session))
+        await asyncio.wait([ready, task], return_when="FIRST_COMPLETED")
+        if session.job.error is not None:
+            raise session.job.error
+        return session
+
+    async def end(self, drive: str, name: str, reason: str = "ended") -> None:
+        """Release everything; returns when it is put back.
+
+        Raises:
+            DriveError: not everything could be put back.
+        """
+        session = self.get(drive, name)
+        if session is None or session.job is None:
+            return
+        session.reason = session.reason or reason
+        await session.job.wait()
+        if session.job.error is not None:
+            raise session.job.error
+
+    def _ended(self, session: ForcingSession) -> None:
+        self._sessions.pop((session.axis.drive.id, session.spec.name), None)
+
+    async def _run(
+        self, session: ForcingSession, ready: asyncio.Future[None], progress: Progress
+    ) -> JobResult:
+        axis, keys = session.axis, session.keys
+        try:
+            async with axis.restoring(*keys) as before:
+                session.before = {key: int(raw) for key, raw in before.items()}
+                if missing := [key for key in keys if key not in session.before]:
+                    raise NotAllowed(
+                        f"{axis.drive.name}: {', '.join(missing)} cannot be read",
+                        drive=axis.drive.name,
+                    )
+                ready.set_result(None)
+                await self._watch(session, progress)
+        finally:
+            # The real terminals must count again even if somebody enabled the axis meanwhile.
+            await shielded(lambda: apply_settings(axis, keys), CLEANUP_TIMEOUT_S, axis.drive.name)
+        return {"reason": session.reason}
+
+    async def _watch(self, session: ForcingSession, progress: Progress) -> None:
+        """Until there is a reason to end; a write that is under way is waited for."""
+        stopped = session.axis.stopped
+        while not session.reason:
+            progress(0.0, _words(session))
+            await asyncio.sleep(_LOOK_S)
+            session.reason = session.reason or self._why_end(session, stopped)
+            stopped = session.axis.stopped
+        async with session.lock:
+            pass
+
+    def _why_end(self, session: ForcingSession, was_stopped: bool) -> str:
+        if session.axis.stopped and not was_stopped:
+            return "STOP was pressed"
+        if time.monotonic() - session.renewed > SILENT_S:
+            return "the page fell silent"
+        holder = self._leases.holder(session.axis.drive.id)
+        if holder is not None and holder.connection != session.connection:
+            return f"{holder.person} took control"
+        return ""
+
+
+def _words(session: ForcingSession) -> str:
+    if not session.values:
+        return "nothing is overruled yet"
+    return ", ".join(f"{n} {'on' if v else 'off'}" for n, v in sorted(session.values.items()))
+
+
+def needs_settings(drive: Drive, keys: tuple[str, ...]) -> bool:
+    """Whether these parameters act only after "write settings"."""
+    return any(drive.parameter(key).effective == "write_settings" for key in keys)
+
+
+async def apply_settings(axis: Axis, keys: tuple[str, ...]) -> None:
+    """Make these parameters act, where the family needs a command for it."""
+    drive = axis.drive
+    quirk = drive.profile.quirk("write_settings")
+    if quirk is None or quirk.key is None or quirk.raw is None or not needs_settings(drive, keys):
+        return
+    await drive.command(quirk.key, quirk.raw)
+    await asyncio.sleep(_APPLY_S)
+    drive.mark_applied("write_settings")
+
+
+def require_forcing(drive: Drive, name: str) -> Forcing:
+    """How this family overrules terminals.
+
+    Raises:
+        NotAllowed: it cannot, or not over the connected port.
+    """
+    found = functions_of(drive.profile).terminals.forcing
+    spec = next((each for each in found if each.name == name), None)
+    if spec is None:
+        raise NotAllowed(
+            f"{drive.name}: {drive.profile.title} has no way to overrule terminals like this",
+            drive=drive.name,
+            value=name,
+            limit=", ".join(each.name for each in found) or "none",
+        )
+    for place in (spec.enable, spec.value):
+        if place is not None and (why := drive.unreachable_why(drive.parameter(place.key))):
+            raise NotAllowed(f"{drive.name}: {place.key}: {why}", drive=drive.name)
+    return spec

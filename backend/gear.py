@@ -1,0 +1,105 @@
+"""Writes an electronic gear as one step: all of it, or what was there before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from backend.axis import Axis
+from backend.mechanics_calc import GearPlan, GearValue, Mechanics, plan_gear
+from backend.units import encoder_counts
+from drivers.cia402 import State
+from drivers.errors import DriveError, NotAllowed, Rejected
+from profiles.schema import Raw
+
+#: Numbers that keep their value and so change their meaning with the gear.
+_COUNTED_ROLES = (
+    "software_limit_min", "software_limit_max", "home_offset", "following_error_window",
+    "profile_velocity", "profile_acceleration", "profile_deceleration",
+    "quick_stop_deceleration", "homing_speed_switch", "homing_speed_zero",
+    "homing_acceleration",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class GearChange:
+    """What was written: ``before`` takes it back; ``waits`` is what must happen before it acts."""
+
+    before: dict[str, int]
+    waits: dict[str, str]
+
+
+async def plan(axis: Axis, mechanics: Mechanics) -> GearPlan:
+    """Gear parameters for these mechanics, with the encoder that the drive reports.
+
+    Raises:
+        OutOfRange: they do not fit. DriveError: the drive cannot be asked.
+    """
+    return plan_gear(axis.drive.profile, mechanics, await encoder_counts(axis.drive))
+
+
+def counted_in_increments(axis: Axis) -> list[str]:
+    """Parameters whose numbers mean something else under another gear."""
+    drive = axis.drive
+    found = []
+    for role in _COUNTED_ROLES:
+        parameter = drive.profile.by_role.get(role)
+        if parameter is not None and ("inc" in parameter.unit or parameter.unit == "pulse"):
+            found.append(parameter.key)
+    return found
+
+
+async def write_gear(axis: Axis, values: Sequence[GearValue]) -> GearChange:
+    """Write all values, each read back; on a failure those written before are put back.
+
+    Raises:
+        NotAllowed: the axis is enabled. Rejected: the drive keeps another value.
+        DriveError: a write failed; the message says what could not be put back.
+    """
+    drive = axis.drive
+    if await axis.state() is State.OPERATION_ENABLED:
+        raise NotAllowed(
+            f"{drive.name}: the gear changes what a position means, and the axis is enabled",
+            drive=drive.name,
+            remedy="disable the axis first",
+        )
+    before: dict[str, int] = {}
+    for value in values:
+        before[value.parameter.key] = await drive.raw(value.parameter.key)
+    done: list[str] = []
+    try:
+        for value in values:
+            key = value.parameter.key
+            if before[key] == value.raw:
+                continue
+            done.append(key)
+            kept: Raw | None = (await drive.write(key, value.raw)).raw
+            if kept != value.raw:
+                raise Rejected(
+                    f"{drive.name}: {key} {value.parameter.name} keeps {kept} instead of "
+                    f"{value.raw}",
+                    code=0,
+                    drive=drive.name,
+                    parameter=key,
+                    value=value.raw,
+                    remedy="see its range; the gear is as it was before",
+                )
+    except DriveError as error:
+        await _put_back(axis, {key: before[key] for key in reversed(done)}, error)
+        raise
+    finally:
+        axis.forget()
+    waits = {key: why for key, why in drive.pending.items() if key in done}
+    return GearChange({key: before[key] for key in done}, waits)
+
+
+async def _put_back(axis: Axis, before: dict[str, int], error: DriveError) -> None:
+    left: list[str] = []
+    for key, raw in before.items():
+        try:
+            await axis.drive.write(key, raw)
+        except DriveError as other:
+            left.append(f"{key} (was {raw}): {other.message}")
+    if left:
+        error.message += f"; not put back: {'; '.join(left)}"
+        error.args = (error.message,)
