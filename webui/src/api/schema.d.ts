@@ -1344,7 +1344,7 @@ export interface paths {
         };
         /**
          * Read Measurement
-         * @description One measurement, evaluated anew from its raw data and compared with its first result.
+         * @description One measurement, evaluated anew from its raw data.
          */
         get: operations["read_measurement"];
         put?: never;
@@ -3695,27 +3695,7 @@ export interface components {
          * @description Its settings, and its result evaluated anew from the raw data.
          */
         MeasurementContent: {
-            /**
-             * Agrees
-             * @description whether the result is the one that was concluded at the time; null: unknown
-             */
-            agrees: boolean | null;
-            /**
-             * Differences
-             * @description fields that differ, at most five
-             */
-            differences: string[];
             info: components["schemas"]["MeasurementInfo"];
-            /**
-             * Profile Version
-             * @description digest of the profile it was measured with
-             */
-            profile_version: string;
-            /**
-             * Program
-             * @description version of servodeck that measured; empty: not told
-             */
-            program: string;
             /** Result */
             result: {
                 [key: string]: unknown;
