@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from backend.bench import Bench
-from backend.commands import measure, params, profile
+from backend.commands import measure, params, profile, report
 from backend.commands.serve import serve as run_server
 from backend.commands.serve import state_folder
 from backend.commands.session import opened, run, show_progress
@@ -31,6 +31,8 @@ app.add_typer(params.app, name="params")
 app.add_typer(profile.app, name="profile")
 app.command("sweep")(measure.sweep)
 app.command("inertia")(measure.inertia)
+app.command("report")(report.report)
+app.command("recompute")(report.recompute)
 
 Host = Annotated[str, typer.Option(help="address to listen on")]
 Port = Annotated[int, typer.Option(help="port to listen on; 0 takes a free one")]

@@ -1,15 +1,19 @@
 """Stored measurements: the raw signals, how they were made, and what was concluded.
 
 One file each (``.sdmeas``, a zip as numpy writes it): ``meta`` is JSON, every other member an
-array. Whoever opens it can evaluate it anew; see `recompute`.
+array. Whoever opens it can evaluate it anew; see `backend.evaluation`.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
+import struct
 import zipfile
-from collections.abc import Mapping
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,14 +21,17 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+import backend
 from backend.drive import Drive
 from backend.files import checked_name, write_atomically
-from backend.tools import inertia as inertia_tool
-from backend.tools import sweep as sweep_tool
 from drivers.errors import NotAllowed
+from profiles.schema import Profile
 
 SUFFIX = ".sdmeas"
 VERSION = 1
+#: Unpacked size that no measurement reaches; more is a file made to exhaust the memory.
+_MAX_UNPACKED = 1024 * 1024 * 1024
+_MAX_HEAD = 64 * 1024 * 1024
 Arrays = dict[str, npt.NDArray[np.generic]]
 
 
@@ -35,14 +42,36 @@ class BadMeasurement(NotAllowed):
 
 
 @dataclass(frozen=True)
-class Measurement:
+class Head:
     """``meta`` holds settings and facts of the tool, identity, profile, time, and the result."""
 
     kind: str
     saved: datetime
     drive: str
     meta: dict[str, object]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A whole file: what it says of itself, and the raw signals [n] by name."""
+
+    head: Head
     arrays: Arrays
+
+    @property
+    def kind(self) -> str:
+        """Tool and what it measured, such as ``sweep-mechanics``."""
+        return self.head.kind
+
+    @property
+    def meta(self) -> dict[str, object]:
+        """See `Head`."""
+        return self.head.meta
+
+
+def profile_version(profile: Profile) -> str:
+    """Twelve hex digits that change with anything that the profile says."""
+    return hashlib.sha256(profile.model_dump_json().encode()).hexdigest()[:12]
 
 
 def pack(
@@ -61,7 +90,11 @@ def pack(
         "kind": kind,
         "saved": saved.isoformat(),
         "drive": drive.name,
+        "drive_id": drive.id,
+        "program": backend.__version__,
         "profile": drive.profile.drive,
+        "profile_title": drive.profile.title,
+        "profile_version": profile_version(drive.profile),
         "manual": drive.profile.manual,
         "identity": {
             "vendor_id": found.vendor_id, "product_code": found.product_code,
@@ -69,6 +102,10 @@ def pack(
         } if found else None,
         "result": result,
     }  # fmt: skip
+    return _zipped(head, arrays)
+
+
+def _zipped(head: Mapping[str, object], arrays: Mapping[str, npt.NDArray[np.generic]]) -> bytes:
     out = io.BytesIO()
     text = np.frombuffer(json.dumps(head, default=str).encode(), dtype=np.uint8)
     members: dict[str, npt.NDArray[np.generic]] = {"meta": text}
@@ -87,48 +124,53 @@ def unpack(data: bytes, name: str = "the file") -> Measurement:
     Raises:
         BadMeasurement: not a measurement, damaged, or of a newer version.
     """
-    try:
+    with _told(name), zipfile.ZipFile(io.BytesIO(data)) as archive:
+        if sum(each.file_size for each in archive.infolist()) > _MAX_UNPACKED:
+            raise ValueError("it is larger than any measurement")
         arrays: Arrays = {}
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            for member in archive.namelist():
-                values = np.load(io.BytesIO(archive.read(member)), allow_pickle=False)
-                arrays[member.removesuffix(".npy").replace(".", "/")] = values
-        meta = json.loads(arrays.pop("meta").tobytes())
-        if int(meta["version"]) > VERSION:
-            raise BadMeasurement(
-                f"{name} was written by a newer version", value=name,
-                remedy="update servodeck to open it",
-            )  # fmt: skip
-        saved = datetime.fromisoformat(meta["saved"])
-        return Measurement(str(meta["kind"]), saved, str(meta["drive"]), meta, arrays)
-    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, EOFError) as error:
-        raise BadMeasurement(
-            f"{name} is not a measurement: {error}", value=name,
-            remedy="choose a file that servodeck wrote",
-        ) from error  # fmt: skip
+        for member in archive.namelist():
+            values = np.load(io.BytesIO(archive.read(member)), allow_pickle=False)
+            arrays[member.removesuffix(".npy").replace(".", "/")] = values
+        return Measurement(_head(arrays.pop("meta"), name), arrays)
 
 
-def recompute(measurement: Measurement) -> dict[str, object]:
-    """Evaluate the raw data anew; the tool's JSON form.
+def unpack_head(file: Path) -> Head:
+    """What a file says of itself, without its signals.
 
     Raises:
-        BadMeasurement: of a kind that cannot be evaluated anew, or not complete.
+        BadMeasurement: as `unpack`; damage in the signals is not seen.
     """
+    with _told(file.name), zipfile.ZipFile(file) as archive:
+        if archive.getinfo("meta.npy").file_size > _MAX_HEAD:
+            raise ValueError("it is larger than any measurement")
+        values = np.load(io.BytesIO(archive.read("meta.npy")), allow_pickle=False)
+        return _head(values, file.name)
+
+
+def _head(text: npt.NDArray[np.generic], name: str) -> Head:
+    meta = json.loads(text.tobytes())
+    if int(meta["version"]) > VERSION:
+        raise BadMeasurement(
+            f"{name} was written by a newer version", value=name,
+            remedy="update servodeck to open it",
+        )  # fmt: skip
+    saved = datetime.fromisoformat(meta["saved"])
+    return Head(str(meta["kind"]), saved, str(meta["drive"]), meta)
+
+
+@contextmanager
+def _told(name: str) -> Iterator[None]:
+    """Whatever a damaged file makes its readers say becomes one kind of error."""
     try:
-        match measurement.meta.get("tool"):
-            case "sweep":
-                return sweep_tool.as_json(
-                    sweep_tool.reevaluate(measurement.arrays, measurement.meta)
-                )
-            case "inertia":
-                return inertia_tool.as_json(
-                    inertia_tool.reevaluate(measurement.arrays, measurement.meta)
-                )
-    except ValueError as error:
-        raise BadMeasurement(str(error), value=measurement.kind) from error
-    raise BadMeasurement(
-        f"a measurement of kind {measurement.kind} has nothing to evaluate", value=measurement.kind
-    )
+        yield
+    except (
+        zipfile.BadZipFile, zlib.error, struct.error, KeyError, ValueError, TypeError, EOFError,
+        OSError, NotImplementedError,
+    ) as error:  # fmt: skip
+        raise BadMeasurement(
+            f"{name} is damaged, or no measurement: {error}", value=name,
+            remedy="choose a file that servodeck wrote, or get an undamaged copy",
+        ) from error  # fmt: skip
 
 
 class MeasurementStore:
@@ -158,6 +200,17 @@ class MeasurementStore:
         write_atomically(self.folder / name, pack(kind, drive, arrays, meta, saved, result))
         return name
 
+    def conclude(self, name: str, result: Mapping[str, object]) -> None:
+        """Add to a file what was concluded from it, so that a later evaluation can be compared.
+
+        Raises:
+            NotAllowed: no such file. StorageFailed: the disk; the file is as it was.
+        """
+        found = self.load(name)
+        head = {**found.meta, "result": result}
+        path = self.folder / checked_name(name, SUFFIX)
+        write_atomically(path, _zipped(head, found.arrays))
+
     def names(self) -> list[str]:
         """File names, newest first."""
         found = sorted((p.name for p in self.folder.glob(f"*{SUFFIX}")), reverse=True)
@@ -182,6 +235,17 @@ class MeasurementStore:
             NotAllowed: no such file. BadMeasurement: not usable.
         """
         return unpack(self.read(name), name)
+
+    def head(self, name: str) -> Head:
+        """What a file says of itself.
+
+        Raises:
+            NotAllowed: no such file. BadMeasurement: not usable.
+        """
+        path = self.folder / checked_name(name, SUFFIX)
+        if not path.is_file():
+            raise NotAllowed(f"there is no measurement {path.name}", value=path.name)
+        return unpack_head(path)
 
     def store(self, name: str, data: bytes) -> str:
         """Take a file from elsewhere; returns its name.

@@ -179,6 +179,12 @@ class MeasurementContent(Message):
     info: MeasurementInfo
     settings: dict[str, object]
     result: dict[str, object]
+    agrees: bool | None = Field(
+        description="whether the result is the one that was concluded at the time; null: unknown"
+    )
+    differences: list[str] = Field(description="fields that differ, at most five")
+    program: str = Field(description="version of servodeck that measured; empty: not told")
+    profile_version: str = Field(description="digest of the profile it was measured with")
 
 
 class CandidatesRequest(Message):

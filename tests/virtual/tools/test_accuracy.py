@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import pytest
 
-from backend.measurements import pack, recompute, unpack
+from backend.evaluation import recompute
+from backend.measurements import pack, unpack
 from backend.tools.autotune import AutotuneSettings, autotune
 from backend.tools.inertia import InertiaSettings, inertia
 from backend.tools.sweep import SweepSettings, as_json, sweep

@@ -1,0 +1,231 @@
+"""Routes of notches, gains and design on stored responses."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+
+import numpy as np
+from fastapi import APIRouter
+
+from backend.analysis.arrays import magnitude_db, phase_deg
+from backend.analysis.design import (
+    Gains,
+    MeasuredPlant,
+    measured_plant,
+    speed_loop,
+    step_of_closed_loop,
+)
+from backend.analysis.margins import closed_from_open, sensitivity
+from backend.analysis.notch import Notch, RealisedNotch
+from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.models_tune import (
+    CandidatesInfo,
+    CandidatesRequest,
+    GainInfo,
+    GainWrite,
+    NotchPreviewInfo,
+    NotchPreviewRequest,
+    NotchShape,
+    NotchSlotInfo,
+    NotchWrite,
+    PredictionInfo,
+    PredictRequest,
+    RealisedInfo,
+    Undo,
+)
+from backend.api.routes_measurements import change_log, load_measurement
+from backend.bench import Bench, Member
+from backend.measurements import BadMeasurement
+from backend.report.changes import Change
+from backend.tools import autotune, gains, notch, sweep
+from backend.tools.axis_facts import read_facts
+from backend.tools.temporary import put_back, write_settings
+from drivers.errors import NotAllowed, OutOfRange
+
+router = APIRouter()
+
+
+def _shape(found: Notch | None) -> NotchShape | None:
+    return None if found is None else NotchShape(
+        center_hz=found.center_hz, width_hz=found.width_hz, depth_db=found.depth_db
+    )  # fmt: skip
+
+
+def _realised(found: RealisedNotch | None) -> RealisedInfo | None:
+    if found is None:
+        return None
+    return RealisedInfo(
+        center_hz=found.center_hz,
+        width_hz=found.width_hz if np.isfinite(found.width_hz) else None,
+        depth_db=found.depth_db,
+        dc_gain_db=found.dc_gain_db if np.isfinite(found.dc_gain_db) else None,
+        stable=found.stable,
+    )
+
+
+def _notches(wanted: Sequence[NotchShape | None]) -> list[Notch | None]:
+    return [None if w is None else Notch(w.center_hz, w.width_hz, w.depth_db) for w in wanted]
+
+
+async def _note(bench: Bench, member: Member, what: str, before: Mapping[str, int]) -> None:
+    """Keep a change for the report, with what the drive says now."""
+    after = {key: await member.drive.raw(key) for key in before}
+    change_log(bench).add(member.drive.id, Change(datetime.now(UTC), what, before, after))
+
+
+@router.get("/drives/{drive_id}/notches")
+async def read_notches(member: TheMember) -> list[NotchSlotInfo]:
+    """All notches of the drive, read now."""
+    return [
+        NotchSlotInfo(
+            slot=s.slot, enabled=s.enabled, notch=_shape(s.notch), realised=_realised(s.realised),
+            raw=dict(s.raw), note=s.note,
+        )
+        for s in await notch.read_notches(member.drive)
+    ]  # fmt: skip
+
+
+@router.post("/drives/{drive_id}/notches/preview")
+async def preview_notches(member: TheMember, request: NotchPreviewRequest) -> NotchPreviewInfo:
+    """What the drive would make of these notches. Nothing is read or written."""
+    profile, name = member.drive.profile, member.drive.name
+    wanted = _notches(request.notches)
+    slots = [notch.encode(profile, name, n, w, None) for n, w in enumerate(wanted)]
+    f = np.asarray(request.frequency_hz, dtype=np.float64)
+    total = notch.combined(profile, [w for w in wanted if w is not None], f)
+    return NotchPreviewInfo(
+        slots=[
+            NotchSlotInfo(
+                slot=p.slot, enabled=p.asked is not None, notch=_shape(p.asked),
+                realised=_realised(p.realised), raw=dict(p.raw), note=p.note,
+            )
+            for p in slots
+        ],
+        magnitude_db=magnitude_db(total).tolist(),
+        phase_deg=np.degrees(np.angle(total)).tolist(),
+    )  # fmt: skip
+
+
+@router.put("/drives/{drive_id}/notches")
+async def write_notches(bench: TheBench, member: Controlled, request: NotchWrite) -> Undo:
+    """Write all notches and make them act; saving is another step."""
+    bench.require_idle(member)
+    before = await notch.write_notches(member.axis, _notches(request.notches))
+    await _note(bench, member, "notches", before)
+    bench.journal.add(f"{member.drive.name}: notches written", drive=member.drive.id)
+    return Undo(before=before)
+
+
+@router.get("/drives/{drive_id}/gains")
+async def read_gains(member: TheMember) -> GainInfo:
+    """Loop gains, read now."""
+    facts = await read_facts(member.axis)
+    found = await gains.read_gains(member.axis, facts)
+    tables = member.drive.profile.stiffness
+    return GainInfo(
+        convention=found.convention, position_1_s=found.position_1_s, speed_hz=found.speed_hz,
+        speed_nms=found.speed_nms, integral_hz=found.integral_hz, level=found.level,
+        levels=sorted(tables[0].rows) if tables else [],
+        inertia_kgm2=facts.drive_inertia_kgm2, current_bandwidth_hz=facts.current_bandwidth_hz,
+        speed_filter_hz=facts.speed_filter_hz,
+        rated_torque_nm=facts.rated_torque_nm if facts.torque_known else None, raw=found.raw,
+    )  # fmt: skip
+
+
+@router.put("/drives/{drive_id}/gains")
+async def write_gains(bench: TheBench, member: Controlled, request: GainWrite) -> Undo:
+    """Write gains or a stiffness level and make them act; saving is another step."""
+    bench.require_idle(member)
+    if (request.gains is None) == (request.level is None):
+        raise OutOfRange("give either gains or a level", drive=member.drive.name)
+    if request.gains is not None:
+        g = request.gains
+        wanted = _gains(g.speed_bandwidth_hz, g.integral_hz, g.position_1_s, g.inertia_kgm2)
+        raw = gains.plan_gains(member.drive, wanted, g.inertia_kgm2)
+    else:
+        raw = gains.plan_level(member.drive, request.level or 0)
+    before = await write_settings(member.axis, raw)
+    await _note(bench, member, "gains", before)
+    bench.journal.add(f"{member.drive.name}: gains written", drive=member.drive.id)
+    return Undo(before=before)
+
+
+def _gains(speed_hz: float, integral_hz: float, position_1_s: float, inertia_kgm2: float) -> Gains:
+    return Gains(2 * np.pi * speed_hz * inertia_kgm2, integral_hz, position_1_s, speed_hz)
+
+
+@router.post("/drives/{drive_id}/tune/undo")
+async def undo_tuning(bench: TheBench, member: Controlled, request: Undo) -> Undo:
+    """Put back what a change returned as `before`; returns what was there until now."""
+    bench.require_idle(member)
+    now = {key: await member.drive.raw(key) for key in request.before}
+    await put_back(member.axis, request.before)
+    await _note(bench, member, "undo", now)
+    bench.journal.add(f"{member.drive.name}: tuning taken back", drive=member.drive.id)
+    return Undo(before=now)
+
+
+async def _plant(bench: Bench, name: str) -> tuple[MeasuredPlant, sweep.SweepResult]:
+    measurement = load_measurement(bench, name)
+    if measurement.meta.get("tool") != "sweep":
+        raise BadMeasurement(f"{name} is not a frequency response", value=name)
+    try:
+        found = await asyncio.to_thread(sweep.reevaluate, measurement.arrays, measurement.meta)
+    except ValueError as error:
+        raise BadMeasurement(f"{name}: {error}", value=name) from error
+    if found.model is None:
+        raise NotAllowed(
+            f"{name}: nothing can be designed on it: "
+            + ("; ".join(found.warnings) or "it is not of the mechanics"),
+            value=name, remedy="measure the mechanics, with enough excitation",
+        )  # fmt: skip
+    return measured_plant(found.frf, found.model), found
+
+
+@router.post("/drives/{drive_id}/tune/candidates")
+async def candidates(
+    bench: TheBench, member: TheMember, request: CandidatesRequest
+) -> CandidatesInfo:
+    """Notch sets and gains for a stored response. Nothing is written."""
+    plant, found = await _plant(bench, request.measurement)
+    facts = await read_facts(member.axis)
+    load = request.load or autotune.load_class(found)
+    table = await asyncio.to_thread(
+        autotune.candidates_for, member.drive, facts, plant, request.inertia_kgm2, load,
+        request.sample_rate_hz,
+    )  # fmt: skip
+    return CandidatesInfo(load=load, candidates=[autotune.candidate_json(c) for c in table])
+
+
+@router.post("/drives/{drive_id}/tune/predict")
+async def predict(bench: TheBench, member: TheMember, request: PredictRequest) -> PredictionInfo:
+    """The speed loop that notches and gains would make of a stored response."""
+    plant, _found = await _plant(bench, request.measurement)
+    facts = await read_facts(member.axis)
+    wanted = [n for n in _notches(request.notches) if n is not None]
+    g, f = request.gains, plant.frequency_hz
+    try:
+        filters = notch.combined(member.drive.profile, wanted, f)
+    except ValueError as error:
+        raise OutOfRange(f"{member.drive.name}: {error}", drive=member.drive.name) from error
+    fixed = gains.loops_of(member.drive, facts).response(f) * filters
+    opened = speed_loop(
+        f, plant.response(), np.asarray(fixed),
+        _gains(g.speed_bandwidth_hz, g.integral_hz, g.position_1_s, g.inertia_kgm2),
+    )  # fmt: skip
+    closed = closed_from_open(opened)
+    time, value = step_of_closed_loop(f, closed, duration_s=0.5)
+    thin = slice(None, None, max(1, time.size // 2000))
+    return PredictionInfo(
+        frequency_hz=f.tolist(),
+        open_db=magnitude_db(opened).tolist(),
+        open_deg=phase_deg(opened).tolist(),
+        closed_db=magnitude_db(closed).tolist(),
+        closed_deg=phase_deg(closed).tolist(),
+        sensitivity_db=magnitude_db(sensitivity(opened)).tolist(),
+        step_time_s=time[thin].tolist(),
+        step=value[thin].tolist(),
+        margins=sweep.margins_of(f, opened),
+    )

@@ -1,0 +1,117 @@
+"""Routes of stored measurements: list, evaluate anew, take in, hand out, delete."""
+
+from __future__ import annotations
+
+import asyncio
+from datetime import UTC
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from backend.api.context import TheBench
+from backend.api.errors import NotFound
+from backend.api.models_tune import MeasurementContent, MeasurementInfo
+from backend.bench import Bench
+from backend.evaluation import evaluate
+from backend.measurements import SUFFIX, BadMeasurement, Head, Measurement
+from backend.report.changes import ChangeLog
+from drivers.errors import NotAllowed, OutOfRange
+
+router = APIRouter()
+_MAX_BYTES = 64 * 1024 * 1024
+
+
+def change_log(bench: Bench) -> ChangeLog:
+    """What tuning wrote, drive by drive."""
+    return ChangeLog(bench.state_folder / "changes")
+
+
+def load_measurement(bench: Bench, name: str) -> Measurement:
+    """A stored measurement.
+
+    Raises:
+        NotFound: there is none of this name. BadMeasurement: not usable.
+    """
+    try:
+        return bench.measurements.load(name)
+    except BadMeasurement:
+        raise
+    except NotAllowed as error:
+        raise NotFound(error.message, value=name) from error
+
+
+def _info(name: str, found: Head) -> MeasurementInfo:
+    identity = found.meta.get("identity")
+    serial = identity.get("serial") if isinstance(identity, dict) else None
+    return MeasurementInfo(
+        file=name, kind=found.kind, drive=found.drive, profile=str(found.meta.get("profile", "")),
+        serial=serial, saved=found.saved.astimezone(UTC),
+    )  # fmt: skip
+
+
+@router.get("/measurements")
+async def list_measurements(bench: TheBench) -> list[MeasurementInfo]:
+    """Stored measurements, newest first; unusable ones say why."""
+    return await asyncio.to_thread(_listed, bench)
+
+
+def _listed(bench: Bench) -> list[MeasurementInfo]:
+    rows = []
+    for name in bench.measurements.names():
+        try:
+            rows.append(_info(name, bench.measurements.head(name)))
+        except BadMeasurement as error:
+            rows.append(
+                MeasurementInfo(
+                    file=name, kind="", drive="", profile="", serial=None, saved=None,
+                    problem=error.message,
+                )
+            )  # fmt: skip
+    return rows
+
+
+@router.get("/measurements/{name}")
+async def read_measurement(bench: TheBench, name: str) -> MeasurementContent:
+    """One measurement, evaluated anew from its raw data and compared with its first result."""
+    found = await asyncio.to_thread(load_measurement, bench, name)
+    made = await asyncio.to_thread(evaluate, found)
+    settings = found.meta.get("settings")
+    return MeasurementContent(
+        info=_info(name, found.head),
+        settings=settings if isinstance(settings, dict) else {},
+        result=made.result,
+        agrees=made.agrees,
+        differences=list(made.differences),
+        program=str(found.meta.get("program", "")),
+        profile_version=str(found.meta.get("profile_version", "")),
+    )
+
+
+@router.get("/measurements/{name}/file", response_class=Response)
+async def download_measurement(bench: TheBench, name: str) -> Response:
+    """The file itself, raw signals included."""
+    load_measurement(bench, name)
+    return Response(
+        bench.measurements.read(name),
+        media_type="application/octet-stream",
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
+
+
+@router.post("/measurements", status_code=201)
+async def upload_measurement(
+    bench: TheBench, request: Request, name: Annotated[str, Query(max_length=100)]
+) -> MeasurementInfo:
+    """Take a file of another computer; the body is the file."""
+    data = await request.body()
+    if len(data) > _MAX_BYTES:
+        raise OutOfRange(f"{name} is too large", value=len(data), limit=f"{_MAX_BYTES} bytes")
+    stored = bench.measurements.store(name.removesuffix(SUFFIX) + SUFFIX, data)
+    return _info(stored, bench.measurements.head(stored))
+
+
+@router.delete("/measurements/{name}", status_code=204)
+async def delete_measurement(bench: TheBench, name: str) -> None:
+    """Delete a file."""
+    load_measurement(bench, name)
+    bench.measurements.delete(name)

@@ -1,0 +1,111 @@
+"""Routes of the commissioning report."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from datetime import UTC, datetime
+
+from fastapi import APIRouter, Response
+
+from backend.api.context import TheBench, TheMember
+from backend.api.errors import NotFound
+from backend.api.models_report import ReportInfo, ReportRequest
+from backend.api.routes_measurements import change_log, load_measurement
+from backend.bench import Bench, Member
+from backend.measurements import BadMeasurement, Head
+from backend.report.gather import About, belongs, choose, kind_of, live_facts, measured_from
+from backend.report.store import Format, ReportStore, render
+from drivers.errors import NotAllowed
+
+router = APIRouter()
+_TYPES: dict[Format, str] = {"html": "text/html; charset=utf-8", "pdf": "application/pdf"}
+
+
+def _store(bench: Bench) -> ReportStore:
+    return ReportStore(bench.state_folder / "reports")
+
+
+@router.post("/drives/{drive_id}/reports", status_code=201)
+async def make_report(bench: TheBench, member: TheMember, request: ReportRequest) -> ReportInfo:
+    """Evaluate the measurements of an axis anew and write its report. Nothing moves."""
+    changes = change_log(bench).read(member.drive.id)
+    first = changes[0].time if changes else None
+    chosen = await asyncio.to_thread(_chosen, bench, member, request.measurements, first)
+    facts = await live_facts(
+        bench, member, changes, About(request.person, request.machine, request.notes)
+    )
+    measured, unusable = await asyncio.to_thread(measured_from, bench.measurements, chosen)
+    whole = replace(facts, measured=measured, unusable=unusable)
+    data = await asyncio.to_thread(render, whole, request.language, request.format)
+    file = await asyncio.to_thread(_store(bench).save, member.drive.name, request.format, data)
+    bench.journal.add(f"{member.drive.name}: report {file}", drive=member.drive.id)
+    return _info(bench, file)
+
+
+def _chosen(
+    bench: Bench, member: Member, asked: list[str] | None, first: datetime | None
+) -> list[tuple[str, str]]:
+    """Files of the report, each with the one it is compared with.
+
+    Raises:
+        NotFound: there is no such file. NotAllowed: it is of another drive.
+    """
+    heads: dict[str, Head] = {}
+    for name in bench.measurements.names() if asked is None else asked:
+        if asked is not None:
+            load_measurement(bench, name)
+        try:
+            head = bench.measurements.head(name)
+        except BadMeasurement:
+            continue
+        if belongs(head, member.drive):
+            heads[name] = head
+        elif asked is not None:
+            raise NotAllowed(
+                f"{name} was not measured on {member.drive.name}", drive=member.drive.name,
+                value=name, remedy="choose measurements of this drive",
+            )  # fmt: skip
+    if asked is None or len({kind_of(head) for head in heads.values()}) == len(heads):
+        return choose(heads, first)
+    # Chosen by hand: of two of a kind the older one is what the newer is compared with.
+    return choose(heads, max(head.saved for head in heads.values()))
+
+
+def _info(bench: Bench, file: str) -> ReportInfo:
+    status = (_store(bench).folder / file).stat()
+    form: Format = "html" if file.endswith(".html") else "pdf"
+    made = datetime.fromtimestamp(status.st_mtime, UTC)
+    return ReportInfo(file=file, format=form, made=made, size_bytes=status.st_size)
+
+
+@router.get("/reports")
+async def list_reports(bench: TheBench) -> list[ReportInfo]:
+    """Stored reports, newest first."""
+    return [_info(bench, name) for name in _store(bench).names()]
+
+
+@router.get("/reports/{name}", response_class=Response)
+async def read_report(bench: TheBench, name: str) -> Response:
+    """The file, to be shown in the browser."""
+    try:
+        data = await asyncio.to_thread(_store(bench).read, name)
+    except NotAllowed as error:
+        raise NotFound(error.message, value=name) from error
+    form: Format = "html" if name.endswith(".html") else "pdf"
+    headers = {"Content-Disposition": f'inline; filename="{name}"'}
+    if form == "html":
+        # Whatever a file in this folder contains, it runs nothing and belongs to no origin.
+        headers["Content-Security-Policy"] = (
+            "default-src 'none'; style-src 'unsafe-inline'; sandbox allow-modals"
+        )
+    return Response(data, media_type=_TYPES[form], headers=headers)
+
+
+@router.delete("/reports/{name}", status_code=204)
+async def delete_report(bench: TheBench, name: str) -> None:
+    """Delete a file."""
+    try:
+        _store(bench).delete(name)
+    except NotAllowed as error:
+        raise NotFound(error.message, value=name) from error

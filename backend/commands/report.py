@@ -1,0 +1,145 @@
+"""``servodeck report`` and ``servodeck recompute``: what stored measurements tell, as files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import httpx
+import typer
+
+from backend.commands.session import run
+from backend.evaluation import Evaluation, evaluate
+from backend.files import write_atomically
+from backend.measurements import SUFFIX, BadMeasurement, Head, MeasurementStore, unpack
+from backend.report.gather import About, choose, facts_of_files, measured_from
+from backend.report.store import FORMATS, Format, render
+from drivers.errors import DriveError, LinkLost, NotAllowed
+
+Files = Annotated[list[Path] | None, typer.Argument(metavar="[FILE.sdmeas]...")]
+Out = Annotated[Path, typer.Option(help="report to write; .html or .pdf")]
+
+
+class LanguageName(StrEnum):
+    """Language of a report."""
+
+    en = "en"
+    zh = "zh"
+
+
+def report(
+    out: Out,
+    files: Files = None,
+    server: Annotated[str | None, typer.Option(help="ask this running server")] = None,
+    axis: Annotated[str | None, typer.Option(help="the server's name of the drive")] = None,
+    language: Annotated[LanguageName, typer.Option()] = LanguageName.en,
+    person: Annotated[str, typer.Option(help="who commissioned")] = "",
+    machine: Annotated[str, typer.Option(help="name of the machine")] = "",
+    notes: Annotated[str, typer.Option(help="free text")] = "",
+) -> None:
+    """Write the commissioning report of an axis, from measurement files or a running server."""
+    about = About(person, machine, notes)
+
+    async def work() -> None:
+        form = _format(out)
+        if (server is None) == (not files):
+            raise NotAllowed("give either measurement files, or --server and --axis",
+                             remedy="see --help")  # fmt: skip
+        if server is not None:
+            data = await _from_server(server, axis, form, language.value, about)
+        else:
+            data = _from_files(files or [], form, language, about)
+        write_atomically(out, data)
+        print(f"written: {out}")
+
+    run(work)
+
+
+def _format(out: Path) -> Format:
+    for form in FORMATS:
+        if out.suffix == f".{form}":
+            return form
+    raise NotAllowed(f"{out.name} is neither HTML nor PDF", value=out.name, limit=".html, .pdf",
+                     remedy="end its name with .html or .pdf")  # fmt: skip
+
+
+def _from_files(files: list[Path], form: Format, language: LanguageName, about: About) -> bytes:
+    """Of several files of a kind, the newest with the one before it."""
+    folders = {file.resolve().parent for file in files}
+    if len(folders) != 1:
+        raise NotAllowed("the measurements lie in different folders",
+                         remedy="copy them into one folder")  # fmt: skip
+    store = MeasurementStore(folders.pop())
+    heads: dict[str, Head] = {file.name: store.head(file.name) for file in files}
+    facts = facts_of_files(heads, about)
+    measured, unusable = measured_from(
+        store, choose(heads, max(head.saved for head in heads.values()))
+    )
+    whole = replace(facts, measured=measured, unusable=unusable)
+    return render(whole, "zh" if language is LanguageName.zh else "en", form)
+
+
+async def _from_server(
+    server: str, axis: str | None, form: Format, language: str, about: About
+) -> bytes:
+    base = server.rstrip("/") + "/api/v1"
+    try:
+        async with httpx.AsyncClient(base_url=base, timeout=120.0) as http:
+            drives = _ok(await http.get("/drives")).json()
+            drive = next((d for d in drives if axis in (d["name"], d["id"])), None)
+            if drive is None:
+                names = ", ".join(str(d["name"]) for d in drives) or "none"
+                raise NotAllowed(f"{server} has no drive {axis!r}", value=axis, limit=names,
+                                 remedy="give its name with --axis")  # fmt: skip
+            body = {"format": form, "language": language, "person": about.person,
+                    "machine": about.machine, "notes": about.notes}  # fmt: skip
+            made = _ok(await http.post(f"/drives/{drive['id']}/reports", json=body)).json()
+            return _ok(await http.get(f"/reports/{made['file']}")).content
+    except httpx.HTTPError as error:
+        raise LinkLost(f"{server} cannot be reached: {error}", remedy="is it running?") from error
+
+
+def _ok(answer: httpx.Response) -> httpx.Response:
+    if answer.is_success:
+        return answer
+    try:
+        problem = answer.json()
+    except ValueError:
+        problem = {}
+    detail = problem.get("detail") or f"the server says {answer.status_code}"
+    raise DriveError(str(detail), remedy=problem.get("remedy"))
+
+
+def recompute(
+    file: Annotated[Path, typer.Argument(metavar=f"FILE{SUFFIX}")],
+    out: Annotated[Path | None, typer.Option(help="JSON file for the result")] = None,
+) -> None:
+    """Evaluate a stored measurement anew from its raw signals. Nothing moves."""
+
+    async def work() -> None:
+        try:
+            data = file.read_bytes()
+        except OSError as error:
+            raise BadMeasurement(f"{file} cannot be read: {error.strerror}", value=str(file),
+                                 remedy="check the name and the rights") from error  # fmt: skip
+        found = unpack(data, file.name)
+        made = evaluate(found)
+        head = found.head
+        print(f"{head.kind} of {head.drive}, {head.saved:%Y-%m-%d %H:%M:%S %Z}")
+        print(_agreement(made))
+        if out is not None:
+            write_atomically(out, json.dumps(made.result, indent=1).encode())
+            print(f"written: {out}")
+
+    run(work)
+
+
+def _agreement(made: Evaluation) -> str:
+    if made.agrees is None:
+        return "evaluated; the file tells no earlier result to compare with"
+    if made.agrees:
+        return "evaluated; the result is the one of that time"
+    return f"evaluated; the result is another than at that time: {', '.join(made.differences)}"

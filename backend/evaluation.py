@@ -1,0 +1,118 @@
+"""Stored measurements evaluated anew, and compared with what was concluded at the time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.axis import Envelope
+from backend.measurements import BadMeasurement, Measurement
+from backend.tools import inertia as inertia_tool
+from backend.tools import step_response as step_tool
+from backend.tools import sweep as sweep_tool
+from backend.tools.recording import Recording
+
+#: Numbers nearer than this share are the same: another computer sums in another order.
+_SAME = 1e-6
+#: Below this nothing is told of a difference; phases and decibels are of the order of one.
+_NOTHING = 1e-9
+_NAMED_AT_MOST = 5
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """``result`` is the tool's JSON form. ``agrees`` is None where no conclusion was stored;
+    ``differences`` names fields, at most five."""
+
+    result: dict[str, object]
+    agrees: bool | None
+    differences: tuple[str, ...]
+
+
+def evaluate(measurement: Measurement) -> Evaluation:
+    """Evaluate the raw data anew and compare.
+
+    Raises:
+        BadMeasurement: of a kind that cannot be evaluated, or not complete.
+        NotAllowed: the data support no answer.
+    """
+    result = recompute(measurement)
+    stored = measurement.meta.get("result")
+    if not isinstance(stored, dict):
+        return Evaluation(result, None, ())
+    found = list(_differences(stored, result, ""))
+    return Evaluation(result, not found, tuple(found[:_NAMED_AT_MOST]))
+
+
+def recompute(measurement: Measurement) -> dict[str, object]:
+    """Evaluate the raw data anew; the tool's JSON form.
+
+    Raises:
+        BadMeasurement: of a kind that cannot be evaluated, or not complete.
+        NotAllowed: the data support no answer.
+    """
+    arrays, meta = measurement.arrays, measurement.meta
+    try:
+        match meta.get("tool"):
+            case "sweep":
+                return sweep_tool.as_json(sweep_tool.reevaluate(arrays, meta))
+            case "inertia":
+                return inertia_tool.as_json(inertia_tool.reevaluate(arrays, meta))
+            case "step":
+                return _step(measurement)
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+        raise BadMeasurement(
+            f"the measurement is not complete: {error}", value=measurement.kind,
+            remedy="get an undamaged copy of the file, or measure again",
+        ) from error  # fmt: skip
+    raise BadMeasurement(
+        f"a measurement of kind {measurement.kind} has nothing to evaluate",
+        value=measurement.kind, remedy="update servodeck to open it",
+    )  # fmt: skip
+
+
+def _step(measurement: Measurement) -> dict[str, object]:
+    given, told = measurement.meta["settings"], measurement.meta["facts"]
+    if not isinstance(given, dict) or not isinstance(told, dict):
+        raise TypeError("settings or facts")
+    settings = step_tool.StepSettings(**{**given, "envelope": Envelope(**given["envelope"])})
+    arrays = {name: np.asarray(values) for name, values in measurement.arrays.items()}
+    demand = np.asarray(arrays.pop("demand"), np.float64)
+    valid = np.asarray(arrays.pop("valid"), np.bool_)
+    columns = {name: np.asarray(values, np.float64) for name, values in arrays.items()}
+    rate = float(str(measurement.meta["sample_rate_hz"]))
+    recording = Recording(rate, **columns, valid=valid)
+    return step_tool.as_json(
+        step_tool.evaluate(recording, demand, settings, float(told["rated_torque_nm"]))
+    )
+
+
+def _differences(then: object, now: object, path: str) -> Iterator[str]:
+    """Fields of what was concluded whose value is another now. New fields are none."""
+    if isinstance(then, Mapping) and isinstance(now, Mapping):
+        for name, value in then.items():
+            if name in now:
+                yield from _differences(value, now[name], f"{path}.{name}" if path else str(name))
+            else:
+                yield f"{path}.{name}" if path else str(name)
+    elif _is_list(then) and _is_list(now):
+        pairs = list(zip(then, now, strict=False))  # type: ignore[call-overload]
+        changed = len(then) != len(now)  # type: ignore[arg-type]
+        if changed or any(next(_differences(a, b, path), None) is not None for a, b in pairs):
+            yield path
+    elif not _same(then, now):
+        yield path
+
+
+def _is_list(value: object) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str)
+
+
+def _same(then: object, now: object) -> bool:
+    numbers = (int, float)
+    if isinstance(then, numbers) and isinstance(now, numbers) and not isinstance(then, bool):
+        return math.isclose(then, now, rel_tol=_SAME, abs_tol=_NOTHING)
+    return then == now

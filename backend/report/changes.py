@@ -1,0 +1,106 @@
+"""What tuning wrote to a drive, from which value to which, kept over restarts for the report."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from backend.files import StorageFailed
+
+_UNSAFE = re.compile(r"[^\w.\-]")
+
+
+@dataclass(frozen=True)
+class Change:
+    """One write of several parameters; raw values by key. ``what`` is notches, gains and so on."""
+
+    time: datetime
+    what: str
+    before: Mapping[str, int]
+    after: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class NetChange:
+    """One parameter from its first value to its last."""
+
+    key: str
+    before: int
+    after: int
+    time: datetime
+
+
+class ChangeLog:
+    """One text file per drive, a JSON object a line, only ever appended to."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def _path(self, drive_id: str) -> Path:
+        return self.folder / f"{_UNSAFE.sub('_', drive_id)}.jsonl"
+
+    def add(self, drive_id: str, change: Change) -> None:
+        """Append; values that stayed are left out.
+
+        Raises:
+            StorageFailed: the disk. The drive has the new values nevertheless.
+        """
+        keys = [key for key, raw in change.after.items() if change.before.get(key) != raw]
+        if not keys:
+            return
+        row = {
+            "time": change.time.isoformat(),
+            "what": change.what,
+            "before": {key: change.before[key] for key in keys if key in change.before},
+            "after": {key: change.after[key] for key in keys},
+        }
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with self._path(drive_id).open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+        except OSError as error:
+            raise StorageFailed(
+                f"the change was written to the drive, but not to the report's list: {error}",
+                drive=drive_id, remedy="free some space; note the values by hand",
+            ) from error  # fmt: skip
+
+    def read(self, drive_id: str) -> tuple[Change, ...]:
+        """All changes, oldest first. A line that a crash cut short is left out."""
+        try:
+            lines = self._path(drive_id).read_text("utf-8").splitlines()
+        except FileNotFoundError:
+            return ()
+        found = (_parsed(line) for line in lines)
+        return tuple(change for change in found if change is not None)
+
+
+def _parsed(line: str) -> Change | None:
+    try:
+        row = json.loads(line)
+        return Change(
+            datetime.fromisoformat(row["time"]), str(row["what"]),
+            {str(k): int(v) for k, v in row["before"].items()},
+            {str(k): int(v) for k, v in row["after"].items()},
+        )  # fmt: skip
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return None
+
+
+def net(changes: Iterable[Change]) -> tuple[NetChange, ...]:
+    """Every parameter from before its first change to after its last, where that differs."""
+    first: dict[str, int] = {}
+    last: dict[str, tuple[int, datetime]] = {}
+    for change in changes:
+        for key, raw in change.after.items():
+            if key in change.before:
+                first.setdefault(key, change.before[key])
+                last[key] = (raw, change.time)
+    return tuple(
+        NetChange(key, first[key], raw, time)
+        for key, (raw, time) in sorted(last.items())
+        if first[key] != raw
+    )

@@ -1,0 +1,262 @@
+"""One chapter of a report for one measurement: numbers, plots, and what it was made with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from backend.report.document import Block, Figure, Heading, Note, Table
+from backend.report.facts import Measured
+from backend.report.numbers import (
+    NONE,
+    fixed,
+    hertz,
+    margin,
+    milliseconds,
+    moment,
+    significant,
+)
+from backend.report.plot import Curve, Plot
+from backend.report.texts import Words
+from backend.report.views import InertiaView, StepView, SweepView
+
+#: Told apart in print and by the colour-blind: dark blue, orange.
+_NOW, _EARLIER, _DEMAND = "#1a5c94", "#c2571a", "#5b6770"
+_LEAST_COHERENCE = 0.5
+_BAND = 1.96
+_PHASE_STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0)
+_TURN = 360.0
+
+
+def chapter(measured: Measured, words: Words) -> list[Block]:
+    """Everything about one measurement."""
+    blocks: list[Block] = [Heading(words(f"kind.{measured.kind}"), 3)]
+    view = measured.view
+    if isinstance(view, SweepView):
+        blocks += _sweep(measured, view, words)
+    elif isinstance(view, InertiaView):
+        blocks += _inertia(view, words)
+    else:
+        blocks += _step(measured, view, words)
+    return [*blocks, *_origin(measured, words)]
+
+
+def _origin(measured: Measured, words: Words) -> list[Block]:
+    text = words("measured", time=moment(measured.saved), file=measured.file,
+                 program=measured.program or "?")  # fmt: skip
+    if measured.earlier is not None:
+        earlier = measured.earlier
+        text += " " + words("compared", time=moment(earlier.saved), file=earlier.file)
+    envelope = measured.settings.get("envelope")
+    if isinstance(envelope, dict):
+        text += " " + words(
+            "limits", travel=_plain(envelope.get("travel_rev")),
+            speed=_plain(envelope.get("speed_rpm")), torque=_plain(envelope.get("torque_percent")),
+        )  # fmt: skip
+    found: list[Block] = [Note(text)]
+    if measured.differences:
+        found.append(Note(words("differs", what=", ".join(measured.differences)), "warn"))
+    return found
+
+
+def _plain(value: object) -> str:
+    return f"{value:g}" if isinstance(value, (int, float)) else "?"
+
+
+# --- inertia ---------------------------------------------------------------------------
+
+
+def _inertia(view: InertiaView, words: Words) -> list[Block]:
+    si = view.unit == "SI"
+    rows = [
+        ("inertia", view.inertia_kgm2, "inertia_kgm2", "kg·m²"),
+        ("load_ratio", view.load_ratio, "load_ratio", ""),
+        ("coulomb", view.coulomb_nm, "coulomb_nm", "N·m"),
+        ("viscous", view.viscous_nms, "viscous_nms", "N·m·s/rad"),
+        ("gravity", view.gravity_nm, "gravity_nm", "N·m"),
+    ]  # fmt: skip
+    table = tuple(
+        (words(name), significant(value, unit if si else "", 3), _interval(view.ci95.get(key)))
+        for name, value, key, unit in rows
+    )
+    head = (words("quantity"), words("value"), words("interval"))
+    verdict = (
+        Note(words("identified", r2=fixed(view.r2, 4)), "good")
+        if view.identifiable
+        else Note(words("unidentified", why=view.verdict), "warn")
+    )
+    rated = [] if si else [Note(words("per_rated"))]
+    return [verdict, Table(head, table, (False, True, True)), *rated]
+
+
+def _interval(found: tuple[float | None, float | None] | None) -> str:
+    if found is None or None in found:
+        return NONE
+    return f"{significant(found[0], digits=3)} … {significant(found[1], digits=3)}"
+
+
+# --- frequency response ----------------------------------------------------------------
+
+
+def _sweep(measured: Measured, view: SweepView, words: Words) -> list[Block]:
+    earlier = measured.earlier.view if measured.earlier else None
+    other = earlier if isinstance(earlier, SweepView) else None
+    blocks: list[Block] = [_bode(view, other, words)]
+    if view.kind == "mechanics":
+        blocks += _resonances(view, words)
+    if view.margins and view.kind != "mechanics":
+        blocks.append(_margins(view, other, words))
+    if view.saturated_share > 0.0:
+        share = fixed(view.saturated_share * 100, 1, "%")
+        blocks.append(Note(words("warn.saturated", share=share), "warn"))
+    return [*blocks, *(Note(each, "warn") for each in view.warnings)]
+
+
+def _bode(view: SweepView, other: SweepView | None, words: Words) -> Figure:
+    low, high = view.valid_band_hz
+    first, last = view.frequency_hz[0], view.frequency_hz[-1]
+    shown = (max(first, low * 0.8), min(last, high * 1.25))
+    shown = shown if shown[0] < shown[1] else (first, last)
+    unit = "dB" if view.unit == "1" else f"dB {view.unit}"
+
+    def plot(title: str, y_label: str, curves: Sequence[Curve], height: float) -> Plot:
+        whole = title == words("coherence")
+        steps = (0.5,) if whole else _PHASE_STEPS if y_label == "°" else ()
+        fixed_range = (0.0, 1.0) if whole else None
+        return Plot(title, words("frequency"), y_label, tuple(curves), shown, True,
+                    view.valid_band_hz, height, steps, fixed_range)  # fmt: skip
+
+    looks = [_Look(view, words("after") if other else "", _NOW, False)]
+    if other is not None:
+        looks.append(_Look(other, words("before"), _EARLIER, True))
+    magnitude = [_curve(of, of.view.magnitude_db, of.view.std_db) for of in looks]
+    phase = [_curve(of, _whole_turns(of.view), of.view.std_deg) for of in looks]
+    coherence = [
+        Curve(of.label, of.color, of.view.frequency_hz, of.view.coherence, dashed=of.dashed)
+        for of in looks
+    ]
+    caption = words("bode.caption", low=fixed(low, 0), high=fixed(high, 0),
+                    rate=fixed(view.sample_rate_hz, 0))  # fmt: skip
+    return Figure(
+        (
+            plot(words("magnitude"), unit, magnitude, 190.0),
+            plot(words("phase"), "°", phase, 150.0),
+            plot(words("coherence"), "", coherence, 60.0),
+        ),
+        caption,
+    )
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A response and how its curves are drawn."""
+
+    view: SweepView
+    label: str
+    color: str
+    dashed: bool
+
+
+def _curve(of: _Look, values: Sequence[float], std: Sequence[float | None]) -> Curve:
+    """Lines drowned in noise are left out, as on the page."""
+    coherence = of.view.coherence
+    kept = [v if c >= _LEAST_COHERENCE else None for v, c in zip(values, coherence, strict=True)]
+    spread = [None if s is None else _BAND * s for s in std]
+    return Curve(of.label, of.color, of.view.frequency_hz, kept, spread, of.dashed)
+
+
+def _whole_turns(view: SweepView) -> list[float]:
+    """An unwrapped phase moved by whole turns so that it begins within ±180°."""
+    first = sorted(view.phase_deg[: max(1, len(view.phase_deg) // 20)])
+    turns = round(first[len(first) // 2] / _TURN)
+    return [value - _TURN * turns for value in view.phase_deg]
+
+
+def _resonances(view: SweepView, words: Words) -> list[Block]:
+    if not view.trusted:
+        return [Note(words("untrusted"), "warn")]
+    if not view.resonances:
+        return [Note(words("no_resonance"))]
+    head = (words("kind"), words("frequency"), words("damping"), words("height"))
+    rows = tuple(
+        (words(r.kind), hertz(r.frequency_hz), fixed(r.damping * 100, 1, "%"),
+         fixed(r.height_db, 1, "dB"))
+        for r in view.resonances
+    )  # fmt: skip
+    return [Table(head, rows, (False, True, True, True))]
+
+
+def _margins(view: SweepView, other: SweepView | None, words: Words) -> Table:
+    def column(of: SweepView) -> list[str]:
+        m = of.margins
+        return [
+            hertz(margin(m, "bandwidth_hz")), hertz(margin(m, "bandwidth_90deg_hz")),
+            hertz(margin(m, "crossover_hz")), fixed(margin(m, "phase_margin_deg"), 1, "°"),
+            fixed(margin(m, "gain_margin_db"), 1, "dB"), fixed(margin(m, "ms"), 2),
+        ]  # fmt: skip
+
+    names = [
+        words(name)
+        for name in ("bandwidth", "bandwidth90", "crossover", "phase_margin", "gain_margin", "ms")
+    ]
+    return _compared(names, column(view), column(other) if other else None, words)
+
+
+def _compared(
+    names: Sequence[str], now: Sequence[str], before: Sequence[str] | None, words: Words
+) -> Table:
+    if before is None:
+        rows = tuple(zip(names, now, strict=True))
+        return Table((words("quantity"), words("value")), rows, (False, True))
+    both = tuple(zip(names, before, now, strict=True))
+    head = (words("quantity"), words("before"), words("after"))
+    return Table(head, both, (False, True, True))
+
+
+# --- steps -----------------------------------------------------------------------------
+
+
+def _step(measured: Measured, view: StepView, words: Words) -> list[Block]:
+    earlier = measured.earlier.view if measured.earlier else None
+    other = earlier if isinstance(earlier, StepView) else None
+    ends = (0.0, max(view.time_s[-1], other.time_s[-1] if other else 0.0))
+    name = words("speed" if view.kind == "speed" else "position")
+    now, before = (words("after"), words("before")) if other else ("", "")
+    motion = [Curve(words("demand"), _DEMAND, view.time_s, view.demand, dashed=True)]
+    torque = []
+    if other is not None:
+        motion.append(Curve(before, _EARLIER, other.time_s, other.actual, dashed=True))
+        torque.append(Curve(before, _EARLIER, other.time_s, other.torque_percent, dashed=True))
+    motion.append(Curve(now, _NOW, view.time_s, view.actual))
+    torque.append(Curve(now, _NOW, view.time_s, view.torque_percent))
+    figure = Figure(
+        (
+            Plot(name, words("time"), view.unit, tuple(motion), ends),
+            Plot(words("torque"), words("time"), words("of_rated"), tuple(torque), ends,
+                 height=110.0),
+        ),
+        words("step.caption"),
+    )  # fmt: skip
+    names, column = _numbers(view, words)
+    return [figure, _compared(names, column, _numbers(other, words)[1] if other else None, words)]
+
+
+def _numbers(view: StepView, words: Words) -> tuple[list[str], list[str]]:
+    rows: list[tuple[str, str]] = []
+    if view.step is not None:
+        rows += [
+            ("overshoot", fixed(view.step.overshoot_percent, 1, "%")),
+            ("rise", milliseconds(view.step.rise_s)),
+            ("settling", milliseconds(view.step.settling_s)),
+        ]
+    if view.move is not None:
+        rows += [
+            ("following", significant(view.move.following_peak, view.unit)),
+            ("following_rms", significant(view.move.following_rms, view.unit)),
+            ("settling", milliseconds(view.move.settling_s)),
+        ]
+    rows += [
+        ("torque_peak", fixed(view.torque_peak_percent, 0, "%")),
+        ("torque_rms", fixed(view.torque_rms_percent, 0, "%")),
+    ]
+    return [words(name) for name, _ in rows], [text for _, text in rows]

@@ -1,0 +1,81 @@
+"""Everything that a report tells, in any language, before it has a form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+
+from backend.report.views import AnyView
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who the axis is; None or empty where it is not known."""
+
+    axis: str
+    drive: str
+    manual: str
+    profile_version: str
+    vendor_id: int | None = None
+    product_code: int | None = None
+    revision: int | None = None
+    serial: int | None = None
+    firmware: str = ""
+    buses: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ChangedSetting:
+    """One parameter before commissioning and after, as text with its unit.
+
+    ``now`` is empty where the drive still has it so, else what it has instead.
+    """
+
+    key: str
+    name: str
+    before: str
+    after: str
+    time: datetime
+    now: str = ""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A measurement evaluated anew. ``earlier`` is the same kind before the first change.
+
+    ``differences`` names what another version of the program concluded otherwise at the time.
+    """
+
+    file: str
+    kind: str
+    saved: datetime
+    program: str
+    differences: tuple[str, ...]
+    settings: Mapping[str, object]
+    view: AnyView
+    earlier: Measured | None = None
+
+
+@dataclass(frozen=True)
+class Facts:
+    """``unsaved`` and ``pending`` name parameters; ``trouble`` are sentences of the drive.
+
+    ``last_change`` is None where nothing was changed.
+    """
+
+    identity: Identity
+    made: datetime
+    program: str
+    person: str = ""
+    machine: str = ""
+    notes: str = ""
+    changes: tuple[ChangedSetting, ...] = ()
+    last_change: datetime | None = None
+    measured: tuple[Measured, ...] = ()
+    unusable: tuple[str, ...] = ()
+    unsaved: tuple[str, ...] = ()
+    pending: tuple[str, ...] = ()
+    trouble: tuple[str, ...] = ()
+    #: Whether the drive was asked; a report of files alone knows nothing of its settings.
+    live: bool = True

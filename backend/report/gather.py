@@ -1,0 +1,233 @@
+"""Collect what a report tells: from the drive as it is now, its changes, and measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+
+import backend
+from backend.bench import Bench, Member
+from backend.drive import Drive
+from backend.evaluation import evaluate
+from backend.measurements import BadMeasurement, Head, MeasurementStore, profile_version
+from backend.report.changes import Change, net
+from backend.report.facts import ChangedSetting, Facts, Identity, Measured
+from backend.report.views import view_of
+from drivers.errors import DriveError, NotAllowed
+from profiles.schema import Parameter
+
+#: The order in which an axis is commissioned, and a report is read.
+_ORDER = (
+    "inertia", "sweep-mechanics", "sweep-speed_loop", "sweep-position_loop", "step-speed",
+    "step-move",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class About:
+    """What a person says of the work; free text."""
+
+    person: str = ""
+    machine: str = ""
+    notes: str = ""
+
+
+def kind_of(head: Head) -> str:
+    """Kind of a measurement as a report tells them apart: steps of speed are not moves."""
+    settings = head.meta.get("settings")
+    if head.kind == "step" and isinstance(settings, dict):
+        return f"step-{settings.get('kind', 'speed')}"
+    return head.kind
+
+
+def belongs(head: Head, drive: Drive) -> bool:
+    """Whether a file was measured on this very drive: by serial number where both tell one."""
+    identity, found = head.meta.get("identity"), drive.found
+    serial = identity.get("serial") if isinstance(identity, dict) else None
+    if head.meta.get("profile") != drive.profile.drive:
+        return False
+    if serial is not None and found is not None and found.serial is not None:
+        return bool(serial == found.serial)
+    return head.meta.get("drive_id", drive.id) == drive.id and head.drive == drive.name
+
+
+def choose(heads: Mapping[str, Head], changed_first: datetime | None) -> list[tuple[str, str]]:
+    """The newest file of each kind, with the newest from before the first change ("" if none)."""
+    chosen = []
+    for kind in _ORDER:
+        files = sorted((h.saved, f) for f, h in heads.items() if kind_of(h) == kind)
+        if not files:
+            continue
+        newest = files[-1][1]
+        before = [f for saved, f in files if changed_first and saved < changed_first]
+        earlier = before[-1] if before and before[-1] != newest else ""
+        chosen.append((newest, earlier))
+    return chosen
+
+
+def measured_from(
+    store: MeasurementStore, chosen: Iterable[tuple[str, str]]
+) -> tuple[tuple[Measured, ...], tuple[str, ...]]:
+    """Chosen files evaluated anew, and sentences about those that cannot be. Takes seconds.
+
+    Raises:
+        NotAllowed: there is no file of a name.
+    """
+    found: list[Measured] = []
+    unusable: list[str] = []
+    for newest, earlier in chosen:
+        try:
+            measured = _measured(store, newest)
+        except (BadMeasurement, DriveError) as error:
+            unusable.append(_sentence(newest, error))
+            continue
+        if earlier:
+            try:
+                measured = replace(measured, earlier=_measured(store, earlier))
+            except (BadMeasurement, DriveError) as error:
+                unusable.append(_sentence(earlier, error))
+        found.append(measured)
+    return tuple(found), tuple(unusable)
+
+
+def _sentence(file: str, error: DriveError) -> str:
+    return error.message if file in error.message else f"{file}: {error.message}"
+
+
+def _measured(store: MeasurementStore, file: str) -> Measured:
+    loaded = store.load(file)
+    made = evaluate(loaded)
+    settings = loaded.meta.get("settings")
+    return Measured(
+        file, kind_of(loaded.head), loaded.head.saved, str(loaded.meta.get("program", "")),
+        made.differences, settings if isinstance(settings, dict) else {},
+        view_of(loaded.meta.get("tool"), made.result),
+    )  # fmt: skip
+
+
+# --- the drive -------------------------------------------------------------------------
+
+
+async def live_facts(
+    bench: Bench, member: Member, changes: Sequence[Change], about: About
+) -> Facts:
+    """Everything but the measurements; values that were changed are read from the drive now.
+
+    A drive that does not answer is told in the report, and fails nothing.
+    """
+    drive = member.drive
+    settings, trouble = await _changes(drive, changes)
+    snapshot = member.monitor.snapshot
+    if not snapshot.fresh:
+        trouble.append(f"{drive.name}: {snapshot.problem or 'does not answer'}")
+    trouble += [f"{fault.code} {fault.name}" for fault in snapshot.faults]
+    named = drive.profile.by_key
+    return Facts(
+        identity=_identity(bench, drive),
+        made=datetime.now(UTC),
+        program=backend.__version__,
+        person=about.person,
+        machine=about.machine,
+        notes=about.notes,
+        changes=settings,
+        last_change=changes[-1].time if changes else None,
+        unsaved=tuple(sorted(f"{key} {named[key].name}" for key in drive.unsaved)),
+        pending=tuple(sorted(f"{key} {named[key].name}" for key in drive.pending)),
+        trouble=tuple(trouble),
+    )
+
+
+def _identity(bench: Bench, drive: Drive) -> Identity:
+    found = drive.found
+    return Identity(
+        axis=drive.name,
+        drive=drive.profile.title,
+        manual=drive.profile.manual,
+        profile_version=profile_version(drive.profile),
+        vendor_id=found.vendor_id if found else None,
+        product_code=found.product_code if found else None,
+        revision=found.revision if found else None,
+        serial=found.serial if found else None,
+        firmware=found.firmware if found else "",
+        buses=tuple(f"{bench.url_of(port)} #{port.station}" for port in drive.ports),
+    )
+
+
+async def _changes(
+    drive: Drive, changes: Sequence[Change]
+) -> tuple[tuple[ChangedSetting, ...], list[str]]:
+    rows: list[ChangedSetting] = []
+    trouble: list[str] = []
+    for each in net(changes):
+        parameter = drive.profile.by_key.get(each.key)
+        if parameter is None:
+            continue
+        now = ""
+        if not trouble:
+            try:
+                raw = await drive.raw(each.key)
+                now = "" if raw == each.after else shown(parameter, raw)
+            except DriveError as error:
+                trouble.append(error.message)
+        rows.append(
+            ChangedSetting(
+                each.key, parameter.name, shown(parameter, each.before),
+                shown(parameter, each.after), each.time, now,
+            )
+        )  # fmt: skip
+    return tuple(rows), trouble
+
+
+def shown(parameter: Parameter, raw: int) -> str:
+    """A raw value in engineering units, or in the manual's words."""
+    if raw in parameter.enum:
+        return f"{raw}: {parameter.enum[raw]}"
+    value = parameter.to_value(raw)
+    return f"{value} {parameter.unit}".rstrip()
+
+
+# --- files alone -----------------------------------------------------------------------
+
+
+def facts_of_files(heads: Mapping[str, Head], about: About) -> Facts:
+    """What files tell of the drive that they were measured on.
+
+    Raises:
+        NotAllowed: they are of different drives.
+    """
+    identities = {
+        (head.drive, str(head.meta.get("profile")), _serial(head)) for head in heads.values()
+    }
+    if len(identities) != 1:
+        drives = ", ".join(sorted(f"{name} ({serial})" for name, _, serial in identities))
+        raise NotAllowed(
+            "the measurements are of different drives", value=drives or "none",
+            remedy="make one report for each drive",
+        )  # fmt: skip
+    head = next(iter(heads.values()))
+    told = head.meta.get("identity")
+    numbers = told if isinstance(told, dict) else {}
+
+    def number(name: str) -> int | None:
+        value = numbers.get(name)
+        return value if isinstance(value, int) else None
+
+    return Facts(
+        identity=Identity(
+            axis=head.drive,
+            drive=str(head.meta.get("profile_title") or head.meta.get("profile", "")),
+            manual=str(head.meta.get("manual", "")),
+            profile_version=str(head.meta.get("profile_version", "")),
+            vendor_id=number("vendor_id"), product_code=number("product_code"),
+            revision=number("revision"), serial=number("serial"),
+            firmware=str(numbers.get("firmware") or ""),
+        ),
+        made=datetime.now(UTC), program=backend.__version__, person=about.person,
+        machine=about.machine, notes=about.notes, live=False,
+    )  # fmt: skip
+
+
+def _serial(head: Head) -> str:
+    identity = head.meta.get("identity")
+    return str(identity.get("serial")) if isinstance(identity, dict) else ""

@@ -1,0 +1,114 @@
+"""Results of the tools as a report needs them: their JSON forms, checked where they come in."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from backend.measurements import BadMeasurement
+
+
+class View(BaseModel):
+    """Fields that a report does not show are left out."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+
+class ResonanceView(View):
+    """One resonance or antiresonance; height in dB."""
+
+    kind: Literal["resonance", "antiresonance"]
+    frequency_hz: float
+    damping: float
+    height_db: float
+
+
+class SweepView(View):
+    """A frequency response; lists [n] over ``frequency_hz``."""
+
+    kind: Literal["mechanics", "speed_loop", "position_loop"]
+    loop: str
+    sample_rate_hz: float
+    valid_band_hz: tuple[float, float]
+    frequency_hz: list[float]
+    magnitude_db: list[float]
+    phase_deg: list[float]
+    coherence: list[float]
+    std_db: list[float | None]
+    std_deg: list[float | None]
+    resonances: list[ResonanceView]
+    margins: dict[str, bool | float | None]
+    unit: str
+    trusted: bool
+    saturated_share: float
+    warnings: list[str]
+
+
+class InertiaView(View):
+    """Inertia and friction with 95 % intervals, in SI units where ``unit`` says so."""
+
+    method: str
+    inertia_kgm2: float | None
+    load_ratio: float | None
+    coulomb_nm: float | None
+    viscous_nms: float | None
+    gravity_nm: float | None
+    ci95: dict[str, tuple[float | None, float | None] | None]
+    r2: float
+    verdict: str
+    identifiable: bool
+    unit: str
+
+
+class StepNumbers(View):
+    """Read-outs of a step of speed."""
+
+    overshoot_percent: float
+    rise_s: float | None
+    settling_s: float | None
+
+
+class MoveNumbers(View):
+    """Read-outs of a move."""
+
+    following_peak: float
+    following_rms: float
+    overshoot: float
+    settling_s: float | None
+
+
+class StepView(View):
+    """A step or move; lists [n] over ``time_s``."""
+
+    kind: Literal["speed", "move"]
+    unit: str
+    time_s: list[float]
+    demand: list[float]
+    actual: list[float]
+    torque_percent: list[float]
+    step: StepNumbers | None
+    move: MoveNumbers | None
+    torque_peak_percent: float
+    torque_rms_percent: float
+
+
+AnyView = SweepView | InertiaView | StepView
+
+
+def view_of(tool: object, result: dict[str, object]) -> AnyView:
+    """The result of a tool, by the name that its measurements carry.
+
+    Raises:
+        BadMeasurement: it is not what that tool concludes.
+    """
+    kinds: dict[object, type[AnyView]] = {
+        "sweep": SweepView, "inertia": InertiaView, "step": StepView,
+    }  # fmt: skip
+    kind = kinds.get(tool)
+    if kind is None:
+        raise BadMeasurement(f"a report cannot show what {tool!r} measures", value=str(tool))
+    try:
+        return kind.model_validate(result)
+    except ValidationError as error:
+        raise BadMeasurement(f"the result of {tool} is not complete: {error}") from error
