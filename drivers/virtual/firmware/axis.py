@@ -50,6 +50,7 @@ class VirtualAxis:
         self.apply_windows(0.0, 0.0, 0.0, math.inf)
         self.set_limits(math.inf, math.inf, math.inf)
         self.set_alarm(None)
+        self.p[k.P_LIMIT_DEC] = 1e3
         gains = GainSet(0.0, 0.0, 0.0)
         self.apply_loops(LoopSettings(first=gains, second=gains, homing=None))
         self.power_off()
@@ -100,7 +101,7 @@ class VirtualAxis:
 
     def listen(self, *events: int) -> None:
         """Events that end a run, besides fault, stop and alarm clock which always do."""
-        mask = k.EV_FAULT | k.EV_STOPPED | k.EV_ALARM_CLOCK
+        mask = k.EV_FAULT | k.EV_STOPPED | k.EV_ALARM_CLOCK | k.EV_LIMIT
         for event in events:
             mask |= event
         self.p[k.P_EVENT_MASK] = mask
@@ -127,8 +128,10 @@ class VirtualAxis:
         p[k.P_KP_POSITION_1], p[k.P_KP_POSITION_2] = first.position_per_s, second.position_per_s
         p[k.P_KP_SPEED_1], p[k.P_KP_SPEED_2] = first.speed_nms, second.speed_nms
         p[k.P_KI_SPEED_1], p[k.P_KI_SPEED_2] = first.integral_nm, second.integral_nm
-        p[k.P_SWITCH_ON] = loops.switch_gains
-        p[k.P_SWITCH_ERROR], p[k.P_SWITCH_TIME] = loops.switch_error_rad, loops.switch_time_s
+        switching = loops.switching
+        p[k.P_SWITCH_KIND], p[k.P_SWITCH_LEVEL] = switching.kind, switching.level
+        p[k.P_SWITCH_HYSTERESIS] = switching.hysteresis
+        p[k.P_SWITCH_DELAY], p[k.P_SWITCH_TIME] = switching.delay_s, switching.ramp_s
         p[k.P_SPEED_OUT_LIMIT] = loops.speed_output_nm
         p[k.P_POSITION_OUT_LIMIT] = loops.position_output_rad_s
         p[k.P_TORQUE_SPEED_LIMIT] = loops.torque_mode_speed_rad_s
@@ -145,6 +148,12 @@ class VirtualAxis:
         p[k.P_OBSERVER_COULOMB] = loops.coulomb_nm
         p[k.P_STOP_SPEED], p[k.P_STOP_TORQUE] = loops.brake_speed_rad_s, loops.brake_torque_nm
         p[k.P_TORQUE_FILTER] = _lag(loops.torque_filter_s)
+        second_s = loops.torque_filter_2_s
+        p[k.P_TORQUE_FILTER_2] = _lag(loops.torque_filter_s if second_s is None else second_s)
+        compensation = loops.compensation
+        p[k.P_TORQUE_BIAS], p[k.P_FRICTION_VISCOUS] = compensation.bias_nm, compensation.viscous_nms
+        p[k.P_FRICTION_POSITIVE] = compensation.positive_nm
+        p[k.P_FRICTION_NEGATIVE] = compensation.negative_nm
         p[k.P_NOTCH_COUNT] = len(loops.notches)
         for i, notch in enumerate(loops.notches):
             start = k.P_NOTCHES + 4 * i
@@ -166,8 +175,13 @@ class VirtualAxis:
         p[k.P_OVERLOAD_NM], p[k.P_OVERLOAD_S] = limits.overload_nm, limits.overload_s
         p[k.P_OTP_C], p[k.P_OVER_SPEED] = limits.over_temperature_c, limits.over_speed_rad_s
         p[k.P_SPEED_ERROR], p[k.P_SPEED_ERROR_S] = limits.speed_error_rad_s, limits.speed_error_s
-        p[k.P_FOLLOWING_S] = limits.following_error_s
-        p[k.P_BRAKE_TORQUE] = 2 * self.motor.rated_torque_nm if limits.holding_brake else 0.0
+        p[k.P_FOLLOWING_S], p[k.P_BRAKE_R] = limits.following_error_s, limits.braking_ohm
+        p[k.P_I2T_LIMIT] = limits.i2t_s
+        rated = self.motor.rated_torque_nm
+        p[k.P_I2T_RATED_NM] = min(limits.i2t_rated_nm, 1e3 * rated)
+        p[k.P_LOCK_NM] = rated if limits.locked_nm is None else limits.locked_nm
+        braked = limits.holding_brake or self.spec.motor.brake
+        p[k.P_BRAKE_TORQUE] = 2 * rated if braked else 0.0
 
     def apply_impedance(self, settings: ImpedanceSettings) -> None:
         """Gains of the impedance controller."""
@@ -217,9 +231,24 @@ class VirtualAxis:
         """True while the power stage is on."""
         return bool(self.p[k.P_LOOP] != k.LOOP_OFF)
 
-    def power_off(self) -> None:
-        """Open the power stage: the axis coasts (or the holding brake grips)."""
+    def power_off(self, dynamic_brake: bool = False) -> None:
+        """Open the power stage: the axis coasts (or the holding brake grips).
+
+        With ``dynamic_brake`` the windings are shorted: Kt²/(3R) Nm per rad/s.
+        """
         self._begin(k.GEN_OFF, k.LOOP_OFF)
+        motor = self.motor
+        shorted = motor.torque_constant**2 / (3 * motor.resistance_ohm)
+        self.p[k.P_DYNAMIC_BRAKE] = shorted if dynamic_brake else 0.0
+
+    def await_standstill(self) -> None:
+        """Raise EV_STOPPED as soon as the axis, which is not powered, has come to rest."""
+        self.s[k.S_STOPPED] = 0.0
+        self.p[k.P_STOPPING] = 1.0
+
+    def close_brake(self, closed: bool) -> None:
+        """The holding brake, apart from the power stage (it grips without power in any case)."""
+        self.p[k.P_BRAKE_CLOSED] = float(closed)
 
     def hold(self, at_rad: float | None = None) -> None:
         """Close the position loop at this angle, or where the axis is, from its speed."""
@@ -286,6 +315,11 @@ class VirtualAxis:
             self._begin(k.GEN_VELOCITY, k.LOOP_SPEED)
         self.p[k.P_STOPPING], self.p[k.P_STOP_DEC] = 1.0, braking
 
+    def stop_by_torque_slope(self, slope_nm_s: float) -> None:
+        """Take the torque back at this slope; EV_STOPPED tells when the axis stands."""
+        self.run_torque(0.0, slope_nm_s)
+        self.p[k.P_STOPPING] = 1.0
+
     def stop_by_torque(self, torque_nm: float) -> None:
         """Brake with a constant torque (0 coasts under power); EV_STOPPED tells when."""
         self._begin(k.GEN_TORQUE_STOP, k.LOOP_TORQUE)
@@ -308,6 +342,7 @@ class VirtualAxis:
             (k.F_OVER_TEMPERATURE, s[k.S_TEMPERATURE] > p[k.P_OTP_C]),
             (k.F_OVER_SPEED, abs(s[k.S_OMEGA]) > p[k.P_OVER_SPEED]),
             (k.F_SENSOR, p[k.P_ENCODER_DEAD] > 0),
+            (k.F_OVERLOAD, s[k.S_I2T] > 0.9 * p[k.P_I2T_LIMIT]),
         ):
             present |= bit if condition else 0
         return present

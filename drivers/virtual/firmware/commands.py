@@ -24,7 +24,7 @@ class Commands:
             "save": storage.save,
             "restore": self._restore,
             "zero": self._zero_position,
-            "clear_history": control.clear_history,
+            "clear_history": control.alarms.log.clear,
             "reset": reset,
             "write_settings": self._write_settings,
             "fault_reset": self._reset_fault,

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.families.base import RPM, Family, Units
+from drivers.virtual.firmware.schedule import Schedule
 from profiles.schema import Profile
 
 _INT32 = (-(2**31), 2**31 - 1)
@@ -30,7 +32,9 @@ class Core:
         self.motor = axis.motor
         self.zero_rad = 0.0
         self.torque_cap_nm = math.inf
+        self.homed = False
         self.units: Units = family.units(od, axis.motor)
+        self.schedule = Schedule(axis)
 
     def number(self, key: str, default: Number = 0) -> Number:
         """Effective value of a parameter."""
@@ -65,6 +69,8 @@ class Core:
 
     def deceleration(self, key: str) -> float:
         """A ramp parameter in rad/s², not above the largest deceleration 60C6h."""
+        if key not in self.od.numbered:
+            key = "6084:00"
         braking = self.units.ramp(self.number(key, 3276800))
         limit = self.number("60C6:00")
         return min(braking, self.units.ramp(limit)) if limit else braking
@@ -88,6 +94,11 @@ class Core:
 
     def software_limits(self) -> tuple[float, float]:
         """607Dh in user units; equal or crossed limits mean none (CiA 402-2)."""
+        choice = self.family.traits.software_limits
+        if choice is not None and choice[0] in self.od.numbered:
+            way = choice[1].get(int(self.number(choice[0])), "off")
+            if way == "off" or (way == "homed" and not self.homed):
+                return _INT32
         low, high = self.number("607D:01", _INT32[0]), self.number("607D:02", _INT32[1])
         if self.family.traits.positive_limit_first and "607D:01" in self.od.numbered:
             low, high = high, low
@@ -143,16 +154,28 @@ class Core:
         )
         self.apply_motion()
 
+    def limit_mode(self) -> float:
+        """What a limit switch does outside a search (LIMIT_*)."""
+        limits = self.family.traits.limits
+        action = limits.action
+        if limits.choice is not None:
+            chosen = int(self.number(limits.choice.key, -1))
+            action = limits.choice.actions.get(chosen, limits.choice.default)
+        return float(k.LIMIT_FAULT if action == "fault" else k.LIMIT_HOLDS)
+
     def apply_motion(self) -> None:
         """Windows and limits of the motion objects, which act at once."""
         per_rad = abs(self.units.position_per_rad)
-        following = self.number("6065:00", 2**32 - 1)
+        window = self.profile.by_role.get("following_error_window")
+        following = self.number("6065:00" if window is None else window.key, 2**32 - 1)
+        in_place = "2501:00" if "2501:00" in self.od.numbered else "6067:00"
         self.axis.apply_windows(
-            self.number("6067:00") / per_rad,
+            self.number(in_place) / per_rad,
             abs(self.speed_at("606D:00")),
             abs(self.speed_at("606F:00")),
             math.inf if following == 2**32 - 1 else following / per_rad,
         )
+        self.axis.p[k.P_LIMIT_DEC] = self.deceleration(self.family.traits.stops.quick_ramp_key)
         largest = min(self.number("6072:00", 3000), self.number("6073:00", 3000))
         sides = (
             self.torque_of(min(largest, self.number(key, 3000))) for key in ("60E0:00", "60E1:00")

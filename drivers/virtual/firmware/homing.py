@@ -9,11 +9,12 @@ mirror image.
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.schedule import Timer
 
 _FAR = 1e9
 _LIMITS = k.SIG_NEGATIVE | k.SIG_POSITIVE
@@ -47,7 +48,8 @@ class Homing:
         self.attained = False
         self.was_attained = False
         self.failed = False
-        self.deadline_step: float | None = None
+        self.on_failed: Callable[[bool], None] = lambda _timed_out: None
+        self._deadline: Timer | None = None
 
     @property
     def active(self) -> bool:
@@ -60,10 +62,8 @@ class Homing:
         core = self._core
         timeout_key, unit_s = core.family.traits.homing_timeout
         timeout_s = core.number(timeout_key) * unit_s
-        self.deadline_step = (
-            float(self._axis.s[k.S_STEP]) + timeout_s / k.STEP_S if timeout_s else None
-        )
-        self._axis.set_alarm(self.deadline_step)
+        if timeout_s:
+            self._deadline = core.schedule.after(timeout_s, self._give_up)
         self._axis.p[k.P_LIMIT_STOPS] = 0.0
         self._script = self._run(method)
         self._resume()
@@ -80,11 +80,14 @@ class Homing:
             if events & k.EV_STOPPED:
                 self.guard_limits()
             return
-        if events & k.EV_ALARM_CLOCK and self.deadline_step is not None:
-            self._script.close()
-            self._fail()
-        elif events & self._waiting.event:
+        if events & self._waiting.event:
             self._resume()
+
+    def _give_up(self) -> None:
+        self._deadline = None
+        if self._script is not None:
+            self._script.close()
+            self._fail(timed_out=True)
 
     def _resume(self) -> None:
         script = self._script
@@ -93,7 +96,7 @@ class Homing:
         try:
             self._waiting = next(script)
         except StopIteration:
-            self.attained = self.was_attained = True
+            self.attained = self.was_attained = self._core.homed = True
             self._finish()
         except HomingFailed:
             self._fail()
@@ -103,19 +106,21 @@ class Homing:
 
     def guard_limits(self) -> None:
         """Outside a search a limit switch is a fault again."""
-        self._axis.p[k.P_LIMIT_STOPS] = float(self._core.family.traits.limit_switch_faults)
+        self._axis.p[k.P_LIMIT_STOPS] = self._core.limit_mode()
 
-    def _fail(self) -> None:
+    def _fail(self, *, timed_out: bool = False) -> None:
         self.failed = True
         self._finish()
         # The axis may stand on a limit switch: that is a homing error and no fault.
         self._axis.p[k.P_LIMIT_STOPS] = 0.0
         self._axis.stop_ramp(self._acceleration())
+        self.on_failed(timed_out)
 
     def _finish(self) -> None:
         self._script = None
-        self.deadline_step = None
-        self._axis.set_alarm(None)
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
         self._axis.listen(k.EV_ARRIVED)
         self._axis.watch_signals(0)
         self._axis.watch_stall(0.0, math.inf, 0.0)
@@ -173,9 +178,15 @@ class Homing:
         return float(self._axis.s[k.S_INDEX_ANGLE])
 
     def _index_either_way(self, direction: int) -> Script:
-        """Methods 33 and 34. Some families turn round at the limit switch, pass the index and
-        approach it again in the method's own direction (000:2679).
+        """Methods 33 and 34. Some families take an index on which they stand (000:2677), turn
+        round at the limit switch, pass the index and approach it again in the method's own
+        direction (000:2679).
         """
+        turn = float(self._axis.p[k.P_INDEX_RAD])
+        nearest = round(self._axis.angle_rad / turn) * turn
+        away = abs(self._axis.angle_rad - nearest) * float(self._axis.p[k.P_COUNTS_PER_RAD])
+        if self._core.family.traits.index_at_once and away <= 2:
+            return nearest
         try:
             return (yield from self._index(direction))
         except HomingFailed:
@@ -217,6 +228,9 @@ class Homing:
             ramp = self._acceleration()
             self._axis.move(home, self._speed("6099:02", 65536), ramp, ramp)
             yield Until(k.EV_ARRIVED)
+        if self._offset_way().startswith("travel"):
+            yield from self._travel_offset(home)
+            return
         self._take(home)
         if stays:
             self._axis.hold()
@@ -224,12 +238,34 @@ class Homing:
     def _take(self, home: float) -> None:
         """The zero position lies the home offset beyond the home position (004:7231-7236).
 
-        Some families show the offset as the position at home instead (001:687-691).
+        Some families show the offset as the position at home instead (001:687-691, 002:4344).
         """
-        offset = self._core.number("607C:00") / self._core.units.position_per_rad
-        if self._core.family.traits.position_at_home_is_offset:
-            offset = -offset
-        self._core.zero_rad = home + offset
+        core = self._core
+        offset = core.number("607C:00") / core.units.position_per_rad
+        way = self._offset_way()
+        if way == "shift":
+            core.zero_rad -= offset
+        elif way == "zero_beyond":
+            core.zero_rad = home + offset
+        else:
+            core.zero_rad = home - offset
+
+    def _offset_way(self) -> str:
+        """P12.11 of the M6-L: 0 at home, 1 shifts, 2 and 3 travel the offset (000:2213-2222)."""
+        traits = self._core.family.traits
+        if traits.home_offset != "by_parameter":
+            return traits.home_offset
+        chosen = int(self._core.number(traits.home_offset_key or ""))
+        return {0: "at_home", 1: "shift", 2: "travel_to_zero", 3: "travel"}.get(chosen, "at_home")
+
+    def _travel_offset(self, home: float) -> Generator[Until, None, None]:
+        """Go the offset beyond home; there the position is 0, or the offset."""
+        core = self._core
+        offset = core.number("607C:00") / core.units.position_per_rad
+        ramp = self._acceleration()
+        self._axis.move(home + offset, self._speed("6099:02", 65536), ramp, ramp)
+        yield Until(k.EV_ARRIVED)
+        core.zero_rad = home + offset if self._offset_way() == "travel_to_zero" else home
 
     def _by_torque(self, direction: int) -> Script:
         core = self._core

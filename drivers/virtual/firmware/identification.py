@@ -9,12 +9,13 @@ have, to the resolution of their objects.
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 
 import numpy as np
 
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.schedule import Timer
 
 (
     IDLE, PREPARATION, RESISTANCE, READY_INDUCTANCE, INDUCTANCE_D, INDUCTANCE_Q, THETA_BIAS,
@@ -32,6 +33,8 @@ class Identification:
         self._core = core
         self._axis = core.axis
         self._script: _Wait | None = None
+        self._timer: Timer | None = None
+        self._ended: Callable[[], None] = lambda: None
         self.started = False
 
     @property
@@ -39,9 +42,10 @@ class Identification:
         """True while identifying (status word bit 14)."""
         return self._script is not None
 
-    def start(self) -> None:
-        """Begin; ends by itself in "complete" or "error"."""
+    def start(self, ended: Callable[[], None]) -> None:
+        """Begin; ends by itself in "complete" or "error" and tells so."""
         self.started = True
+        self._ended = ended
         self._script = self._run()
         self._resume()
 
@@ -50,15 +54,11 @@ class Identification:
         if self._script is not None:
             self._script.close()
             self._script = None
-            self._axis.set_alarm(None)
             self._status(IDLE)
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
         self.started = False
-
-    def on_events(self, events: int) -> bool:
-        """Resume after the awaited time; True when that was the end."""
-        if events & k.EV_ALARM_CLOCK:
-            self._resume()
-        return self._script is None
 
     def _resume(self) -> None:
         if self._script is None:
@@ -67,9 +67,10 @@ class Identification:
             wait_s = next(self._script)
         except StopIteration:
             self._script = None
-            self._axis.set_alarm(None)
+            self._timer = None
+            self._ended()
         else:
-            self._axis.set_alarm(float(self._axis.s[k.S_STEP]) + max(1, round(wait_s / k.STEP_S)))
+            self._timer = self._core.schedule.after(wait_s, self._resume)
 
     def _status(self, value: int) -> None:
         self._core.od.put("200C:05", value)

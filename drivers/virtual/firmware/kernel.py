@@ -31,8 +31,8 @@ GEN_OFF, GEN_POSITION, GEN_VELOCITY, GEN_TORQUE, GEN_CYCLIC, GEN_TORQUE_STOP = r
 # --- which loops are closed ----------------------------------------------------------------
 LOOP_OFF, LOOP_POSITION, LOOP_SPEED, LOOP_TORQUE, LOOP_IMPEDANCE = range(5)
 # --- events that end a run early, as bits --------------------------------------------------
-EV_FAULT, EV_STOPPED, EV_ARRIVED, EV_SIGNAL, EV_INDEX, EV_STALL, EV_ALARM_CLOCK = (
-    1 << bit for bit in range(7)
+EV_FAULT, EV_STOPPED, EV_ARRIVED, EV_SIGNAL, EV_INDEX, EV_STALL, EV_ALARM_CLOCK, EV_LIMIT = (
+    1 << bit for bit in range(8)
 )  # fmt: skip
 # --- protections: bits of the MMS7's error status 200Bh:0Bh (004:6254-6282), then those that
 #     other families have ------------------------------------------------------------------
@@ -44,12 +44,21 @@ EV_FAULT, EV_STOPPED, EV_ARRIVED, EV_SIGNAL, EV_INDEX, EV_STALL, EV_ALARM_CLOCK 
 # --- switches, as bits of P_SIGNAL_* and S_SIGNALS ------------------------------------------
 SIG_NEGATIVE, SIG_POSITIVE, SIG_HOME = 1, 2, 4
 
+# --- when the second gains act: P_SWITCH_KIND (conditions as M6-L 000:3399, R6L 002:10800) -----
+(
+    SWITCH_OFF, SWITCH_SMALL_ERROR, SWITCH_INPUT, SWITCH_TORQUE, SWITCH_SPEED_DEMAND,
+    SWITCH_SPEED, SWITCH_ACCELERATION, SWITCH_ERROR, SWITCH_COMMANDED, SWITCH_UNFINISHED,
+    SWITCH_COMMANDED_OR_FAST,
+) = range(11)  # fmt: skip
+# --- what a limit switch does: P_LIMIT_STOPS --------------------------------------------------
+LIMIT_IGNORED, LIMIT_FAULT, LIMIT_HOLDS = range(3)
+
 # --- parameters -----------------------------------------------------------------------------
 (
     P_GEN, P_LOOP, P_EVENT_MASK, P_TARGET, P_V_MAX, P_ACC, P_DEC, P_STOPPING, P_STOP_DEC,
     P_V_TARGET, P_T_TARGET, P_T_SLOPE, P_STOP_SPEED, P_STOP_TORQUE,
     P_KP_POSITION_1, P_KP_POSITION_2, P_KP_SPEED_1, P_KP_SPEED_2, P_KI_SPEED_1, P_KI_SPEED_2,
-    P_SWITCH_ERROR, P_SWITCH_TIME, P_SWITCH_ON, P_SPEED_OUT_LIMIT, P_POSITION_OUT_LIMIT,
+    P_SWITCH_LEVEL, P_SWITCH_TIME, P_SWITCH_KIND, P_SPEED_OUT_LIMIT, P_POSITION_OUT_LIMIT,
     P_TORQUE_SPEED_LIMIT, P_MAX_SPEED, P_T_MAX, P_T_MIN,
     P_FF_SPEED, P_FF_SPEED_COEFFICIENT, P_FF_TORQUE, P_FF_TORQUE_COEFFICIENT,
     P_POSITION_FILTER, P_SPEED_FILTER, P_SPEED_SOURCE, P_OBSERVER_GAIN, P_OBSERVER_INERTIA,
@@ -66,8 +75,11 @@ SIG_NEGATIVE, SIG_POSITIVE, SIG_HOME = 1, 2, 4
     P_POSITION_WINDOW, P_SPEED_WINDOW, P_ZERO_SPEED, P_FOLLOWING_WINDOW, P_STALL_NM, P_STALL_S,
     P_STALL_SPEED, P_Z_KP, P_Z_KI, P_Z_KD, P_Z_FILTER, P_Z_LIMIT, P_LOAD_RATIO_S,
     P_POWER_LIMIT_V, P_INDEX_RAD, P_TORQUE_FILTER, P_FOLLOWING_S,
-) = range(102)  # fmt: skip
-P_NOTCHES = 102
+    P_TORQUE_FILTER_2, P_SWITCH_HYSTERESIS, P_SWITCH_DELAY, P_SWITCH_INPUT, P_LIMIT_DEC,
+    P_DYNAMIC_BRAKE, P_BRAKE_CLOSED, P_I2T_LIMIT, P_LOCK_NM, P_FRICTION_POSITIVE,
+    P_FRICTION_NEGATIVE, P_FRICTION_VISCOUS, P_TORQUE_BIAS, P_I2T_RATED_NM,
+) = range(116)  # fmt: skip
+P_NOTCHES = 116
 """Start of the notches: per notch a1, a2, b1, b2 of (z² + a1·z + a2)/(z² + b1·z + b2)."""
 P_SIZE = P_NOTCHES + 16
 
@@ -83,9 +95,9 @@ P_SIZE = P_NOTCHES + 16
     S_POSITION_T, S_SPEED_T, S_ZERO_T, S_FOLLOWING_T, S_STALL_T,
     S_IP_POSITION, S_IP_POSITION_INC, S_IP_SPEED, S_IP_SPEED_INC, S_IP_TORQUE, S_IP_TORQUE_INC,
     S_IP_LEFT, S_Z_INTEGRAL, S_Z_SPEED, S_SPARE_NORMAL, S_HAS_SPARE, S_LIMIT_ACTIVE, S_UQ,
-    S_TORQUE_FILTERED,
-) = range(56)  # fmt: skip
-S_NOTCHES = 56
+    S_TORQUE_FILTERED, S_SECOND_GAINS, S_SWITCH_T, S_I2T, S_LIMIT_HELD,
+) = range(60)  # fmt: skip
+S_NOTCHES = 60
 """Start of the notch states, two per notch."""
 S_SIZE = S_NOTCHES + 8
 
@@ -194,10 +206,29 @@ def _approach(value, goal, rise, fall):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def _held(p, s, towards):  # type: ignore[no-untyped-def]
+    """Whether an active limit switch forbids this direction (sign of ``towards``)."""
+    held = False
+    if p[P_LIMIT_STOPS] == LIMIT_HOLDS:
+        signals = int(s[S_SIGNALS])
+        held = (towards > 0.0 and signals & SIG_POSITIVE != 0) or (
+            towards < 0.0 and signals & SIG_NEGATIVE != 0
+        )
+    if held and s[S_LIMIT_HELD] == 0.0:
+        _event(s, EV_LIMIT)
+    s[S_LIMIT_HELD] = 1.0 if held else 0.0
+    return held
+
+
+@njit(cache=True, nogil=True)
 def _generate_position(p, s):  # type: ignore[no-untyped-def]
     speed = s[S_V_DEMAND]
     if p[P_STOPPING] > 0.0:
         new = _approach(speed, 0.0, 0.0, p[P_STOP_DEC] * STEP_S)
+    elif _held(p, s, p[P_TARGET] - s[S_P_DEMAND]):
+        new = _approach(speed, 0.0, 0.0, p[P_LIMIT_DEC] * STEP_S)
+        if new == 0.0:
+            p[P_TARGET] = s[S_P_DEMAND]  # what lies behind the switch is given up
     else:
         distance = p[P_TARGET] - s[S_P_DEMAND]
         fall = p[P_DEC] * STEP_S
@@ -221,6 +252,8 @@ def _generate_velocity(p, s):  # type: ignore[no-untyped-def]
     speed = s[S_V_DEMAND]
     if p[P_STOPPING] > 0.0:
         new = _approach(speed, 0.0, 0.0, p[P_STOP_DEC] * STEP_S)
+    elif _held(p, s, p[P_V_TARGET]):
+        new = _approach(speed, 0.0, 0.0, p[P_LIMIT_DEC] * STEP_S)
     else:
         new = _approach(speed, p[P_V_TARGET], p[P_ACC] * STEP_S, p[P_DEC] * STEP_S)
         s[S_ARRIVED] = 1.0 if new == p[P_V_TARGET] else 0.0
@@ -233,7 +266,16 @@ def _generate_velocity(p, s):  # type: ignore[no-untyped-def]
 def _generate_cyclic(p, s):  # type: ignore[no-untyped-def]
     speed = s[S_V_DEMAND]
     loop = int(p[P_LOOP])
-    if s[S_IP_LEFT] > 0.0:
+    held = False
+    if p[P_LIMIT_STOPS] == LIMIT_HOLDS:
+        towards = s[S_IP_POSITION_INC] if loop == LOOP_POSITION else s[S_IP_SPEED]
+        if loop in (LOOP_TORQUE, LOOP_IMPEDANCE):
+            towards = s[S_IP_TORQUE] if s[S_OMEGA] * s[S_IP_TORQUE] >= 0.0 else 0.0
+        held = _held(p, s, towards)
+    if held and loop == LOOP_POSITION:
+        s[S_IP_LEFT] = 0.0
+        s[S_V_DEMAND] = 0.0
+    elif s[S_IP_LEFT] > 0.0:
         s[S_IP_LEFT] -= 1.0
         s[S_IP_POSITION] += s[S_IP_POSITION_INC]
         s[S_IP_SPEED] += s[S_IP_SPEED_INC]
@@ -246,13 +288,13 @@ def _generate_cyclic(p, s):  # type: ignore[no-untyped-def]
         s[S_P_DEMAND] = s[S_IP_POSITION]
         s[S_T_DEMAND] = 0.0
     elif loop == LOOP_SPEED:
-        s[S_V_DEMAND] = s[S_IP_SPEED]
+        s[S_V_DEMAND] = 0.0 if held else s[S_IP_SPEED]
         s[S_P_DEMAND] = s[S_THETA]
         s[S_T_DEMAND] = 0.0
     else:
         s[S_V_DEMAND] = s[S_OMEGA]
         s[S_P_DEMAND] = s[S_IP_POSITION] if loop == LOOP_IMPEDANCE else s[S_THETA]
-        s[S_T_DEMAND] = s[S_IP_TORQUE]
+        s[S_T_DEMAND] = 0.0 if held else s[S_IP_TORQUE]
     s[S_A_DEMAND] = (s[S_V_DEMAND] - speed) / STEP_S
     s[S_ARRIVED] = 1.0
 
@@ -269,6 +311,8 @@ def _generate(p, s):  # type: ignore[no-untyped-def]
     elif kind in (GEN_TORQUE, GEN_TORQUE_STOP):
         if kind == GEN_TORQUE:
             goal = 0.0 if p[P_STOPPING] > 0.0 else p[P_T_TARGET]
+            if _held(p, s, goal):
+                goal = 0.0
             slope = p[P_T_SLOPE] * STEP_S
             s[S_T_DEMAND] += _clamp(goal - s[S_T_DEMAND], -slope, slope)
             s[S_ARRIVED] = 1.0 if s[S_T_DEMAND] == goal else 0.0
@@ -289,6 +333,76 @@ def _generate(p, s):  # type: ignore[no-untyped-def]
         if ramped and abs(s[S_OMEGA]) <= p[P_STOP_SPEED]:
             s[S_STOPPED] = 1.0
             _event(s, EV_STOPPED)
+
+
+@njit(cache=True, nogil=True)
+def _switch_measure(s, kind):  # type: ignore[no-untyped-def]
+    """The quantity that a gain switching condition compares with its level, SI units."""
+    error = abs(s[S_P_DEMAND] - s[S_THETA])
+    if kind == SWITCH_TORQUE:
+        return abs(s[S_TORQUE_COMMAND])
+    if kind == SWITCH_SPEED_DEMAND:
+        return abs(s[S_V_DEMAND])
+    if kind == SWITCH_SPEED:
+        return abs(s[S_OMEGA])
+    if kind == SWITCH_ACCELERATION:
+        return abs(s[S_A_DEMAND])
+    if kind == SWITCH_ERROR:
+        return error
+    if kind == SWITCH_COMMANDED_OR_FAST and s[S_V_DEMAND] == 0.0:
+        return abs(s[S_OMEGA])
+    return 0.0
+
+
+@njit(cache=True, nogil=True)
+def _select_gains(p, s, loop):  # type: ignore[no-untyped-def]
+    """Share of the second gains, 0 to 1.
+
+    To the second gains at once above level + hysteresis, back when the quantity has been below
+    level − hysteresis for the delay.
+    """
+    kind = int(p[P_SWITCH_KIND])
+    goal = s[S_SECOND_GAINS]
+    if kind == SWITCH_OFF:
+        goal = 0.0
+    elif kind == SWITCH_SMALL_ERROR:
+        error = abs(s[S_P_DEMAND] - s[S_THETA_FILTERED])
+        goal = 1.0 if loop == LOOP_POSITION and error < p[P_SWITCH_LEVEL] else 0.0
+    else:
+        if kind == SWITCH_INPUT:
+            on = p[P_SWITCH_INPUT] > 0.0
+            off = not on
+        elif kind in (SWITCH_COMMANDED, SWITCH_UNFINISHED) or (
+            kind == SWITCH_COMMANDED_OR_FAST and s[S_V_DEMAND] != 0.0
+        ):
+            on = s[S_V_DEMAND] != 0.0
+            if kind == SWITCH_UNFINISHED:
+                on = on or abs(s[S_P_DEMAND] - s[S_THETA]) > p[P_POSITION_WINDOW]
+            off = not on
+        else:
+            measure = _switch_measure(s, kind)
+            on = measure > p[P_SWITCH_LEVEL] + p[P_SWITCH_HYSTERESIS]
+            off = measure < max(p[P_SWITCH_LEVEL] - p[P_SWITCH_HYSTERESIS], 1e-9)
+        s[S_SWITCH_T] = s[S_SWITCH_T] + STEP_S if off else 0.0
+        if on:
+            goal = 1.0
+        elif off and s[S_SWITCH_T] >= p[P_SWITCH_DELAY]:
+            goal = 0.0
+    s[S_SECOND_GAINS] = goal
+    rate = STEP_S / max(p[P_SWITCH_TIME], STEP_S)
+    s[S_GAIN_MIX] = _clamp(goal, s[S_GAIN_MIX] - rate, s[S_GAIN_MIX] + rate)
+    return s[S_GAIN_MIX]
+
+
+@njit(cache=True, nogil=True)
+def _friction_compensation(p, s):  # type: ignore[no-untyped-def]
+    """Torque that the drive adds for friction by the direction of the demand, and its bias."""
+    torque = p[P_TORQUE_BIAS] + p[P_FRICTION_VISCOUS] * s[S_V_DEMAND]
+    if s[S_V_DEMAND] > 0.0:
+        torque += p[P_FRICTION_POSITIVE]
+    elif s[S_V_DEMAND] < 0.0:
+        torque -= p[P_FRICTION_NEGATIVE]
+    return torque
 
 
 @njit(cache=True, nogil=True)
@@ -325,7 +439,8 @@ def _control(p, s):  # type: ignore[no-untyped-def]
         s[S_INTEGRAL] = 0.0
         s[S_FF_SPEED] = 0.0
         s[S_FF_TORQUE] = 0.0
-        s[S_TORQUE_COMMAND] = 0.0
+        # Dynamic braking: the shorted windings brake in proportion to the speed.
+        s[S_TORQUE_COMMAND] = -p[P_DYNAMIC_BRAKE] * s[S_OMEGA]
         s[S_SATURATED] = 0.0
         s[S_TORQUE_FILTERED] = 0.0
         s[S_SPEED_REFERENCE] = s[S_OMEGA]
@@ -335,14 +450,10 @@ def _control(p, s):  # type: ignore[no-untyped-def]
     increment = 0.0
     s[S_SPEED_LIMITED] = 0.0
     if loop in (LOOP_POSITION, LOOP_SPEED):
-        mix = s[S_GAIN_MIX]
+        mix = _select_gains(p, s, loop)
         reference = s[S_V_DEMAND]
         if loop == LOOP_POSITION:
             error = s[S_P_DEMAND] - s[S_THETA_FILTERED]
-            goal = 1.0 if p[P_SWITCH_ON] > 0.0 and abs(error) < p[P_SWITCH_ERROR] else 0.0
-            rate = STEP_S / max(p[P_SWITCH_TIME], STEP_S)
-            mix = _clamp(goal, mix - rate, mix + rate)
-            s[S_GAIN_MIX] = mix
             kp = p[P_KP_POSITION_1] + mix * (p[P_KP_POSITION_2] - p[P_KP_POSITION_1])
             wanted = p[P_FF_SPEED] * s[S_V_DEMAND]
             s[S_FF_SPEED] += p[P_FF_SPEED_COEFFICIENT] * (wanted - s[S_FF_SPEED])
@@ -354,6 +465,7 @@ def _control(p, s):  # type: ignore[no-untyped-def]
         s[S_SPEED_LIMITED] = 0.0 if limited == reference else 1.0
         s[S_SPEED_REFERENCE] = limited
         torque, increment = _speed_controller(p, s, limited, mix)
+        torque += _friction_compensation(p, s)
         if int(p[P_GEN]) == GEN_CYCLIC:
             torque += s[S_IP_TORQUE]
     else:
@@ -367,7 +479,9 @@ def _control(p, s):  # type: ignore[no-untyped-def]
             s[S_SPEED_LIMITED] = 1.0
             torque = _clamp(torque, lower, upper)
 
-    s[S_TORQUE_FILTERED] += p[P_TORQUE_FILTER] * (torque - s[S_TORQUE_FILTERED])
+    share = s[S_GAIN_MIX]
+    lag = p[P_TORQUE_FILTER] + share * (p[P_TORQUE_FILTER_2] - p[P_TORQUE_FILTER])
+    s[S_TORQUE_FILTERED] += lag * (torque - s[S_TORQUE_FILTERED])
     torque = s[S_TORQUE_FILTERED]
     for i in range(int(p[P_NOTCH_COUNT])):
         c, z = P_NOTCHES + 4 * i, S_NOTCHES + 2 * i
@@ -418,7 +532,7 @@ def _step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no
                 total += bm[i, 3 + g] * (1.0 if x[gap_state[g]] > 0.0 else -1.0)
         scratch[i] = total
     coulomb = p[P_COULOMB]
-    if int(p[P_LOOP]) == LOOP_OFF:
+    if int(p[P_LOOP]) == LOOP_OFF or p[P_BRAKE_CLOSED] > 0.0:
         coulomb += p[P_BRAKE_TORQUE]
     friction = 0.0
     if coulomb > 0.0:
@@ -496,6 +610,10 @@ def _protect(p, s):  # type: ignore[no-untyped-def]
     s[S_OVERLOAD_T] = s[S_OVERLOAD_T] + STEP_S if torque > p[P_OVERLOAD_NM] else 0.0
     if s[S_OVERLOAD_T] > p[P_OVERLOAD_S]:
         faults |= F_OVERLOAD
+    share = torque / p[P_I2T_RATED_NM]
+    s[S_I2T] = max(0.0, s[S_I2T] + (share * share - 1.0) * STEP_S)
+    if s[S_I2T] > p[P_I2T_LIMIT]:
+        faults |= F_OVERLOAD
     loop = int(p[P_LOOP])
     closed = loop in (LOOP_POSITION, LOOP_SPEED)
     away = closed and abs(s[S_SPEED_REFERENCE] - s[S_OMEGA]) > p[P_SPEED_ERROR]
@@ -504,7 +622,7 @@ def _protect(p, s):  # type: ignore[no-untyped-def]
         faults |= F_SPEED_ERROR
     if loop == LOOP_POSITION and s[S_FOLLOWING_T] > p[P_FOLLOWING_S]:
         faults |= F_FOLLOWING
-    pushing = closed and powered and torque > p[P_RATED_NM]
+    pushing = closed and powered and torque > p[P_LOCK_NM]
     if pushing and loop == LOOP_POSITION:
         goal = p[P_TARGET] if int(p[P_GEN]) == GEN_POSITION else s[S_P_DEMAND]
         pushing = abs(goal - s[S_THETA]) > p[P_LOCK_ANGLE]
@@ -522,7 +640,7 @@ def _protect(p, s):  # type: ignore[no-untyped-def]
     if signals & SIG_POSITIVE and s[S_OMEGA] > p[P_STOP_SPEED]:
         into = 1.0
     s[S_LIMIT_ACTIVE] = into
-    if into > 0.0 and powered and p[P_LIMIT_STOPS] > 0.0:
+    if into > 0.0 and powered and p[P_LIMIT_STOPS] == LIMIT_FAULT:
         faults |= F_POSITION_LIMIT
     before = int(s[S_FAULTS])
     if faults & ~before:

@@ -8,8 +8,10 @@ from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.dictionary import Number
+from drivers.virtual.firmware.monitors import monitors
 from drivers.virtual.firmware.panel import Panel
 from drivers.virtual.firmware.states import State
+from drivers.virtual.firmware.terminals import Terminals
 
 _TURN_INCREMENTS = 65536
 """Increments of the internal unit INC per motor revolution (004:6984-6986)."""
@@ -27,7 +29,7 @@ _STANDARD_OF_ROLE = {
 
 
 def live_values(
-    core: Core, control: DeviceControl, panel: Panel
+    core: Core, control: DeviceControl, panel: Panel | Terminals
 ) -> dict[str, Callable[[], Number]]:
     """Getters by parameter key; a drive connects those that its dictionary has."""
     item = core.axis.s.item
@@ -47,8 +49,9 @@ def live_values(
 
     def status_word() -> int:
         word = control.status_word()
-        panel.target_reached = bool(word & 1 << 10)
-        panel.alarm = control.state in (State.FAULT, State.FAULT_REACTION)
+        if isinstance(panel, Panel):
+            panel.target_reached = bool(word & 1 << 10)
+            panel.alarm = control.state in (State.FAULT, State.FAULT_REACTION)
         return word
 
     def digital_inputs() -> int:
@@ -62,8 +65,9 @@ def live_values(
             bits = bits & 4 | (bits & 1) << 1 | bits >> 1 & 1
         return bits
 
+    has_terminals = core.family.traits.assigns_terminals or isinstance(panel, Terminals)
     values: dict[str, Callable[[], Number]] = {
-        "1001:00": lambda: control.error_register,
+        "1001:00": lambda: control.alarms.error_register,
         "603F:00": lambda: control.error_code,
         "6041:00": status_word,
         "6061:00": lambda: control.modes.mode,
@@ -89,11 +93,12 @@ def live_values(
             (item(k.S_P_DEMAND) - item(k.S_THETA)) * core.units.position_per_rad
         ),
         "60FC:00": lambda: round((item(k.S_P_DEMAND) - core.zero_rad) * inc_per_rad),
-        "60FD:00": digital_inputs if core.family.traits.assigns_terminals else plain_inputs,
+        "60FD:00": digital_inputs if has_terminals else plain_inputs,
     }
     if core.family.traits.error_status_key is not None:
         values[core.family.traits.error_status_key] = lambda: core.axis.faults & 0x1FFF
     values |= core.family.readings(core.axis)
+    values |= monitors(core, control, panel if isinstance(panel, Terminals) else None)
     # The same quantity under a number of the maker's own (2102h is DS_C's error code).
     for role, standard in _STANDARD_OF_ROLE.items():
         parameter = core.profile.by_role.get(role)

@@ -217,7 +217,8 @@ class Modes:
     def status_bits(self, halted: bool, enabled: bool) -> int:
         """Bits 10 to 13 of the status word."""
         core, s = self._core, self._axis.s
-        bits = 1 << 11 if self.limited or s[k.S_LIMIT_ACTIVE] > 0 else 0
+        held = s[k.S_LIMIT_ACTIVE] > 0 or s[k.S_LIMIT_HELD] > 0
+        bits = 1 << 11 if self.limited or held else 0
         following = s[k.S_FOLLOWING_T] > core.number("6066:00", 10) * 1e-3
         reached: Callable[[], bool] = {
             PP: lambda: bool(s[k.S_POSITION_T] >= core.number("6068:00", 10) * 1e-3),

@@ -15,6 +15,7 @@ from drivers.virtual.device import (
     SdoAbort,
 )
 from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.alarms import FaultLog
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.commands import Commands
 from drivers.virtual.firmware.control import DeviceControl, Emergency
@@ -27,6 +28,7 @@ from drivers.virtual.firmware.panel import Panel
 from drivers.virtual.firmware.process_data import InputImage, OutputImage, check_mapping
 from drivers.virtual.firmware.registers import RegisterTable
 from drivers.virtual.firmware.storage import Storage
+from drivers.virtual.firmware.terminals import Terminals
 from drivers.virtual.firmware.trouble import make_trouble
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
@@ -65,7 +67,9 @@ class VirtualServo:
         self._storage = Storage(profile, family, self.od, mechanics, self.axis.motor, nvm_path)
         self._family = family
         self._registers = RegisterTable(profile, self.od)
+        self._watches_terminals = family.traits.assigns_terminals or family.terminals is not None
         self._zero_rad = 0.0
+        self._log = FaultLog(family.traits.history_size)
         self._start_ns: int | None = None
         self._off_until_ns: int | None = None
         self._reset_step: int | None = None
@@ -79,9 +83,12 @@ class VirtualServo:
         self.axis.set_alarm(None)
         self.core = Core(self.profile, self._family, self.od, self.axis)
         self.core.zero_rad = self._zero_rad
-        self.control = DeviceControl(self.core)
+        self.control = DeviceControl(self.core, self._log)
         self.control.modes.mode = int(self.core.number("6060:00", 0))
-        self.panel = Panel(self.core)
+        table = self._family.terminals
+        self.panel: Panel | Terminals = (
+            Panel(self.core) if table is None else Terminals(self.core, self.control, table)
+        )
         self.core.apply_settings()
         self._connect()
         if self._storage.nvm.damaged:
@@ -236,7 +243,7 @@ class VirtualServo:
         self.control.set_mode(mode)
 
     def _terminals_changed(self) -> None:
-        if self._family.traits.assigns_terminals and self.panel.update():
+        if self._watches_terminals and self.panel.update():
             self.control.reset_fault()
 
     # --- trouble ---------------------------------------------------------------------------
@@ -253,10 +260,11 @@ class VirtualServo:
     def inject(self, what: str, value: float = 1.0) -> None:
         """Trouble by name.
 
-        A fault's name (``over_current`` … ``watchdog``) or 603Fh code (``0x7121``) latches it;
+        A fault's name (``over_current`` … ``watchdog``), its code in the profile's table
+        (``Er.013``, ``AL.247`` …) or in 603Fh (``0x7121``) latches it; a warning's code shows it;
         ``encoder_loss`` (1/0), ``supply_v``, ``ambient_c``, ``temperature_c``, ``load_nm`` (the
-        constant torque of gravity) and ``coulomb_nm`` change the machine; ``di1`` … ``di4`` set
-        terminals without a switch; ``power_off`` switches off for ``value`` seconds.
+        constant torque of gravity) and ``coulomb_nm`` change the machine; ``di1`` … set terminals
+        without a switch; ``power_off`` switches off for ``value`` seconds.
 
         Raises:
             ValueError: this drive knows no such trouble.

@@ -40,15 +40,35 @@ class GainSet:
 
 
 @dataclass(frozen=True, slots=True)
+class Switching:
+    """When the second gains act: ``kind`` is one of the kernel's SWITCH_*, levels in SI units."""
+
+    kind: int = 0
+    level: float = 0.0
+    hysteresis: float = 0.0
+    delay_s: float = 0.0
+    ramp_s: float = 0.001
+
+
+@dataclass(frozen=True, slots=True)
+class Compensation:
+    """Torque added by the drive: a bias (gravity), and friction by the direction of the demand."""
+
+    bias_nm: float = 0.0
+    positive_nm: float = 0.0
+    negative_nm: float = 0.0
+    viscous_nms: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class LoopSettings:
     """Everything between command and current loop."""
 
     first: GainSet
     second: GainSet
     homing: GainSet | None
-    switch_gains: bool = False
-    switch_error_rad: float = 0.0
-    switch_time_s: float = 0.001
+    switching: Switching = Switching()
+    compensation: Compensation = Compensation()
     current_loop_hz: float = 1000.0
     speed_feed_forward: float = 0.0
     speed_feed_forward_s: float = 0.0
@@ -62,6 +82,7 @@ class LoopSettings:
     viscous_nms: float = 0.0
     coulomb_nm: float = 0.0
     torque_filter_s: float = 0.0
+    torque_filter_2_s: float | None = None
     notches: tuple[Biquad, ...] = ()
     speed_output_nm: float = math.inf
     position_output_rad_s: float = math.inf
@@ -90,6 +111,10 @@ class ProtectionSettings:
     speed_error_s: float = math.inf
     following_error_s: float = math.inf
     holding_brake: bool = False
+    braking_ohm: float = 25.0
+    i2t_s: float = math.inf
+    i2t_rated_nm: float = math.inf
+    locked_nm: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,8 @@ from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.panel import Panel
+from drivers.virtual.firmware.terminals import Terminals
+from profiles.schema import Fault
 
 _FAULTS: Final = {
     "over_current": k.F_OVER_CURRENT, "under_voltage": k.F_UNDER_VOLTAGE,
@@ -23,7 +25,9 @@ _PHYSICS: Final = {
 }  # fmt: skip
 
 
-def make_trouble(core: Core, control: DeviceControl, panel: Panel, what: str, value: float) -> None:
+def make_trouble(
+    core: Core, control: DeviceControl, panel: Panel | Terminals, what: str, value: float
+) -> None:
     """One trouble by name; see `VirtualServo.inject`.
 
     Raises:
@@ -35,10 +39,32 @@ def make_trouble(core: Core, control: DeviceControl, panel: Panel, what: str, va
         core.axis.s[k.S_TEMPERATURE] = value
     elif what in _FAULTS:
         control.raise_fault(_FAULTS[what])
-    elif what in ("di1", "di2", "di3", "di4"):
-        panel.external[int(what[2]) - 1] = value > 0
+    elif what.startswith("di") and what[2:].isdigit():
+        place = int(what[2:]) - 1
+        if not 0 <= place < len(panel.external):
+            raise ValueError(f"{core.profile.drive} has no input {what}")
+        panel.external[place] = value > 0
+    elif (fault := _entry(control, what)) is not None:
+        bit = _protection_of(core, fault.code)
+        if bit:
+            control.raise_fault(bit)
+        else:
+            control.raise_alarm(fault)
     else:
         control.raise_fault(_fault_by_code(core, what))
+
+
+def _entry(control: DeviceControl, what: str) -> Fault | None:
+    """An entry of the fault table by its code or the value of 603Fh."""
+    found = control.alarms.find(what)
+    if found is None and what.startswith("0x"):
+        found = control.alarms.find_raw(int(what, 16))
+    return found
+
+
+def _protection_of(core: Core, code: str) -> int:
+    """The protection that reports this entry, 0 if none does."""
+    return next((b for b, info in core.family.traits.faults.items() if info.fault == code), 0)
 
 
 def _fault_by_code(core: Core, what: str) -> int:

@@ -22,6 +22,8 @@ class MotorSpec(_Part):
     inertia_kgm2: float = Field(gt=0)
     rated_torque_nm: float = Field(gt=0)
     rated_speed_rpm: float = Field(gt=0)
+    brake: bool = False
+    """A holding brake of twice the rated torque is mounted."""
 
 
 class FrictionSpec(_Part):

@@ -186,9 +186,9 @@ def test_zero_position_and_history(bench) -> None:
     b.run(0.01)
     assert abs(b.get("6064:00")) < 200  # the absolute encoder keeps its zero
     b.servo.inject("overload")
-    assert b.servo.control.history == [0x3230]
+    assert [r.error_code for r in b.servo.control.alarms.log.records] == [0x3230]
     b.set("200D:00", CLEAR)
-    assert b.servo.control.history == []
+    assert b.servo.control.alarms.log.records == []
 
 
 def test_mapping_rules(bench) -> None:

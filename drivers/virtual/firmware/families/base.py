@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.axis import VirtualAxis
@@ -13,6 +13,9 @@ from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.settings import LoopSettings, MotorData, ProtectionSettings
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
+
+if TYPE_CHECKING:
+    from drivers.virtual.firmware.families.terminals import TerminalTable
 
 RPM = math.pi / 30
 """rad/s per rpm."""
@@ -44,6 +47,13 @@ class FaultInfo:
     code: int
     fixed: bool = False
     error_register: int = 0x01
+    fault: str = ""
+    """The entry's code in the profile's table of faults."""
+
+    @property
+    def name(self) -> str:
+        """What tells this fault from others."""
+        return self.fault or f"{self.code:#06x}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +81,51 @@ class FeedForward:
 
     speed_gain: str
     speed_filter: str
-    torque_gain: str
-    torque_filter: str
+    torque_gain: str | None = None
+    torque_filter: str | None = None
     speed_select: str | None = None
     torque_select: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class GainKeys:
+    """Parameters of one more gain set, in the units of the first."""
+
+    position: str | None = None
+    speed: str | None = None
+    integral: str | None = None
+    torque_filter: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SwitchKeys:
+    """Parameters that choose between the first and the second gains.
+
+    ``kinds`` translates the condition to the kernel's SWITCH_*; ``on_raw`` are the values of
+    ``mode`` that let it switch, ``always_raw`` those that mean the second gains at all times.
+    """
+
+    mode: str
+    on_raw: tuple[int, ...] = ()
+    always_raw: tuple[int, ...] = ()
+    condition: str | None = None
+    kinds: dict[int, int] = field(default_factory=dict)
+    level: str | None = None
+    hysteresis: str | None = None
+    delay: str | None = None
+    ramp: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CompensationKeys:
+    """Torques that the drive adds, in % of the rated torque by the parameters' own scales."""
+
+    bias: str | None = None
+    positive: str | None = None
+    negative: str | None = None
+    viscous: str | None = None
+    viscous_per_rpm: float = 1e-4
+    """Rated torque per rpm and per % of ``viscous``."""
 
 
 StatusStyle = Literal["cia402", "echo"]
@@ -97,17 +148,97 @@ class TorqueHoming:
 _MMS7_TORQUE_HOMING = TorqueHoming({-3: (-1, False), -2: (1, False)}, "2070:01", "2070:02")
 
 
+Action = Literal["fault", "warning", "stop"]
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A protection whose action a parameter chooses; ``warning`` is shown instead of the fault.
+
+    *fault* coasts, *warning* goes on, *stop* brakes and holds.
+    """
+
+    key: str
+    actions: dict[int, Action]
+    default: Action = "fault"
+    warning: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LimitSwitches:
+    """What the limit switches do: faults and warnings are (negative, positive) codes."""
+
+    action: Action = "stop"
+    choice: Choice | None = None
+    faults: tuple[str, str] = ("", "")
+    warnings: tuple[str, str] = ("", "")
+
+
+@dataclass(frozen=True, slots=True)
+class BrakeTimes:
+    """Course of the holding brake; see the brake sections of 000:1360 and 002:8117."""
+
+    release_s: float = 0.0
+    command_s: float = 0.0
+    hold_s: float = 0.0
+    hold_moving_s: float = 0.0
+    moving_s: float = 0.0
+    speed_rad_s: float = math.inf
+
+
+#: How the axis is brought to rest when the servo goes off or trips: (while moving, afterwards).
+OffStop = tuple[Literal["coast", "dynamic", "ramp"], Literal["free", "dynamic", "hold"]]
+
+
+@dataclass(frozen=True, slots=True)
+class Stops:
+    """How a family stops apart from the ramps 6084h and 6085h of options 1 and 2.
+
+    ``ramps`` gives other options their own deceleration parameter. ``slope_in_torque`` takes the
+    torque back by 6087h in torque modes. With ``waits`` a state is left only when the axis
+    stands, coasting too. ``off`` tells by a parameter how the servo goes off, ``first`` and
+    ``second`` how faults of the first and second kind stop (R6L).
+    """
+
+    ramps: dict[int, str] = field(default_factory=dict)
+    slope_in_torque: bool = False
+    waits: bool = False
+    disable_voltage_key: str | None = None
+    torque_key: str | None = None
+    quick_ramp_key: str = "6085:00"
+    reaction: Literal["605E", "off"] = "605E"
+    off: tuple[str, dict[int, OffStop]] | None = None
+    first: tuple[str, dict[int, OffStop]] | None = None
+    second: tuple[str, dict[int, OffStop]] | None = None
+    emergency: tuple[str | None, dict[int, int]] | None = None
+    """Emergency stop input: a parameter, and the quick stop option that its values mean: −1
+    none, −2 that of 605Ah. Without a parameter the option stands under 0.
+    """
+
+
 @dataclass(frozen=True, slots=True)
 class Traits:
     """Documented behaviours that are a matter of yes or no, or of one number.
 
     ``commands`` names what writing a raw value to a parameter does: save, restore, reset, zero,
     clear_history, write_settings, fault_reset. ``self_clearing`` commands read 0 afterwards.
-    ``communication_fault`` is 0 for a drive that does not watch its bus.
+    ``communication_fault`` is 0 for a drive that does not watch its bus. ``protections`` names
+    the entries of the fault table that the protections report; a protection without one is off.
+    ``disabled_bits`` are the state bits of "switch on disabled" (EP3E shows 0270h, 001:296).
+    ``index_at_once``: an axis that stands on the index takes it without moving (000:2677).
+    ``homing_alarms`` are the warning and the fault of a homing that failed or ran out of time.
+    ``home_offset``: the zero position lies the offset beyond home (CiA 402-2), or the position
+    at home is the offset, or a parameter chooses (M6-L, 000:2213).
     """
 
     buffered_setpoints: bool = True
-    limit_switch_faults: bool = True
+    limits: LimitSwitches = LimitSwitches()
+    stops: Stops = Stops()
+    protections: dict[int, str] = field(default_factory=dict)
+    choices: dict[int, Choice] = field(default_factory=dict)
+    history_size: int = 20
+    disabled_bits: int = 0x40
+    listed_options_only: bool = False
     communication_fault: int = k.F_WATCHDOG
     faults: dict[int, FaultInfo] = field(default_factory=dict)
     commands: dict[str, dict[int, str]] = field(default_factory=dict)
@@ -115,16 +246,28 @@ class Traits:
     error_status_key: str | None = None
     status: StatusStyle = "cia402"
     home_found_bit: int | None = None
-    position_at_home_is_offset: bool = False
+    home_offset: Literal["zero_beyond", "at_home", "by_parameter"] = "zero_beyond"
+    home_offset_key: str | None = None
     positive_limit_first: bool = False
     limit_bits_swapped: bool = False
     autosave: tuple[Autosave, ...] = ()
     torque_speed_limit_key: str | None = None
+    second_gains: GainKeys | None = None
+    switching: SwitchKeys | None = None
+    compensation: CompensationKeys | None = None
+    speed_filter: tuple[str, str] | None = None
+    """Low-pass of the speed feedback: parameter and "Hz", "ms" or "µs"."""
     feed_forward: FeedForward | None = None
     assigns_terminals: bool = False
     torque_homing: TorqueHoming = _MMS7_TORQUE_HOMING
     homing_timeout: tuple[str, float] = ("2070:03", 1.0)  # parameter and its unit [s]
     index_search_reverses: bool = False
+    index_at_once: bool = False
+    homing_alarms: tuple[str, str] = ("", "")
+    software_limits: tuple[str, dict[int, Literal["off", "on", "homed"]]] | None = None
+    reset_after_s: dict[str, float] = field(default_factory=dict)
+    """Faults that a reset ends only after so long."""
+    emergency_warning: str = ""
 
 
 class Family(Protocol):
@@ -132,6 +275,8 @@ class Family(Protocol):
 
     name: str
     traits: Traits
+    terminals: TerminalTable | None
+    """None for a family whose terminals are the MMS7's, or that has none."""
 
     def factory_values(self, spec: MechanicsSpec, motor: MotorData) -> dict[str, Raw]:
         """What the maker sets for this motor, whatever the manual prints."""
@@ -154,6 +299,15 @@ class Family(Protocol):
 
     def wiring(self, od: ObjectDictionary) -> Wiring:
         """How the switches reach the drive."""
+
+    def refusal(self, od: ObjectDictionary, mode: int) -> str | None:
+        """Code of the fault with which the drive answers enabling as it is set, or None."""
+
+    def in_place_s(self, od: ObjectDictionary) -> float:
+        """How long the axis must be within its window to be in place."""
+
+    def brake(self, od: ObjectDictionary) -> BrakeTimes | None:
+        """Course of the holding brake, None where there is none or it has no timing."""
 
     def readings(self, axis: VirtualAxis) -> dict[str, Callable[[], Number]]:
         """Measured objects of the maker's own, by key."""

@@ -8,19 +8,31 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
-from drivers.virtual.firmware.families.base import RPM, FaultInfo, Traits, Units, Wiring
+from drivers.virtual.firmware.families import power
+from drivers.virtual.firmware.families.base import (
+    RPM,
+    BrakeTimes,
+    FaultInfo,
+    GainKeys,
+    Traits,
+    Units,
+    Wiring,
+)
+from drivers.virtual.firmware.families.terminals import TABLES, TerminalTable
 from drivers.virtual.firmware.settings import (
     Biquad,
+    Compensation,
     GainSet,
     LoopSettings,
     MotorData,
     ProtectionSettings,
+    Switching,
     notch_biquad,
 )
 from drivers.virtual.mechanics import MechanicsSpec
@@ -60,8 +72,18 @@ class Cia402:
     def __init__(self, profile: Profile, traits: Traits | None = None) -> None:
         self.name = profile.drive
         self._profile = profile
+        self.terminals = self._table(profile)
         base = traits or Traits()
-        self.traits = replace(base, faults=base.faults or faults_of(profile))
+        self.traits = replace(base, faults=base.faults or faults_of(profile, base.protections))
+
+    @staticmethod
+    def _table(profile: Profile) -> TerminalTable | None:
+        """The family's terminals, if this profile has their parameters."""
+        table = TABLES.get(profile.drive)
+        if table is None:
+            return None
+        keys = [t.function_key for t in table.inputs if t.function_key is not None]
+        return table if all(key in profile.by_key for key in keys) else None
 
     # --- values ----------------------------------------------------------------------------
     def factory_values(self, spec: MechanicsSpec, motor: MotorData) -> dict[str, Raw]:
@@ -102,6 +124,14 @@ class Cia402:
             "60C2:01": 1, "60C2:02": -3, "605A:00": 2, "605D:00": 1, "605E:00": 2, "6007:00": 1,
             "6502:00": sum(1 << (mode - 1) for mode in self._profile.supported_modes if mode > 0),
         }  # fmt: skip
+        if self.name == "ds_c":
+            # In-place window and time, out-of-tolerance threshold; origin and limits on DI0 to DI2.
+            fallback |= {
+                "2500:00": min(round(turn), 65535), "2501:00": window, "2502:00": 10,
+                "2400:02": 1, "2400:03": 2, "2400:04": 3,
+            }  # fmt: skip
+        if self.name == "r6l":
+            fallback["2000:16"] = round(1.2 * motor.rated_speed_rad_s / RPM)
         turns_per_s = {"606D:00": 1.0, "606F:00": 1.0, "6099:01": 2.0, "6099:02": 0.25}
         for key, turns in turns_per_s.items():
             parameter = self._profile.by_key.get(key)
@@ -149,7 +179,7 @@ class Cia402:
     def _ratio(self, od: ObjectDictionary, above: str | None, below: str | None) -> float:
         """(above/below) now over (above/below) by default."""
         result = 1.0
-        for key, power in ((above, 1.0), (below, -1.0)):
+        for key, exponent in ((above, 1.0), (below, -1.0)):
             parameter = self._profile.by_key.get(key or "")
             if key is None or parameter is None:
                 continue
@@ -159,7 +189,7 @@ class Cia402:
             default = float(printed) if isinstance(printed, (int, float)) and printed else start
             now = float(od.number(key, default))
             if now > 0:
-                result *= (now / default) ** power
+                result *= (now / default) ** exponent
         return result
 
     def _default_turn(self) -> float:
@@ -191,54 +221,114 @@ class Cia402:
         od: ObjectDictionary,
         profile: Profile,
         motor: MotorData,
-        units: Units,  # noqa: ARG002 - the seam's signature
+        units: Units,
     ) -> LoopSettings:
         """Gains by the profile's convention; without one, 40 Hz speed and 6 Hz position loop."""
-        gains = profile.gains
         inertia = self._inertia(od, motor)
-
-        def value(key: str | None, default: float) -> float:
-            parameter = profile.by_key.get(key or "")
-            if parameter is None or key is None:
-                return default
-            return float(parameter.to_value(od.number(key))) or default
-
-        hertz, integral_ms, position, torque_ms, current_hz = 40.0, 20.0, 40.0, 0.0, 1000.0
-        if gains is not None and gains.convention == "unit":
-            # No meaning is printed: what stands there by default is taken as the moderate gains
-            # above, and everything else in proportion.
-            hertz *= self._share(od, gains.speed)
-            integral_ms /= self._share(od, gains.integral)
-            position *= self._share(od, gains.position)
-        elif gains is not None:
-            hertz = value(gains.speed, hertz)
-            integral_ms = value(gains.integral, integral_ms)
-            position = value(gains.position, position)
-            unit = profile.by_key[gains.position].unit if gains.position else ""
-            if "Hz" in unit or gains.convention == "bandwidth":
-                position *= TWO_PI
-            current_hz = value(gains.current_bandwidth, current_hz)
-            torque_ms = value(gains.torque_filter, torque_ms)
+        gains = profile.gains
+        first = GainKeys()
+        current_hz = 1000.0
+        if gains is not None:
+            first = GainKeys(gains.position, gains.speed, gains.integral, gains.torque_filter)
+            current_hz = self._value(od, gains.current_bandwidth, current_hz)
+        second = self.traits.second_gains or first
         speed_ff, speed_ff_s, torque_ff, torque_ff_s = self._feed_forward(od)
-        kp = TWO_PI * hertz * inertia
-        first = GainSet(position, kp, kp / (integral_ms * _MS))
+        rated = motor.rated_torque_nm
         return LoopSettings(
-            first=first,
-            second=first,
+            first=self._gain_set(od, first, inertia),
+            second=self._gain_set(od, second, inertia),
             homing=None,
+            switching=self._switching(od, motor, units),
+            compensation=self._compensation(od, rated),
             current_loop_hz=current_hz if current_hz >= 100.0 else 1000.0,
             inertia_kgm2=inertia,
-            torque_filter_s=torque_ms * _MS,
+            torque_filter_s=self._value(od, first.torque_filter, 0.0) * _MS,
+            torque_filter_2_s=self._value(od, second.torque_filter, 0.0) * _MS,
             speed_feed_forward=speed_ff,
             speed_feed_forward_s=speed_ff_s,
             torque_feed_forward=torque_ff,
             torque_feed_forward_s=torque_ff_s,
+            speed_filter_hz=self._speed_filter(od),
             notches=self._notches(od),
-            speed_output_nm=3.0 * motor.rated_torque_nm,
+            speed_output_nm=3.0 * rated,
             torque_mode_speed_rad_s=self._torque_mode_speed(od, motor),
             brake_speed_rad_s=10 * RPM,
-            brake_torque_nm=motor.rated_torque_nm,
+            brake_torque_nm=rated,
         )
+
+    def _value(self, od: ObjectDictionary, key: str | None, default: float) -> float:
+        """A parameter in its engineering unit; 0 and a missing one give the default."""
+        parameter = self._profile.by_key.get(key or "")
+        if parameter is None or key is None:
+            return default
+        return float(parameter.to_value(od.number(key))) or default
+
+    def _gain_set(self, od: ObjectDictionary, keys: GainKeys, inertia: float) -> GainSet:
+        """40 Hz speed loop, 20 ms and 40 /s where a family has no such parameter."""
+        gains = self._profile.gains
+        hertz, integral_ms, position = 40.0, 20.0, 40.0
+        if gains is not None and gains.convention == "unit":
+            # No meaning is printed: what stands there by default is taken as the moderate gains
+            # above, and everything else in proportion.
+            hertz *= self._share(od, keys.speed)
+            integral_ms /= self._share(od, keys.integral)
+            position *= self._share(od, keys.position)
+        elif gains is not None:
+            hertz = self._value(od, keys.speed, hertz)
+            integral_ms = self._value(od, keys.integral, integral_ms)
+            position = self._value(od, keys.position, position)
+            parameter = self._profile.by_key.get(keys.position or "")
+            unit = parameter.unit if parameter is not None else ""
+            if "Hz" in unit or gains.convention == "bandwidth":
+                position *= TWO_PI
+        kp = TWO_PI * hertz * inertia
+        return GainSet(position, kp, kp / (integral_ms * _MS))
+
+    def _switching(self, od: ObjectDictionary, motor: MotorData, units: Units) -> Switching:
+        keys = self.traits.switching
+        if keys is None:
+            return Switching()
+        mode = int(od.number(keys.mode))
+        if mode in keys.always_raw:
+            return Switching(k.SWITCH_SMALL_ERROR, level=math.inf)
+        kind = keys.kinds.get(int(od.number(keys.condition or "")), k.SWITCH_OFF)
+        if mode not in keys.on_raw or kind == k.SWITCH_OFF:
+            return Switching()
+        unit = {
+            k.SWITCH_TORQUE: 0.01 * motor.rated_torque_nm,
+            k.SWITCH_ACCELERATION: 10 * RPM,
+            k.SWITCH_ERROR: 1 / abs(units.position_per_rad),
+        }.get(kind, RPM)
+        return Switching(
+            kind,
+            level=self._value(od, keys.level, 0.0) * unit,
+            hysteresis=self._value(od, keys.hysteresis, 0.0) * unit,
+            delay_s=self._value(od, keys.delay, 0.0) * _MS,
+            ramp_s=max(self._value(od, keys.ramp, 0.0) * _MS, k.STEP_S),
+        )
+
+    def _compensation(self, od: ObjectDictionary, rated_nm: float) -> Compensation:
+        keys = self.traits.compensation
+        if keys is None:
+            return Compensation()
+        percent = 0.01 * rated_nm
+        return Compensation(
+            bias_nm=self._value(od, keys.bias, 0.0) * percent,
+            positive_nm=self._value(od, keys.positive, 0.0) * percent,
+            # R6L prints the reverse value with a sign of its own (002:11348), M6-L without.
+            negative_nm=abs(self._value(od, keys.negative, 0.0)) * percent,
+            viscous_nms=self._value(od, keys.viscous, 0.0) * percent * keys.viscous_per_rpm / RPM,
+        )
+
+    def _speed_filter(self, od: ObjectDictionary) -> float:
+        """Corner frequency of the speed feedback's low-pass [Hz]."""
+        if self.traits.speed_filter is None:
+            return 1000.0
+        key, unit = self.traits.speed_filter
+        number = self._value(od, key, 0.0)
+        if number <= 0:
+            return 1000.0
+        return number if unit == "Hz" else 1.0 / (TWO_PI * number * _MS)
 
     def _feed_forward(self, od: ObjectDictionary) -> tuple[float, float, float, float]:
         """Shares and time constants [s] of speed and torque feed-forward."""
@@ -246,10 +336,8 @@ class Cia402:
         if keys is None:
             return (0.0, 0.0, 0.0, 0.0)
 
-        def value(key: str, per_unit: float) -> float:
-            parameter = self._profile.by_key.get(key)
-            raw = od.number(key)
-            return 0.0 if parameter is None else float(parameter.to_value(raw)) * per_unit
+        def value(key: str | None, per_unit: float) -> float:
+            return self._value(od, key, 0.0) * per_unit
 
         def selected(key: str | None) -> bool:
             return key is None or od.number(key) == 1
@@ -327,24 +415,35 @@ class Cia402:
         motor: MotorData,
         units: Units,  # noqa: ARG002 - the seam's signature
     ) -> ProtectionSettings:
-        """Own thresholds, in shares of the supply and of the ratings; following error by 6065h."""
-        supply = motor.supply_v
-        window = od.number("6065:00", 2**32 - 1)
-        limited = k.F_FOLLOWING in self.traits.faults and window not in (0, 2**32 - 1)
-        return ProtectionSettings(
-            over_current_a=3.5 * math.sqrt(2) * motor.rated_current_a,
-            under_voltage_v=0.6 * supply,
-            over_voltage_v=1.3 * supply,
-            brake_on_v=1.2 * supply,
-            brake_off_v=1.15 * supply,
-            brake_enabled=True,
-            locked_s=math.inf,
-            overload_nm=1.5 * motor.rated_torque_nm,
-            overload_s=10.0,
-            over_temperature_c=100.0,
-            over_speed_rad_s=1.3 * motor.rated_speed_rad_s,
-            following_error_s=od.number("6066:00", 100) * _MS if limited else math.inf,
-        )
+        """The virtual drive's own, refined by the parameters that the family has."""
+        base = power.own(motor)
+        refine = power.REFINE.get(self.name)
+        if refine is not None:
+            base = refine(od, motor, base)
+        window = self._profile.by_role.get("following_error_window")
+        size = od.number("6065:00" if window is None else window.key, 2**32 - 1)
+        limited = k.F_FOLLOWING in self.traits.faults and size not in (0, 2**32 - 1)
+        wait_s = od.number("6066:00", 0 if window is not None else 100) * _MS
+        return replace(base, following_error_s=wait_s if limited else math.inf)
+
+    def refusal(self, od: ObjectDictionary, mode: int) -> str | None:  # noqa: ARG002 - the seam's
+        """EP3E: no mode or one that it has not (001:1538-1547), a gear out of range (001:1035)."""
+        if self.name != "ep3e":
+            return None
+        if mode == 0:
+            return "Err88"
+        if mode not in self._profile.supported_modes:
+            return "Err89"
+        return None
+
+    def in_place_s(self, od: ObjectDictionary) -> float:
+        """6068h, or the family's own (2502h of the DS_C, 003:577)."""
+        return od.number("2502:00" if self.name == "ds_c" else "6068:00", 10) * _MS
+
+    def brake(self, od: ObjectDictionary) -> BrakeTimes | None:
+        """Course of the brake, for a motor that has one."""
+        course = power.BRAKES.get(self.name)
+        return None if course is None else course(od)
 
     def readings(self, axis: VirtualAxis) -> dict[str, Callable[[], Number]]:
         """Objects that a profile tells by role but that CiA 402 has no number for."""
@@ -362,26 +461,41 @@ class Cia402:
                 values[parameter.key] = lambda s=state, f=scale: round(item(s) * f)  # type: ignore[misc]
         return values
 
-    def wiring(self, od: ObjectDictionary) -> Wiring:  # noqa: ARG002 - the seam's signature
-        """All switches reach the drive, active high: the terminals' default functions."""
-        return Wiring()
+    def wiring(self, od: ObjectDictionary) -> Wiring:
+        """By the functions of the terminals; a family without a table sees all switches."""
+        return Wiring() if self.terminals is None else self.terminals.wiring(od)
 
 
-def faults_of(profile: Profile) -> dict[int, FaultInfo]:
-    """The profile's codes for the protections, found by the printed names."""
+def faults_of(profile: Profile, protections: Mapping[int, str]) -> dict[int, FaultInfo]:
+    """How the protections report: the named entries of the table.
+
+    A family that names none (a profile made from a file) is searched by the printed words. Where
+    the table has no code of 603Fh (R6L), the standard's is shown.
+    """
     found: dict[int, FaultInfo] = {}
     for bit, words, standard in _FAULT_WORDS:
+        named = protections.get(bit)
+        if protections and named is None:
+            continue
         match = next(
             (
-                fault.code_raw
+                fault
                 for fault in profile.faults
                 if fault.kind == "fault"
-                and fault.code_raw is not None
-                and re.search(words, fault.name, re.IGNORECASE)
+                and (
+                    fault.code == named
+                    if named is not None
+                    else fault.code_raw is not None and re.search(words, fault.name, re.IGNORECASE)
+                )
             ),
-            standard,
+            None,
         )
-        found[bit] = FaultInfo(match, fixed=bit in (k.F_OVER_CURRENT, k.F_SENSOR, k.F_POWER_STAGE))
+        code = standard if match is None or match.code_raw is None else match.code_raw
+        found[bit] = FaultInfo(
+            code,
+            fixed=bit in (k.F_OVER_CURRENT, k.F_SENSOR, k.F_POWER_STAGE),
+            fault="" if match is None else match.code,
+        )
     return found
 
 

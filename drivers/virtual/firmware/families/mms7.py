@@ -10,18 +10,23 @@ from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.families.base import (
     RPM,
+    BrakeTimes,
     FaultInfo,
+    LimitSwitches,
+    Stops,
     Traits,
     Units,
     Wiring,
     inertia_kgm2,
 )
+from drivers.virtual.firmware.families.terminals import TerminalTable
 from drivers.virtual.firmware.settings import (
     Biquad,
     GainSet,
     LoopSettings,
     MotorData,
     ProtectionSettings,
+    Switching,
 )
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw, StiffnessTable
@@ -34,6 +39,7 @@ class Mms7:
     """See `drivers.virtual.firmware.families.base.Family`."""
 
     name = "mms7"
+    terminals: TerminalTable | None = None
     traits = Traits(
         # Bit 5 is "not used" and bit 4 alone takes a new target (004:3748-3752).
         buffered_setpoints=False,
@@ -48,23 +54,27 @@ class Mms7:
                 0xAAB555AA: "write_settings",
             }
         },
+        limits=LimitSwitches(action="fault"),
+        stops=Stops(torque_key="2002:05"),
         error_status_key="200B:0B",
         assigns_terminals=True,
         # Codes 004:4705-4917; fixed reactions 004:4951-4955.
         faults={
-            k.F_OVER_CURRENT: FaultInfo(0x2300, fixed=True, error_register=0x03),
-            k.F_UNDER_VOLTAGE: FaultInfo(0x3220, error_register=0x05),
-            k.F_LOCKED: FaultInfo(0x7121),
-            k.F_POWER_STAGE: FaultInfo(0x5400, fixed=True),
-            k.F_OVERLOAD: FaultInfo(0x3230),
-            k.F_POSITION_LIMIT: FaultInfo(0),
-            k.F_SENSOR: FaultInfo(0, fixed=True),
-            k.F_MEMORY: FaultInfo(0),
-            k.F_OVER_TEMPERATURE: FaultInfo(0x4210, fixed=True, error_register=0x09),
-            k.F_OVER_VOLTAGE: FaultInfo(0x3210, error_register=0x05),
-            k.F_OVER_SPEED: FaultInfo(0x8400, fixed=True),
-            k.F_SPEED_ERROR: FaultInfo(0x8401, fixed=True),
-            k.F_WATCHDOG: FaultInfo(0x7500, error_register=0x11),
+            k.F_OVER_CURRENT: FaultInfo(0x2300, fixed=True, error_register=0x03, fault="0x2300"),
+            k.F_UNDER_VOLTAGE: FaultInfo(0x3220, error_register=0x05, fault="0x3220"),
+            k.F_LOCKED: FaultInfo(0x7121, fault="0x7121"),
+            k.F_POWER_STAGE: FaultInfo(0x5400, fixed=True, fault="0x5400"),
+            k.F_OVERLOAD: FaultInfo(0x3230, fault="0x3230"),
+            k.F_POSITION_LIMIT: FaultInfo(0, fault="POS_LIMIT"),
+            k.F_SENSOR: FaultInfo(0, fixed=True, fault="SENSOR_ERR"),
+            k.F_MEMORY: FaultInfo(0, fault="MEM_ERR"),
+            k.F_OVER_TEMPERATURE: FaultInfo(
+                0x4210, fixed=True, error_register=0x09, fault="0x4210"
+            ),
+            k.F_OVER_VOLTAGE: FaultInfo(0x3210, error_register=0x05, fault="0x3210"),
+            k.F_OVER_SPEED: FaultInfo(0x8400, fixed=True, fault="0x8400"),
+            k.F_SPEED_ERROR: FaultInfo(0x8401, fixed=True, fault="0x8401"),
+            k.F_WATCHDOG: FaultInfo(0x7500, error_register=0x11, fault="0x7500"),
         },
     )
 
@@ -118,9 +128,11 @@ class Mms7:
             )
             if number("2005:12") == 1
             else None,
-            switch_gains=number("2005:09") == 1,
-            switch_error_rad=number("2005:0A") / abs(units.position_per_rad),
-            switch_time_s=number("2005:0B", 1) * 1e-3,
+            switching=Switching(
+                k.SWITCH_SMALL_ERROR if number("2005:09") == 1 else k.SWITCH_OFF,
+                level=number("2005:0A") / abs(units.position_per_rad),
+                ramp_s=number("2005:0B", 1) * 1e-3,
+            ),
             current_loop_hz=max(number("2005:05", 10000), 1) * 0.1,
             speed_feed_forward=number("2004:06", 100) / 100 if feed_forward & 4 else 0.0,
             speed_feed_forward_s=number("2004:07") * 1e-4,
@@ -198,6 +210,18 @@ class Mms7:
             speed_error_s=number("200B:0E", 10) * 1e-3,
             holding_brake=number("2108:01") == 1,
         )
+
+    def refusal(self, od: ObjectDictionary, mode: int) -> str | None:  # noqa: ARG002 - the seam's
+        """Nothing is refused."""
+        return None
+
+    def in_place_s(self, od: ObjectDictionary) -> float:
+        """6068h."""
+        return od.number("6068:00", 10) * 1e-3
+
+    def brake(self, od: ObjectDictionary) -> BrakeTimes | None:  # noqa: ARG002 - the seam's
+        """The brake follows the power stage; the manual prints no times (004:2604)."""
+        return None
 
     def readings(self, axis: VirtualAxis) -> dict[str, Callable[[], Number]]:
         """Servo internal information 200Eh and temperature (004:6407-6469, 004:6580)."""

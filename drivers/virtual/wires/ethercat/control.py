@@ -7,6 +7,7 @@ Times are in seconds.
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable
 from typing import IO, Any
@@ -14,6 +15,7 @@ from typing import IO, Any
 from drivers.virtual.device import SdoAbort
 from drivers.virtual.wires.ethercat import registers as reg
 from drivers.virtual.wires.ethercat.coe import Oddities
+from drivers.virtual.wires.ethercat.foe import FileTrouble
 from drivers.virtual.wires.ethercat.registers import AlState
 from drivers.virtual.wires.ethercat.segment import Segment, register
 from drivers.virtual.wires.ethercat.slave import Slave
@@ -57,6 +59,8 @@ class Control:
             "die_in_transfer": self._die_in_transfer,
             "refuse": self._refuse,
             "odd": self._odd,
+            "files": self._files,
+            "firmware": self._firmware,
             "inject": self._inject,
             "read": self._read,
             "write": self._write,
@@ -242,6 +246,19 @@ class Control:
         self._slave(slave).coe.oddities = Oddities(
             unpadded_count, abort_command & 0xFF, endless_segments
         )
+
+    def _firmware(self, slave: int, **trouble: Any) -> None:
+        """Trouble while firmware is loaded, see `FileTrouble`; without arguments, none."""
+        store = self._slave(slave).files
+        if store is None:
+            raise ValueError(f"slave {slave} takes no files")
+        store.trouble = FileTrouble(**trouble)
+
+    def _files(self, slave: int) -> dict[str, str]:
+        """Names of the files that came whole, and their SHA-256."""
+        store = self._slave(slave).files
+        kept = {} if store is None else store.files
+        return {name: hashlib.sha256(data).hexdigest() for name, data in kept.items()}
 
     def _inject(self, slave: int, what: str, value: float = 1.0) -> None:
         self._segment.settle()

@@ -1,24 +1,57 @@
-"""File access over EtherCAT, server side (ETG.1000.6 clause 5.8): firmware files in and out."""
+"""File access over EtherCAT, server side (ETG.1000.6 clause 5.8): firmware files in and out.
+
+In BOOT the drive's own program is erased when a download begins: what breaks off leaves a drive
+that goes no further than INIT and BOOT. In Pre-Op the file is kept aside until it is whole.
+"""
 
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 
-_READ, _WRITE, _DATA, _ACK, _ERROR = 1, 2, 3, 4, 5
-NOT_FOUND, ILLEGAL, PACKET_NUMBER = 0x8001, 0x8004, 0x8005
+_READ, _WRITE, _DATA, _ACK, _ERROR, _BUSY = 1, 2, 3, 4, 5, 6
+NOT_FOUND, ILLEGAL, PACKET_NUMBER, BOOTSTRAP_ONLY = 0x8001, 0x8004, 0x8005, 0x8008
 _HEADER = 6
 
 
-class FirmwareStore:
-    """Keeps what was downloaded; ``capacity`` is the payload of one mailbox in bytes."""
+@dataclass(slots=True)
+class FileTrouble:
+    """What a drive's file service may do instead of taking a file; nothing by default."""
 
-    def __init__(self, capacity: int) -> None:
+    refuse: int = 0
+    """Error code for every request to write."""
+    fail_at: int | None = None
+    """Byte at which writing the memory fails…"""
+    code: int = 0x8011
+    """…with this error code."""
+    text: str = ""
+    busy: int = 0
+    """How often each packet is answered by "busy" before it is taken."""
+    boot_only: bool = False
+    """Files are taken in BOOT only."""
+
+
+class FirmwareStore:
+    """Keeps what was downloaded."""
+
+    def __init__(self) -> None:
         self.files: dict[str, bytes] = {}
-        self._room = capacity - _HEADER
+        self.intact = True
+        """The drive has a whole program to run."""
+        self.trouble = FileTrouble()
+        self._boot = False
+        self._room = 0
         self._name: str | None = None
         self._writing = False
         self._data = bytearray()
         self._packet = 0
+        self._busy_left = 0
+
+    def enter(self, capacity: int, *, boot: bool) -> None:
+        """A mailbox with ``capacity`` bytes of payload opens, in BOOT or above."""
+        self._room = capacity - _HEADER
+        self._boot = boot
+        self._name, self._writing = None, False
 
     def handle(self, payload: bytes) -> list[bytes]:
         """Answers to one FoE message."""
@@ -26,9 +59,7 @@ class FirmwareStore:
         number = struct.unpack_from("<I", payload.ljust(_HEADER, b"\0"), 2)[0]
         rest = payload[_HEADER:]
         if code == _WRITE:
-            self._name, self._data, self._packet = _text(rest), bytearray(), 0
-            self._writing = True
-            return [_message(_ACK, 0)]
+            return self._begin(_text(rest))
         if code == _DATA and self._writing:
             return self._store(number, rest)
         if code == _READ:
@@ -46,15 +77,36 @@ class FirmwareStore:
             return [self._packet_out()]
         return [_message(_ERROR, ILLEGAL)]
 
+    def _begin(self, name: str) -> list[bytes]:
+        refused = self.trouble.refuse
+        if not refused and self.trouble.boot_only and not self._boot:
+            refused = BOOTSTRAP_ONLY
+        if refused:
+            return [_message(_ERROR, refused) + self.trouble.text.encode()]
+        self._name, self._data, self._packet = name, bytearray(), 0
+        self._writing = True
+        self._busy_left = self.trouble.busy
+        self.intact = self.intact and not self._boot
+        return [_message(_ACK, 0)]
+
     def _store(self, number: int, data: bytes) -> list[bytes]:
         if number != self._packet + 1 or self._name is None:
             self._writing = False
             return [_message(_ERROR, PACKET_NUMBER)]
+        if self._busy_left:
+            self._busy_left -= 1
+            return [struct.pack("<BBHH", _BUSY, 0, 1, 2)]
+        limit = self.trouble.fail_at
+        if limit is not None and len(self._data) + len(data) > limit:
+            self._writing = False
+            return [_message(_ERROR, self.trouble.code) + self.trouble.text.encode()]
         self._packet = number
+        self._busy_left = self.trouble.busy
         self._data += data
         if len(data) < self._room:
             self.files[self._name] = bytes(self._data)
             self._writing = False
+            self.intact = True
         return [_message(_ACK, number)]
 
     def _packet_out(self) -> bytes:

@@ -29,6 +29,9 @@ class FileServer(Protocol):
     def handle(self, payload: bytes) -> list[bytes]:
         """Answers to one FoE message."""
 
+    def enter(self, capacity: int, *, boot: bool) -> None:
+        """A mailbox with ``capacity`` bytes of payload opens, in BOOT or above."""
+
 
 class Mailbox:
     """Both directions of one slave's mailbox."""
@@ -46,6 +49,7 @@ class Mailbox:
         self.die_after_segments: int | None = None
         """Trouble: no answer after this many segments of a segmented transfer."""
         self.open = False
+        self._boot = False
         self._due_ns: int | None = None
         self._request = b""
         self._queue: deque[bytes] = deque()
@@ -61,9 +65,12 @@ class Mailbox:
         """When a request under way will be answered."""
         return self._due_ns
 
-    def start(self) -> None:
-        """Pre-Op is entered from below: fresh counters, empty boxes."""
+    def start(self, *, boot: bool = False) -> None:
+        """Pre-Op or Boot is entered from below: fresh counters, empty boxes."""
         self.open = True
+        self._boot = boot
+        if self._foe is not None:
+            self._foe.enter(min(self._inbox.length, self._outbox.length) - HEADER, boot=boot)
         self._inbox.locked = self._outbox.locked = False
         self._inbox.reset()
         self._outbox.reset()
@@ -148,7 +155,7 @@ class Mailbox:
             self._post(kind, answer)
 
     def _dispatch(self, kind: int, payload: bytes) -> list[bytes]:
-        if kind == _COE:
+        if kind == _COE and not self._boot:
             return self._coe.handle(payload)
         if kind == _FOE and self._foe is not None:
             return self._foe.handle(payload)

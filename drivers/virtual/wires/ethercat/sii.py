@@ -61,6 +61,8 @@ class SiiContent:
     coe_details: int
     foe: bool
     sync_managers: tuple[SmLayout, ...]
+    boot: tuple[SmLayout, SmLayout] | None = None
+    """Mailboxes in BOOT, of a slave that has this state."""
     rx_pdos: tuple[SiiPdo, ...] = ()
     tx_pdos: tuple[SiiPdo, ...] = ()
     clocks: bool = True
@@ -87,8 +89,10 @@ def build(content: SiiContent) -> bytes:
         content.vendor_id, content.product_code, content.revision, content.serial,
     )  # fmt: skip
     layout = (mailbox_out.start, mailbox_out.length, mailbox_in.start, mailbox_in.length)
-    if content.foe:
-        struct.pack_into("<HHHH", image, 0x28, *layout)
+    if content.boot is not None:
+        out, back = content.boot
+        boot = (out.start, out.length, back.start, back.length)
+        struct.pack_into("<HHHH", image, 0x28, *boot)
     struct.pack_into("<HHHH", image, 0x30, *layout)
     protocols = PROTOCOL_COE | (PROTOCOL_FOE if content.foe else 0)
     struct.pack_into("<H", image, 0x38, protocols)

@@ -6,6 +6,7 @@ state changes, SYNC0, watchdog) happens before the frame is processed.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivers.virtual.device import Device, SdoAbort
@@ -32,6 +33,11 @@ LAYOUT = (
     sii.SmLayout(0x1200, 0, 0x64, 1, 3),
     sii.SmLayout(0x1500, 0, 0x20, 1, 4),
 )
+BOOT_LAYOUT = (
+    sii.SmLayout(0x1000, 512, 0x26, 1, 1),
+    sii.SmLayout(0x1200, 512, 0x22, 1, 2),
+)
+"""In BOOT there are no process data, so the mailboxes may take their room."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +61,7 @@ class Slave:
         self.dictionary = CoeDictionary(device, lambda: self.al.state, self.report, self._has_dc)
         complete = bool(link and link.complete_access)
         self.coe = CoeServer(self.dictionary, complete, MAILBOX_BYTES - HEADER)
-        self.files = FirmwareStore(MAILBOX_BYTES - HEADER) if link and link.foe else None
+        self.files = FirmwareStore() if link and link.foe else None
         memory = bytearray(0x10000)
         self.dc = DistributedClock(memory, clock)
         content = _sii_content(device, self.dictionary, identity or SlaveIdentity(), self._has_dc)
@@ -179,7 +185,9 @@ class Slave:
     def configuration_changed(self) -> None:
         """A master that switches off what the present state needs forces an error state."""
         heading = min(self.al.state, self.al.target)
-        if heading >= AlState.PREOP and not self._mailbox_set():
+        if heading == AlState.BOOT and not self._mailbox_set(BOOT_LAYOUT):
+            self.al.fall(AlState.INIT, AlCode.INVALID_MAILBOX_BOOT)
+        elif heading >= AlState.PREOP and heading != AlState.BOOT and not self._mailbox_set():
             self.al.fall(AlState.INIT, AlCode.INVALID_MAILBOX_PREOP)
         elif heading >= AlState.SAFEOP and (code := self.process.check()):
             self.al.fall(AlState.PREOP, code)
@@ -192,8 +200,10 @@ class Slave:
         if target == AlState.BOOT:
             if self.files is None:
                 return AlCode.BOOT_UNSUPPORTED
-            return 0 if self._mailbox_set() else AlCode.INVALID_MAILBOX_BOOT
+            return 0 if self._mailbox_set(BOOT_LAYOUT) else AlCode.INVALID_MAILBOX_BOOT
         if target == AlState.PREOP and self.al.state == AlState.INIT:
+            if self.files is not None and not self.files.intact:
+                return AlCode.NO_VALID_FIRMWARE
             return 0 if self._mailbox_set() else AlCode.INVALID_MAILBOX_PREOP
         if target == AlState.SAFEOP and self.al.state == AlState.PREOP:
             return self.process.check()
@@ -201,13 +211,13 @@ class Slave:
             return AlCode.NO_SYNC
         return 0
 
-    def _mailbox_set(self) -> bool:
+    def _mailbox_set(self, layout: Sequence[sii.SmLayout] = LAYOUT) -> bool:
         """Sync managers 0 and 1 are as the EEPROM describes them."""
         return all(
             sm.enabled
             and sm.mailbox
             and sm.writable == (sm.number == 0)
-            and (sm.start, sm.length) == (LAYOUT[sm.number].start, LAYOUT[sm.number].length)
+            and (sm.start, sm.length) == (layout[sm.number].start, layout[sm.number].length)
             for sm in self.controller.sms[:2]
         )
 
@@ -226,7 +236,7 @@ class Slave:
         if new == AlState.INIT:
             self.mailbox.stop()
         elif old == AlState.INIT:
-            self.mailbox.start()
+            self.mailbox.start(boot=new == AlState.BOOT)
         if old >= AlState.SAFEOP > new:
             self.process.stop()
         if old < AlState.SAFEOP <= new:
@@ -274,6 +284,7 @@ def _sii_content(
         coe_details=details,
         foe=bool(link and link.foe),
         sync_managers=LAYOUT,
+        boot=BOOT_LAYOUT if link and link.foe else None,
         rx_pdos=_sii_pdos(device, dictionary, "rx", 2),
         tx_pdos=_sii_pdos(device, dictionary, "tx", 3),
         clocks=has_dc,

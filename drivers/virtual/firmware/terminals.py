@@ -1,0 +1,193 @@
+"""Terminals and touch probes of the families whose terminals are tables of functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.control import DeviceControl
+from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.families.terminals import (
+    SWITCHES,
+    Input,
+    InputUse,
+    OutputUse,
+    TerminalTable,
+    is_virtually_on,
+)
+from drivers.virtual.firmware.states import State
+
+_LATCHES = ("60BA:00", "60BB:00", "60BC:00", "60BD:00")
+
+
+class Terminals:
+    """Levels of the terminals. ``external`` holds levels set from outside the mechanics."""
+
+    def __init__(self, core: Core, control: DeviceControl, table: TerminalTable) -> None:
+        self._core = core
+        self._control = control
+        self._table = table
+        self.external = [False] * len(table.inputs)
+        self._before: dict[InputUse, bool] = {}
+        self._probe_function = 0
+        self._probe_status = 0
+        self._probe_levels = [False, False]
+        self._index_count = float(core.axis.s[k.S_INDEX_COUNT])
+        self._latched = dict.fromkeys(_LATCHES, 0)
+        self._counts = [0, 0, 0, 0]
+        control.levels = lambda: (self.input_bits(), self.output_bits())
+
+    # --- inputs ----------------------------------------------------------------------------
+    def level(self, place: int) -> bool:
+        """Logic level of an input: after polarity and forcing."""
+        core, terminal = self._core, self._table.inputs[place]
+        if is_virtually_on(terminal, core.od):
+            return True
+        use = self._table.use_of(terminal, core.od)
+        signal = SWITCHES.get(use) if use is not None else None
+        on = self.external[place] or (signal is not None and self._pressed() & signal != 0)
+        return on != (terminal.logic is not None and terminal.logic.inverted(core.od))
+
+    def _pressed(self) -> int:
+        """Switches as the mechanics presses them."""
+        axis = self._core.axis
+        angle = float(axis.s[k.S_THETA])
+        pressed = k.SIG_NEGATIVE if angle <= axis.p[k.P_LIMIT_NEGATIVE] else 0
+        pressed |= k.SIG_POSITIVE if angle >= axis.p[k.P_LIMIT_POSITIVE] else 0
+        inside = axis.p[k.P_HOME_FROM] <= angle <= axis.p[k.P_HOME_TO]
+        return pressed | (k.SIG_HOME if inside else 0)
+
+    def active(self, use: InputUse) -> bool:
+        """Whether any input with this function is on."""
+        inputs: tuple[Input, ...] = self._table.inputs
+        return any(
+            self._table.use_of(terminal, self._core.od) == use and self.level(place)
+            for place, terminal in enumerate(inputs)
+        )
+
+    def input_bits(self) -> int:
+        """Inputs as bits from the first on."""
+        return sum(self.level(place) << place for place in range(len(self._table.inputs)))
+
+    def digital_inputs(self) -> int:
+        """60FDh."""
+        signals = int(self._core.axis.s[k.S_SIGNALS]) & 7
+        if self._core.family.traits.limit_bits_swapped:
+            signals = signals & 4 | (signals & 1) << 1 | signals >> 1 & 1
+        word = signals
+        for place, terminal in enumerate(self._table.inputs):
+            if terminal.bit is not None:
+                word |= self.level(place) << terminal.bit
+        if self._table.probe_bits is not None:
+            word |= self.active("probe1") << self._table.probe_bits[0]
+            word |= self.active("probe2") << self._table.probe_bits[1]
+        return word
+
+    # --- outputs ---------------------------------------------------------------------------
+    def _shows(self, use: OutputUse | None) -> bool:
+        control, s = self._control, self._core.axis.s
+        faulty = control.state in (State.FAULT, State.FAULT_REACTION)
+        known: dict[OutputUse, Callable[[], bool]] = {
+            "ready": lambda: not faulty,
+            "running": lambda: control.state is State.OPERATION_ENABLED,
+            "fault": lambda: faulty,
+            "no_fault": lambda: not faulty,
+            "warning": lambda: control.warning,
+            "zero_speed": lambda: bool(s[k.S_ZERO_T] > 0),
+            "in_position": lambda: bool(s[k.S_POSITION_T] > 0),
+            "homed": lambda: control.homed,
+            "brake": lambda: control.brake_released,
+            "target": lambda: bool(control.status_word() & 1 << 10),
+            "on": lambda: True,
+        }
+        shown = known.get(use) if use is not None else None
+        return shown is not None and shown()
+
+    def output_bits(self) -> int:
+        """Outputs as bits from the first on, forced by 60FEh where its mask says so."""
+        core = self._core
+        value, mask = int(core.number("60FE:01")), int(core.number("60FE:02"))
+        bits = 0
+        for place, terminal in enumerate(self._table.outputs):
+            use = self._table.output_use(terminal, core.od)
+            forced = terminal.bit is not None and mask >> terminal.bit & 1
+            if self._table.bus_outputs_need_function:
+                forced = use == "bus"  # no mask for DO1 to DO5, only their function (001:988)
+            if forced and terminal.bit is not None:
+                on = bool(value >> terminal.bit & 1)
+            else:
+                on = self._shows(use)
+                if terminal.logic is not None and terminal.logic.inverted(core.od):
+                    on = not on
+            bits |= on << place
+        return bits
+
+    # --- reactions -------------------------------------------------------------------------
+    def update(self) -> bool:
+        """Something may have changed; True asks for a fault reset."""
+        self._update_probes()
+        uses: tuple[InputUse, ...] = ("reset", "emergency", "gain", "fault")
+        now: dict[InputUse, bool] = {use: self.active(use) for use in uses}
+        before, self._before = self._before, now
+        self._core.axis.p[k.P_SWITCH_INPUT] = float(now["gain"])
+        if now["emergency"] != before.get("emergency", False):
+            warning = self._core.family.traits.emergency_warning
+            self._control.alarms.warn(warning, now["emergency"])
+            self._control.emergency_stop(now["emergency"])
+        if now["fault"] and not before.get("fault", False):
+            fault = self._control.alarms.find("Er.043")
+            if fault is not None:
+                self._control.raise_alarm(fault)
+        return now["reset"] and not before.get("reset", False)
+
+    # --- touch probes ----------------------------------------------------------------------
+    def set_probe_function(self, word: int) -> None:
+        """60B8h: enabling anew forgets what was latched."""
+        rising = word & ~self._probe_function
+        for probe, shift in ((0, 0), (1, 8)):
+            if rising >> shift & 1 or not word >> shift & 1:
+                self._probe_status &= ~(0x7 << shift)
+            self._probe_levels[probe] = self.active("probe2" if probe else "probe1")
+        self._index_count = float(self._core.axis.s[k.S_INDEX_COUNT])
+        self._probe_function = word
+
+    def _update_probes(self) -> None:
+        core = self._core
+        here = round(core.position_of(core.axis.angle_rad))
+        count = float(core.axis.s[k.S_INDEX_COUNT])
+        passed, self._index_count = count != self._index_count, count
+        index = round(core.position_of(float(core.axis.s[k.S_INDEX_ANGLE])))
+        for probe, shift in ((0, 0), (1, 8)):
+            function = self._probe_function >> shift
+            level = self.active("probe2" if probe else "probe1")
+            changed = level != self._probe_levels[probe]
+            self._probe_levels[probe] = level
+            if function & 4:  # the encoder's index instead of an input
+                if passed:
+                    self._latch(probe, 0, shift, index)
+            elif changed:
+                self._latch(probe, 0 if level else 1, shift, here)
+
+    def _latch(self, probe: int, edge: int, shift: int, position: int) -> None:
+        function = self._probe_function >> shift
+        done = 2 << edge << shift
+        if not (function & 1 and function & 0x10 << edge):
+            return
+        if not function & 2 and self._probe_status & done:
+            return
+        place = 2 * probe + edge
+        self._latched[_LATCHES[place]] = position
+        self._counts[place] = self._counts[place] + 1 & 0xFFFF
+        self._probe_status |= done
+
+    def probe_status(self) -> int:
+        """60B9h."""
+        return self._probe_status | (self._probe_function & 0x0101)
+
+    def latched(self, key: str) -> int:
+        """60BAh to 60BDh."""
+        return self._latched[key]
+
+    def latch_count(self, place: int) -> int:
+        """60D5h to 60D8h of the R6L."""
+        return self._counts[place]
