@@ -4,6 +4,7 @@ import { frame } from './texts/frame'
 import { notListed } from './texts/notlisted'
 import { parameters } from './texts/parameters'
 import { recordings } from './texts/recordings'
+import { scope } from './texts/scope'
 import { segment } from './texts/segment'
 import { tuning } from './texts/tuning'
 
@@ -15,6 +16,7 @@ export const catalogue = {
   ...parameters,
   ...recordings,
   ...notListed,
+  ...scope,
   ...segment,
   ...tuning,
 }

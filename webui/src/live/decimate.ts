@@ -1,10 +1,4 @@
-import type { Ring } from './ring'
-
-/** One trace: a channel of a ring. */
-export interface Trace {
-  ring: Ring
-  channel: number
-}
+import type { Trace } from './ring'
 
 /** Columns for uPlot: common times, then one array per trace; null where a trace has no sample. */
 export type Columns = [number[], ...(number | null)[][]]
@@ -18,31 +12,33 @@ export type Columns = [number[], ...(number | null)[][]]
 export function columns(traces: Trace[], from: number, to: number, bins: number): Columns {
   const rings = new Set(traces.map((trace) => trace.ring))
   let samples = 0
-  for (const ring of rings) samples += Math.max(0, ring.firstAt(to) - ring.firstAt(from))
-  return samples <= 2 * bins
-    ? exact(traces, [...rings], from, to)
-    : binned(traces, from, to, Math.max(1, bins))
+  for (const ring of rings) {
+    samples = Math.max(samples, ring.firstAfter(to) - ring.firstAt(from))
+  }
+  return samples <= 2 * bins ? exact(traces, from, to) : binned(traces, from, to, Math.max(1, bins))
 }
 
-function exact(traces: Trace[], rings: Ring[], from: number, to: number): Columns {
-  const times: number[] = []
-  for (const ring of rings) {
-    const end = lastInside(ring, to)
-    for (let row = ring.firstAt(from); row < end; row++) times.push(ring.time(row))
+function exact(traces: Trace[], from: number, to: number): Columns {
+  const all: number[] = []
+  for (const ring of new Set(traces.map((trace) => trace.ring))) {
+    const end = ring.firstAfter(to)
+    for (let row = ring.firstAt(from); row < end; row++) all.push(ring.time(row))
   }
-  times.sort((a, b) => a - b)
-  const unique = times.filter((time, i) => i === 0 || time !== times[i - 1])
-  const series = traces.map(({ ring, channel }) => {
-    const values = new Array<number | null>(unique.length).fill(null)
+  const times = [...new Set(Float64Array.from(all).sort())]
+  const series = traces.map((trace) => {
+    const { ring } = trace
+    const values = new Array<number | null>(times.length).fill(null)
     let row = ring.firstAt(from)
-    for (let i = 0; i < unique.length && row < ring.length; i++) {
-      if (ring.time(row) !== unique[i]) continue
-      values[i] = finite(ring.value(row, channel))
+    for (let i = 0; i < times.length && row < ring.length; i++) {
+      if (ring.time(row) !== times[i]) continue
+      // Two rows of the same time: the later one counts.
+      while (row + 1 < ring.length && ring.time(row + 1) === times[i]) row++
+      values[i] = finite(trace.value(row))
       row++
     }
     return values
   })
-  return [unique, ...series]
+  return [times, ...series]
 }
 
 function binned(traces: Trace[], from: number, to: number, bins: number): Columns {
@@ -52,42 +48,47 @@ function binned(traces: Trace[], from: number, to: number, bins: number): Column
     times[2 * bin] = from + (bin + 0.25) * width
     times[2 * bin + 1] = from + (bin + 0.75) * width
   }
-  const series = traces.map(({ ring, channel }) => {
+  const series = traces.map((trace) => {
+    const { ring } = trace
     const values = new Array<number | null>(2 * bins).fill(null)
-    const end = lastInside(ring, to)
     let row = ring.firstAt(from)
-    while (row < end) {
-      const bin = Math.min(bins - 1, Math.floor((ring.time(row) - from) / width))
-      const edge = from + (bin + 1) * width
-      let low = Number.POSITIVE_INFINITY
-      let high = Number.NEGATIVE_INFINITY
-      let lowFirst = true
-      do {
-        const value = ring.value(row, channel)
-        if (value < low) {
-          low = value
-          lowFirst = false
-        }
-        if (value > high) {
-          high = value
-          lowFirst = true
-        }
-        row++
-      } while (row < end && (bin === bins - 1 || ring.time(row) < edge))
-      if (low <= high) {
-        values[2 * bin] = lowFirst ? low : high
-        values[2 * bin + 1] = lowFirst ? high : low
-      }
+    for (let bin = 0; bin < bins; bin++) {
+      const end = bin === bins - 1 ? ring.firstAfter(to) : ring.firstAt(from + (bin + 1) * width)
+      const found = trace.extremes(row, end)
+      row = Math.max(row, end)
+      if (!found) continue
+      values[2 * bin] = found.lowFirst ? found.low : found.high
+      values[2 * bin + 1] = found.lowFirst ? found.high : found.low
     }
     return values
   })
   return [times, ...series]
 }
 
-function lastInside(ring: Ring, to: number): number {
-  let end = ring.firstAt(to)
-  while (end < ring.length && ring.time(end) === to) end++
-  return end
+/** Points of one curve, at most about `most`, with the extremes of each group kept. */
+export function thinned(
+  times: ArrayLike<number>,
+  values: ArrayLike<number>,
+  most: number,
+): { times: number[]; values: number[] } {
+  const group = Math.max(1, Math.ceil((2 * times.length) / most))
+  const thin = { times: [] as number[], values: [] as number[] }
+  for (let begin = 0; begin < times.length; begin += group) {
+    let low = -1
+    let high = -1
+    for (let i = begin; i < Math.min(times.length, begin + group); i++) {
+      const value = values[i] as number
+      if (!Number.isFinite(value)) continue
+      if (low < 0 || value < (values[low] as number)) low = i
+      if (high < 0 || value > (values[high] as number)) high = i
+    }
+    for (const i of new Set([Math.min(low, high), Math.max(low, high)])) {
+      if (i < 0) continue
+      thin.times.push(times[i] as number)
+      thin.values.push(values[i] as number)
+    }
+  }
+  return thin
 }
 
 function finite(value: number): number | null {

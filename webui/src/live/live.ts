@@ -2,14 +2,13 @@ import { API_ROOT, api, ask, setConnection } from '../api/client'
 import type { JogStart } from '../api/schema'
 import type { FromPage, ToPage } from './protocol'
 import * as store from './store'
-import type { FromWorker, ScopeFrame, ScopeView, ToWorker, TraceRef } from './worker-messages'
+import type { FromWorker, QuestionKind, Questions, ToWorker } from './worker-messages'
 
 const worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' })
 const post = (message: ToWorker) => worker.postMessage(message)
 
 let asked = 0
-const frames = new Map<number, (frame: ScopeFrame) => void>()
-const texts = new Map<number, (text: string) => void>()
+const waiting = new Map<number, (answer: never) => void>()
 
 /** Open the connection for good. */
 export function start(): void {
@@ -23,28 +22,18 @@ export const stand = (name: string, message: FromPage | null) =>
 export const jogStart = (message: JogStart) => post({ kind: 'jogStart', message })
 export const jogBeat = (drive: string) => post({ kind: 'jogBeat', drive })
 export const jogStop = (reason: string) => post({ kind: 'jogStop', reason })
-export const toScope = (
-  message: Extract<ToWorker, { kind: 'scopeStart' | 'scopeStop' | 'scopeClear' | 'trigger' }>,
-) => post(message)
+export const toScope = (message: Extract<ToWorker, { kind: 'scope' | 'scopeClear' | 'trigger' }>) =>
+  post(message)
 
-export function scopeFrame(view: ScopeView): Promise<ScopeFrame> {
+/** Ask the worker about its samples. */
+export function askScope<Kind extends QuestionKind>(
+  what: Kind,
+  ask: Questions[Kind]['ask'],
+): Promise<Questions[Kind]['get']> {
   const id = ++asked
   return new Promise((resolve) => {
-    frames.set(id, resolve)
-    post({ kind: 'view', id, view })
-  })
-}
-
-export function scopeCsv(
-  traces: TraceRef[],
-  names: string[],
-  from: number,
-  to: number,
-): Promise<string> {
-  const id = ++asked
-  return new Promise((resolve) => {
-    texts.set(id, resolve)
-    post({ kind: 'csv', id, traces, names, from, to })
+    waiting.set(id, resolve)
+    post({ kind: 'ask', id, what, ask } as ToWorker)
   })
 }
 
@@ -102,11 +91,7 @@ function receive(message: ToPage): void {
       store.publish('jogEnded')
       break
     case 'scope_info':
-      store.contents.scopeInfo = new Map(store.contents.scopeInfo).set(
-        message.subscription,
-        message,
-      )
-      store.publish('scopeInfo')
+      store.setScopeInfo(message)
       break
     case 'log':
       store.addLog([message.entry])
@@ -135,13 +120,12 @@ worker.onmessage = (event: MessageEvent<FromWorker>) => {
     case 'jogRefused':
       store.publish('jogRefused')
       break
-    case 'frame':
-      frames.get(answer.id)?.(answer.frame)
-      frames.delete(answer.id)
+    case 'subscriptions':
+      store.keepScopeInfo(answer.numbers)
       break
-    case 'csv':
-      texts.get(answer.id)?.(answer.text)
-      texts.delete(answer.id)
+    case 'answer':
+      waiting.get(answer.id)?.(answer.answer as never)
+      waiting.delete(answer.id)
       break
   }
 }

@@ -1,57 +1,65 @@
-import type { ScopeBlock } from './blocks'
+const FIRST_ROWS = 1024
+/** Rows whose least and greatest value are kept together, so that long stretches draw fast. */
+const CHUNK = 64
 
-/** The last rows of one subscription. Bounded: the oldest row makes room for the newest. */
+/**
+ * The last samples of one channel with their times. Bounded: the oldest makes room for the newest.
+ * Memory is taken as it is needed, up to `capacity` rows.
+ */
 export class Ring {
-  readonly channels: number
   readonly capacity: number
-  private readonly times: Float64Array
-  private readonly values: Float32Array
-  private start = 0
+  private times = new Float64Array(FIRST_ROWS)
+  private values = new Float64Array(FIRST_ROWS)
+  private low: Float64Array
+  private high: Float64Array
+  /** Number of the oldest row since the beginning; rows are stored at number % length. */
+  private first = 0
   private used = 0
-  /** Samples that the server had to leave out, and blocks that never arrived. */
-  dropped = 0
-  lostBlocks = 0
-  private sequence: number | null = null
 
-  constructor(channels: number, capacity: number) {
-    this.channels = channels
-    this.capacity = capacity
-    this.times = new Float64Array(capacity)
-    this.values = new Float32Array(capacity * channels)
+  constructor(capacity: number) {
+    // A whole number of chunks, so that a chunk is never half of one lap and half of the next.
+    this.capacity = Math.max(FIRST_ROWS, Math.ceil(capacity / CHUNK) * CHUNK)
+    this.low = new Float64Array(FIRST_ROWS / CHUNK)
+    this.high = new Float64Array(FIRST_ROWS / CHUNK)
   }
 
   get length(): number {
     return this.used
   }
 
-  push(block: ScopeBlock): void {
-    if (block.channels !== this.channels) return
-    if (this.sequence !== null && block.sequence > this.sequence + 1) {
-      this.lostBlocks += block.sequence - this.sequence - 1
-    }
-    this.sequence = block.sequence
-    this.dropped += block.dropped
-    for (let row = 0; row < block.rows; row++) {
-      const at = (this.start + this.used) % this.capacity
-      this.times[at] = block.times[row] as number
-      for (let k = 0; k < this.channels; k++) {
-        this.values[at * this.channels + k] = block.samples[row * this.channels + k] as number
+  get newest(): number | null {
+    return this.used === 0 ? null : this.time(this.used - 1)
+  }
+
+  /** Add a sample. A clock that went back (another computer) begins anew. */
+  push(time: number, value: number): void {
+    if (this.used > 0 && time < this.time(this.used - 1)) this.clear()
+    if (this.used === this.times.length) {
+      if (this.times.length < this.capacity) this.grow()
+      else {
+        this.first++
+        this.used--
       }
-      if (this.used < this.capacity) this.used++
-      else this.start = (this.start + 1) % this.capacity
     }
+    const at = (this.first + this.used) % this.times.length
+    this.times[at] = time
+    this.values[at] = value
+    const chunk = Math.floor(at / CHUNK)
+    if (at % CHUNK === 0 || this.used === 0) {
+      this.low[chunk] = Number.POSITIVE_INFINITY
+      this.high[chunk] = Number.NEGATIVE_INFINITY
+    }
+    if (value < (this.low[chunk] as number)) this.low[chunk] = value
+    if (value > (this.high[chunk] as number)) this.high[chunk] = value
+    this.used++
   }
 
   time(row: number): number {
-    return this.times[(this.start + row) % this.capacity] as number
+    return this.times[(this.first + row) % this.times.length] as number
   }
 
-  value(row: number, channel: number): number {
-    return this.values[((this.start + row) % this.capacity) * this.channels + channel] as number
-  }
-
-  get newest(): number | null {
-    return this.used === 0 ? null : this.time(this.used - 1)
+  value(row: number): number {
+    return this.values[(this.first + row) % this.values.length] as number
   }
 
   /** First row at or after `time`; `length` when there is none. */
@@ -66,11 +74,102 @@ export class Ring {
     return low
   }
 
+  /** First row after `time`; `length` when there is none. */
+  firstAfter(time: number): number {
+    let row = this.firstAt(time)
+    while (row < this.used && this.time(row) === time) row++
+    return row
+  }
+
+  /** Least and greatest value of the rows from `begin` to before `end`; null without any. */
+  extremes(begin: number, end: number): { low: number; high: number; lowFirst: boolean } | null {
+    let low = Number.POSITIVE_INFINITY
+    let high = Number.NEGATIVE_INFINITY
+    let lowFirst = true
+    const see = (least: number, greatest: number) => {
+      if (least < low) {
+        low = least
+        lowFirst = false
+      }
+      if (greatest > high) {
+        high = greatest
+        lowFirst = true
+      }
+    }
+    let row = begin
+    while (row < end) {
+      const at = (this.first + row) % this.times.length
+      if (at % CHUNK === 0 && row + CHUNK <= end) {
+        see(this.low[at / CHUNK] as number, this.high[at / CHUNK] as number)
+        row += CHUNK
+      } else {
+        const value = this.values[at] as number
+        see(value, value)
+        row++
+      }
+    }
+    return low <= high ? { low, high, lowFirst } : null
+  }
+
   clear(): void {
-    this.start = 0
+    this.first = 0
     this.used = 0
-    this.dropped = 0
-    this.lostBlocks = 0
-    this.sequence = null
+  }
+
+  private grow(): void {
+    // Only a full ring that never let a row go grows, so its rows lie in order from 0.
+    const rows = Math.min(this.capacity, this.times.length * 2)
+    const longer = (old: Float64Array, length: number) => {
+      const next = new Float64Array(length)
+      next.set(old)
+      return next
+    }
+    this.times = longer(this.times, rows)
+    this.values = longer(this.values, rows)
+    this.low = longer(this.low, rows / CHUNK)
+    this.high = longer(this.high, rows / CHUNK)
+  }
+}
+
+/** A channel as it is shown: in the unit that the person chose. */
+export class Trace {
+  constructor(
+    readonly ring: Ring,
+    readonly factor = 1,
+    readonly offset = 0,
+  ) {}
+
+  value(row: number): number {
+    return this.ring.value(row) * this.factor + this.offset
+  }
+
+  extremes(begin: number, end: number): { low: number; high: number; lowFirst: boolean } | null {
+    const found = this.ring.extremes(begin, end)
+    if (!found) return null
+    const [a, b] = [found.low * this.factor + this.offset, found.high * this.factor + this.offset]
+    return this.factor >= 0
+      ? { low: a, high: b, lowFirst: found.lowFirst }
+      : { low: b, high: a, lowFirst: !found.lowFirst }
+  }
+
+  /** Last valid sample at or before a time, or null. */
+  at(time: number): number | null {
+    for (let row = this.ring.firstAfter(time) - 1; row >= 0; row--) {
+      const value = this.value(row)
+      if (Number.isFinite(value)) return value
+    }
+    return null
+  }
+
+  /** Between two samples, on the straight line through them; NaN outside. */
+  between(time: number): number {
+    const row = this.ring.firstAt(time)
+    if (row >= this.ring.length) return Number.NaN
+    const after = this.ring.time(row)
+    if (after === time) return this.value(row)
+    if (row === 0) return Number.NaN
+    const before = this.ring.time(row - 1)
+    const part = (time - before) / (after - before)
+    return this.value(row - 1) * (1 - part) + this.value(row) * part
   }
 }

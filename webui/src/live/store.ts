@@ -8,6 +8,7 @@ import type {
   ParameterRow,
   ParameterValue,
   Problem,
+  ScopeChannelInfo,
   ScopeInfo,
 } from '../api/schema'
 import type { LinkState } from './socket'
@@ -24,7 +25,9 @@ interface Contents {
   readings: Map<string, Map<string, ParameterValue>>
   log: LogEntry[]
   jogEnded: JogEnded | null
+  /** What the server said of the subscriptions that there are, and of every channel ever asked. */
   scopeInfo: Map<number, ScopeInfo>
+  scopeChannels: Map<string, ScopeChannelInfo>
   refused: { request: string; problem: Problem; at: number } | null
 }
 
@@ -42,6 +45,7 @@ export const contents: Contents = {
   log: [],
   jogEnded: null,
   scopeInfo: new Map(),
+  scopeChannels: new Map(),
   refused: null,
 }
 
@@ -126,6 +130,21 @@ export function setReadings(drive: string, values: ParameterValue[]): void {
   contents.readings.set(drive, known)
   for (const key of changed) publish(`value ${drive} ${key}`)
   publish(`values ${drive}`)
+}
+
+export function setScopeInfo(info: ScopeInfo): void {
+  contents.scopeInfo = new Map(contents.scopeInfo).set(info.subscription, info)
+  const channels = new Map(contents.scopeChannels)
+  for (const each of info.channels) channels.set(`${each.drive} ${each.key}`, each)
+  contents.scopeChannels = channels
+  publish('scopeInfo')
+}
+
+/** Only these subscriptions are left; what was said of others is old. */
+export function keepScopeInfo(subscriptions: number[]): void {
+  const kept = [...contents.scopeInfo].filter(([number]) => subscriptions.includes(number))
+  contents.scopeInfo = new Map(kept)
+  publish('scopeInfo')
 }
 
 export function addLog(entries: LogEntry[]): void {

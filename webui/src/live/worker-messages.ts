@@ -1,23 +1,61 @@
-import type { JogStart, ScopeStart } from '../api/schema'
+import type { JogStart } from '../api/schema'
 import type { Columns } from './decimate'
 import type { Measurement } from './measure'
 import type { FromPage, ToPage } from './protocol'
 import type { LinkState } from './socket'
+import type { Spectrogram, Spectrum, WindowKind } from './spectrum'
 import type { TriggerSettings } from './trigger'
 
-/** A trace of the scope: a channel of a subscription. */
-export interface TraceRef {
-  subscription: number
-  channel: number
+/** A channel to be sampled, shown as (drive's value × factor + offset). */
+export interface ScopeSource {
+  id: string
+  drive: string
+  key: string
+  factor: number
+  offset: number
+}
+
+/** All that is sampled and computed; replaces the earlier one and keeps what is in both. */
+export interface ScopeConfig {
+  sources: ScopeSource[]
+  maths: { id: string; expression: string }[]
+  period: number
+}
+
+export interface ScopeTrigger {
+  id: string
+  mode: 'auto' | 'normal' | 'single'
+  settings: TriggerSettings
+  /** Earlier sweeps that stay in sight. */
+  persistence: number
 }
 
 export interface ScopeView {
-  traces: TraceRef[]
+  ids: string[]
   /** Fixed stretch, or the newest `window` seconds, or the newest triggered stretch. */
   show: { from: number; to: number } | { window: number } | { trigger: 'newest' }
   bins: number
-  measure: { from: number; to: number } | null
+  /** Figures over this stretch, over what is shown, or none. */
+  measure: { from: number; to: number } | 'shown' | null
   cursors: number[]
+  persistence: boolean
+}
+
+/** One earlier sweep of one trace, its times counted from its trigger. */
+export interface Overlay {
+  trace: number
+  times: number[]
+  values: number[]
+}
+
+/** What the view lost; raw data on the server are not concerned. */
+export interface Losses {
+  /** Samples that the server had to leave out. */
+  dropped: number
+  /** Blocks that never arrived. */
+  blocks: number
+  /** Synchronous samples that passed while there was no connection. */
+  away: number
 }
 
 export interface ScopeFrame {
@@ -25,15 +63,46 @@ export interface ScopeFrame {
   from: number
   to: number
   newest: number | null
-  triggeredAt: number | null
-  measurements: (Measurement | null)[]
+  trigger: { state: 'off' | 'waiting' | 'triggered' | 'auto'; at: number | null; count: number }
+  overlays: Overlay[]
+  measurements: (Measurement | null)[] | null
   cursorValues: (number | null)[][]
-  dropped: number
-  lostBlocks: number
-  /** Rows a second and age of the newest row, per trace; ages in seconds behind the newest. */
+  losses: Losses
+  /** Rows a second per trace. */
   rates: (number | null)[]
+  /** Seconds by which the newest sample of a trace lies behind the newest of all. */
   ages: (number | null)[]
+  /** Seconds since anything of a trace arrived here. */
+  silent: (number | null)[]
 }
+
+/** Raw samples of one trace. */
+export interface Samples {
+  times: Float64Array
+  values: Float64Array
+}
+
+interface Stretch {
+  from: number
+  to: number
+}
+
+/** What the page asks the worker, and what it gets. */
+export interface Questions {
+  view: { ask: ScopeView; get: ScopeFrame }
+  csv: { ask: Stretch & { ids: string[]; names: string[]; origin: number }; get: string }
+  samples: { ask: Stretch & { ids: string[] }; get: Samples[] }
+  spectrum: {
+    ask: Stretch & { id: string; window: WindowKind; synchronous: boolean }
+    get: Spectrum | null
+  }
+  spectrogram: {
+    ask: Stretch & { id: string; columns: number; synchronous: boolean }
+    get: Spectrogram | null
+  }
+  xy: { ask: Stretch & { x: string; y: string; most: number }; get: { x: number[]; y: number[] } }
+}
+export type QuestionKind = keyof Questions
 
 export type ToWorker =
   | { kind: 'open'; url: string }
@@ -42,16 +111,16 @@ export type ToWorker =
   | { kind: 'jogStart'; message: JogStart }
   | { kind: 'jogBeat'; drive: string }
   | { kind: 'jogStop'; reason: string }
-  | { kind: 'scopeStart'; message: ScopeStart }
-  | { kind: 'scopeStop'; subscription: number }
+  | { kind: 'scope'; config: ScopeConfig }
   | { kind: 'scopeClear' }
-  | { kind: 'trigger'; trace: TraceRef | null; settings: TriggerSettings | null }
-  | { kind: 'view'; id: number; view: ScopeView }
-  | { kind: 'csv'; id: number; traces: TraceRef[]; names: string[]; from: number; to: number }
+  | { kind: 'trigger'; trigger: ScopeTrigger | null }
+  | {
+      [Kind in QuestionKind]: { kind: 'ask'; id: number; what: Kind; ask: Questions[Kind]['ask'] }
+    }[QuestionKind]
 
 export type FromWorker =
   | { kind: 'link'; state: LinkState }
   | { kind: 'message'; message: ToPage }
   | { kind: 'jogRefused' }
-  | { kind: 'frame'; id: number; frame: ScopeFrame }
-  | { kind: 'csv'; id: number; text: string }
+  | { kind: 'subscriptions'; numbers: number[] }
+  | { kind: 'answer'; id: number; answer: Questions[QuestionKind]['get'] }

@@ -5,7 +5,6 @@ import { BEAT_MS, LiveSocket, type SocketLike } from './socket'
 import type { FromWorker, ToWorker } from './worker-messages'
 
 const post = (message: FromWorker) => self.postMessage(message)
-const scope = new ScopeStore()
 let url = ''
 
 const socket = new LiveSocket(() => new WebSocket(url) as unknown as SocketLike, {
@@ -15,7 +14,19 @@ const socket = new LiveSocket(() => new WebSocket(url) as unknown as SocketLike,
     post({ kind: 'message', message })
   },
   block: (data) => scope.block(data),
-  closed: () => deadMan.ended(),
+  closed: () => {
+    deadMan.ended()
+    scope.interrupted()
+  },
+})
+const scope = new ScopeStore({
+  start: (message) => socket.stand(`scope ${message.subscription}`, message),
+  stop: (subscription) => {
+    socket.stand(`scope ${subscription}`, null)
+    socket.send({ type: 'scope_stop', subscription })
+  },
+  changed: (numbers) => post({ kind: 'subscriptions', numbers }),
+  now: () => performance.now() / 1000,
 })
 const deadMan = new DeadMan(
   (message) => socket.send(message),
@@ -47,30 +58,17 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
     case 'jogStop':
       deadMan.stop(request.reason)
       break
-    case 'scopeStart':
-      scope.add(request.message.subscription, request.message.channels.length)
-      socket.stand(`scope ${request.message.subscription}`, request.message)
-      break
-    case 'scopeStop':
-      socket.stand(`scope ${request.subscription}`, null)
-      socket.send({ type: 'scope_stop', subscription: request.subscription })
-      scope.remove(request.subscription)
+    case 'scope':
+      scope.configure(request.config)
       break
     case 'scopeClear':
       scope.clear()
       break
     case 'trigger':
-      scope.setTrigger(request.trace, request.settings)
+      scope.setTrigger(request.trigger)
       break
-    case 'view':
-      post({ kind: 'frame', id: request.id, frame: scope.frame(request.view) })
-      break
-    case 'csv':
-      post({
-        kind: 'csv',
-        id: request.id,
-        text: scope.csv(request.traces, request.names, request.from, request.to),
-      })
+    case 'ask':
+      post({ kind: 'answer', id: request.id, answer: scope.answer(request.what, request.ask) })
       break
   }
 }

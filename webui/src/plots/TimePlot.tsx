@@ -10,6 +10,17 @@ export interface PlotSeries {
   color: string
 }
 
+/** A curve that is not of the running picture: an earlier sweep, or a reference. */
+export interface PlotOverlay {
+  unit: string
+  color: string
+  dashed: boolean
+  opacity?: number
+  /** Seconds from what is shown as zero. */
+  times: number[]
+  values: number[]
+}
+
 export interface PlotFrame {
   columns: Columns
   from: number
@@ -19,6 +30,7 @@ export interface PlotFrame {
   /** Level line of the trigger, on the scale of its unit. */
   level: { unit: string; value: number; color: string } | null
   cursors: number[]
+  overlays?: PlotOverlay[]
 }
 
 /** Where frames are handed in, so that thirty a second do not pass through React. */
@@ -129,6 +141,16 @@ function yRange(
       if (value > max) max = value
     }
   }
+  for (const overlay of frame.overlays ?? []) {
+    if ((overlay.unit || NO_UNIT) !== unit) continue
+    for (const [i, time] of overlay.times.entries()) {
+      const at = time + frame.origin
+      if (at < frame.from || at > frame.to) continue
+      const value = overlay.values[i] as number
+      if (value < min) min = value
+      if (value > max) max = value
+    }
+  }
   if (frame.level && (frame.level.unit || NO_UNIT) === unit) {
     min = Math.min(min, frame.level.value)
     max = Math.max(max, frame.level.value)
@@ -211,6 +233,7 @@ function drawMarks(plot: uPlot, frame: PlotFrame | null, color: string): void {
   if (!frame) return
   const { ctx, bbox } = plot
   ctx.save()
+  for (const overlay of frame.overlays ?? []) drawOverlay(plot, overlay)
   ctx.lineWidth = devicePixelRatio
   for (const [i, time] of frame.cursors.entries()) {
     const x = plot.valToPos(time - frame.origin, 'x', true)
@@ -228,6 +251,29 @@ function drawMarks(plot: uPlot, frame: PlotFrame | null, color: string): void {
     ctx.setLineDash([2, 4])
     line(ctx, bbox.left, y, bbox.left + bbox.width, y)
   }
+  ctx.restore()
+}
+
+function drawOverlay(plot: uPlot, overlay: PlotOverlay): void {
+  const { ctx, bbox } = plot
+  const scale = overlay.unit || NO_UNIT
+  if (!plot.scales[scale]) return // no trace of this unit is shown
+  ctx.save()
+  ctx.beginPath()
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height)
+  ctx.clip()
+  ctx.globalAlpha = overlay.opacity ?? 0.8
+  ctx.strokeStyle = overlay.color
+  ctx.lineWidth = 1.2 * devicePixelRatio
+  ctx.setLineDash(overlay.dashed ? [6, 4] : [])
+  ctx.beginPath()
+  for (const [i, time] of overlay.times.entries()) {
+    ctx.lineTo(
+      plot.valToPos(time, 'x', true),
+      plot.valToPos(overlay.values[i] as number, scale, true),
+    )
+  }
+  ctx.stroke()
   ctx.restore()
 }
 

@@ -4,21 +4,27 @@ import { useT } from '../../i18n'
 import { loadRows } from '../../live/live'
 import { contents, useDrives, useRows } from '../../live/store'
 import { matches } from '../parameters/filters'
-import { type Channel, drawable, GREATEST_CHANNELS } from './channels'
+import type { ScopeSetup } from '../../api/schema'
+import { type Channel, drawable } from './channels'
+import { GREATEST_CHANNELS, withChannels } from './setup'
+import { UnitRows } from './UnitRows'
+import { useScopeChannels } from './useScope'
 
 const GREATEST_LIST = 120
 
-/** Choose traces from any axis. */
+/** Choose traces from any axis, and the units in which they are shown. */
 export function ChannelPicker({
-  channels,
+  setup,
   onChange,
   onClose,
 }: {
-  channels: Channel[]
-  onChange: (channels: Channel[]) => void
+  setup: ScopeSetup
+  onChange: (setup: ScopeSetup) => void
   onClose: () => void
 }) {
   const t = useT()
+  const infos = useScopeChannels()
+  const channels: Channel[] = setup.traces.map(({ drive, key }) => ({ drive, key }))
   const drives = useDrives() ?? []
   const [drive, setDrive] = useState(channels[0]?.drive ?? drives[0]?.id ?? '')
   const [search, setSearch] = useState('')
@@ -36,10 +42,17 @@ export function ChannelPicker({
   )
   const toggle = (key: string) =>
     onChange(
-      has(key)
-        ? channels.filter((each) => each.drive !== drive || each.key !== key)
-        : [...channels, { drive, key }],
+      withChannels(
+        setup,
+        has(key)
+          ? channels.filter((each) => each.drive !== drive || each.key !== key)
+          : [...channels, { drive, key }],
+      ),
     )
+  const nameOf = (channel: Channel) => {
+    const owner = drives.find((each) => each.id === channel.drive)?.name ?? channel.drive
+    return `${owner} ${infos.get(`${channel.drive} ${channel.key}`)?.name ?? channel.key}`
+  }
   return (
     <Modal opened onClose={onClose} title={t('scope.choose')} size="lg">
       <div className="row">
@@ -73,6 +86,17 @@ export function ChannelPicker({
           <p className="dim">{t('scope.more', { count: ordered.length - GREATEST_LIST })}</p>
         )}
       </div>
+      {setup.traces.length > 0 && (
+        <details className="units">
+          <summary>{t('scope.units')}</summary>
+          <UnitRows
+            traces={setup.traces}
+            infos={infos}
+            nameOf={nameOf}
+            onChange={(traces) => onChange({ ...setup, traces })}
+          />
+        </details>
+      )}
       <div className="row end">
         <Button variant="filled" onClick={onClose}>
           {t('close')}

@@ -1,231 +1,201 @@
-import { ActionIcon, Button, NativeSelect, useComputedColorScheme } from '@mantine/core'
+import { SegmentedControl, useComputedColorScheme } from '@mantine/core'
 import { useCallback, useEffect, useRef, useState } from 'react'
 import { useRoute } from '../../app/router'
+import type { ScopeSetup } from '../../api/schema'
 import { useT } from '../../i18n'
 import * as live from '../../live/live'
 import { contents, useDrives, useLink, useRows } from '../../live/store'
-import type { TriggerSettings } from '../../live/trigger'
 import type { ScopeFrame, ScopeView } from '../../live/worker-messages'
 import { type PlotHandle, TimePlot } from '../../plots/TimePlot'
-import { Icon } from '../../widgets/Icon'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { offerDownload } from '../files/sets'
 import { ChannelPicker } from './ChannelPicker'
-import {
-  type Channel,
-  storeChannels,
-  storedChannels,
-  TRACE_COLORS,
-  usualChannels,
-} from './channels'
+import { TRACE_COLORS, usualChannels } from './channels'
+import { Cursors } from './Cursors'
+import { KeepPanel } from './KeepPanel'
+import { MathsPanel } from './MathsPanel'
 import { Measurements } from './Measurements'
-import { type TriggerChoice, TriggerPanel } from './TriggerPanel'
-import { useFrames, useScopeInfo, useSubscriptions, useTrigger } from './useScope'
+import type { PanelProps } from './panels'
+import { type Reference, referenceOverlays, sweepOverlays } from './references'
+import './scope.css'
+import { needsDrive, needsLevel, type Shown, triggerOf, withChannels } from './setup'
+import { SpectrogramPanel } from './SpectrogramPanel'
+import { SpectrumPanel } from './SpectrumPanel'
+import { Toolbar } from './Toolbar'
+import { TriggerPanel } from './TriggerPanel'
+import {
+  useFrames,
+  useSampling,
+  useScopeChannels,
+  useScopeInfo,
+  useSetup,
+  useTrigger,
+} from './useScope'
+import { useShown } from './useShown'
+import { XyPanel } from './XyPanel'
 
-const WINDOWS = [0.2, 0.5, 1, 2, 5, 10, 30, 60]
 const TABLE_MS = 250
+const FRAME_MS = 40
+/** A picture that stands is asked for again only for what stands beside it. */
+const FROZEN_MS = 500
+const TABS = ['measure', 'spectrum', 'spectrogram', 'xy', 'maths', 'keep'] as const
+type Tab = (typeof TABS)[number]
+
+interface Frozen {
+  from: number
+  to: number
+  /** Time that is shown as zero. */
+  origin: number
+}
 
 export function ScopePage() {
   const t = useT()
-  const link = useLink()
-  const drives = useDrives()
-  const { drive: chosen } = useRoute()
-  const first = chosen ?? drives?.[0]?.id ?? null
-  const rows = useRows(first ?? '')
   const dark = useComputedColorScheme('light') === 'dark'
-  const [channels, setChannels] = useState<Channel[] | null>(storedChannels)
+  const [setup, change] = useFirstSetup()
+  const infos = useScopeChannels()
+  const shown = useShown(setup, infos)
+  const palette = TRACE_COLORS[dark ? 'dark' : 'light']
+  const colors = shown.map((_, i) => palette[i % palette.length] as string)
+  const problems = [...useScopeInfo().values()].flatMap((info) => info.problem ?? [])
   const [picking, setPicking] = useState(false)
-  const [window_, setWindow] = useState(5)
-  const [stretch, setStretch] = useState<{ from: number; to: number } | null>(null)
-  const [frozenAt, setFrozenAt] = useState<number | null>(null)
-  const [paused, setPaused] = useState(false)
+  const [tab, setTab] = useState<Tab>('measure')
+  const [arming, setArming] = useState(0)
+  const [frozen, setFrozen] = useState<Frozen | null>(null)
   const [cursors, setCursors] = useState<number[]>([])
-  const [choice, setChoice] = useState<TriggerChoice>({
-    mode: 'off',
-    kind: 'rising',
-    level: 0,
-    before: 0.2,
-    index: 0,
-  })
+  const [references, setReferences] = useState<Reference[]>([])
   const [table, setTable] = useState<ScopeFrame | null>(null)
   const plot = useRef<PlotHandle | null>(null)
-  const lastFrame = useRef<ScopeFrame | null>(null)
+  const last = useRef<ScopeFrame | null>(null)
   const tableAt = useRef(0)
-
-  useEffect(() => {
-    if (link.open && first && !contents.rows.has(first)) void live.loadRows(first).catch(() => {})
-  }, [link.open, first])
-  useEffect(() => {
-    if (channels === null && first && rows) setChannels(usualChannels(first, rows))
-  }, [channels, first, rows])
-  const known = (channels ?? []).filter((each) => drives?.some((drive) => drive.id === each.drive))
-  const traces = useSubscriptions(known, 0)
-  const info = useScopeInfo()
-  const described = traces.map((ref) => info.get(ref.subscription)?.channels[ref.channel] ?? null)
-  const problems = [...new Set(traces.map((ref) => ref.subscription))].flatMap(
-    (id) => info.get(id)?.problem ?? [],
-  )
-  const name = (i: number) => {
-    const channel = known[i]
-    const owner = drives?.find((drive) => drive.id === channel?.drive)?.name ?? ''
-    return `${owner} ${described[i]?.name ?? channel?.key ?? ''}`.trim()
-  }
-  const palette = TRACE_COLORS[dark ? 'dark' : 'light']
-  const series = known.map((_, i) => ({
-    label: name(i),
-    unit: described[i]?.unit ?? '',
-    color: palette[i % palette.length] as string,
-  }))
-  const trigger: TriggerSettings | null =
-    choice.mode === 'off'
-      ? null
-      : { kind: choice.kind, level: choice.level, window: window_, before: choice.before }
-  useTrigger(traces[choice.index] ?? null, trigger)
+  const trigger = triggerOf(setup)
+  useSampling(setup, infos)
+  useTrigger(setup, arming)
 
   const view = (): ScopeView | null =>
-    traces.length === 0
+    shown.length === 0
       ? null
       : {
-          traces,
-          show: stretch ?? (trigger ? { trigger: 'newest' } : { window: window_ }),
+          ids: shown.map((each) => each.id),
+          show: frozen ?? (trigger ? { trigger: 'newest' } : { window: setup.window_s }),
           bins: Math.round(plot.current?.width() ?? 600),
           measure:
-            cursors.length === 2 ? { from: Math.min(...cursors), to: Math.max(...cursors) } : null,
+            tab === 'measure' && tableDue(tableAt.current, frozen !== null)
+              ? (between(cursors) ?? 'shown')
+              : null,
           cursors,
+          persistence: setup.persistence > 0,
         }
-  const show = (frame: ScopeFrame) => {
-    lastFrame.current = frame
-    const fresh = stretch === null
-    const origin = fresh ? (frame.triggeredAt ?? frame.newest ?? 0) : (frozenAt ?? frame.to)
-    const level = series[choice.index]
+  const originOf = (frame: ScopeFrame) => frozen?.origin ?? frame.trigger.at ?? frame.newest ?? 0
+  const freeze = (frame: ScopeFrame) =>
+    setFrozen({ from: frame.from, to: frame.to, origin: originOf(frame) })
+  const draw = (frame: ScopeFrame) => {
+    last.current = frame
+    const level = levelOf(setup, shown, colors)
     plot.current?.draw({
       columns: frame.columns,
       from: frame.from,
       to: frame.to,
-      origin: trigger === null && fresh ? (frame.newest ?? 0) : origin,
-      level:
-        trigger && level ? { unit: level.unit, value: choice.level, color: level.color } : null,
+      origin: originOf(frame),
+      level: trigger ? level : null,
       cursors,
+      overlays: [
+        ...sweepOverlays(frame.overlays, shown, colors),
+        ...referenceOverlays(references, palette),
+      ],
     })
-    if (performance.now() - tableAt.current > TABLE_MS || paused) {
+    if (frame.measurements !== null || (tab !== 'measure' && tableDue(tableAt.current, false))) {
       tableAt.current = performance.now()
       setTable(frame)
     }
-    if (choice.mode === 'single' && frame.triggeredAt !== null && fresh) freeze(frame)
+    const caught = trigger?.mode === 'single' && frame.trigger.state === 'triggered'
+    if (caught && frozen === null) freeze(frame)
   }
-  const freeze = (frame: ScopeFrame) => {
-    setStretch({ from: frame.from, to: frame.to })
-    setFrozenAt(frame.triggeredAt ?? frame.newest)
-  }
-  const follow = () => {
-    setStretch(null)
-    setFrozenAt(null)
-    setPaused(false)
-    setCursors([])
-    if (choice.mode === 'single') setChoice({ ...choice })
-  }
-  const toStretch = useCallback((from: number, to: number) => {
-    setFrozenAt((old) => old ?? lastFrame.current?.triggeredAt ?? lastFrame.current?.newest ?? null)
-    setStretch({ from, to })
-  }, [])
   useFrames(
     view,
-    !paused,
-    JSON.stringify([traces, stretch, window_, trigger, cursors, dark, series]),
-    show,
+    frozen ? FROZEN_MS : FRAME_MS,
+    JSON.stringify([shown, frozen, setup.window_s, trigger, cursors, dark, tab, references.length]),
+    draw,
   )
 
+  const follow = () => {
+    setFrozen(null)
+    setCursors([])
+    if (setup.trigger.mode === 'single') setArming((n) => n + 1)
+  }
+  const toStretch = useCallback((from: number, to: number) => {
+    const frame = last.current
+    const origin = frame?.trigger.at ?? frame?.newest ?? to
+    setFrozen((old) => ({ from, to, origin: old?.origin ?? origin }))
+  }, [])
+  const move = (part: number, factor: number) => {
+    const frame = last.current
+    if (!frame) return
+    const width = frame.to - frame.from
+    const centre = (frame.from + frame.to) / 2 + width * part
+    toStretch(centre - (width * factor) / 2, centre + (width * factor) / 2)
+  }
   const toggleCursors = () => {
-    const frame = lastFrame.current
-    if (cursors.length > 0) setCursors([])
-    else if (frame) {
-      const width = frame.to - frame.from
-      // Cursors stand on samples; a picture that runs on would slide away beneath them.
-      if (!stretch) freeze(frame)
-      setCursors([frame.from + width / 3, frame.from + (2 * width) / 3])
-    }
-  }
-  const pan = (part: number) => {
-    const frame = lastFrame.current
-    if (!frame) return
-    const by = (frame.to - frame.from) * part
-    toStretch(frame.from + by, frame.to + by)
-  }
-  const zoom = (factor: number) => {
-    const frame = lastFrame.current
-    if (!frame) return
-    const centre = (frame.from + frame.to) / 2
-    const half = ((frame.to - frame.from) / 2) * factor
-    toStretch(centre - half, centre + half)
+    const frame = last.current
+    if (cursors.length > 0 || !frame) return setCursors([])
+    // Cursors stand on samples; a picture that runs on would slide away beneath them.
+    freeze(frame)
+    const width = frame.to - frame.from
+    setCursors([frame.from + width / 3, frame.from + (2 * width) / 3])
   }
   const csv = async () => {
-    const frame = lastFrame.current
+    const frame = last.current
     if (!frame) return
-    const names = series.map((each) => (each.unit ? `${each.label} [${each.unit}]` : each.label))
-    const text = await live.scopeCsv(traces, names, frame.from, frame.to)
+    const text = await live.askScope('csv', {
+      ids: shown.map((each) => each.id),
+      names: shown.map(({ label, unit }) => (unit ? `${label} [${unit}]` : label)),
+      from: frame.from,
+      to: frame.to,
+      origin: frame.from,
+    })
     offerDownload(`scope ${new Date().toISOString().replaceAll(':', '.')}.csv`, [text], 'text/csv')
   }
-  const choose = (next: Channel[]) => {
-    storeChannels(next)
-    setChannels(next)
+  const changeFromNow = (next: ScopeSetup) => {
+    setFrozen(null)
+    setCursors([])
+    change(next)
+  }
+  const panel: PanelProps = {
+    shown,
+    colors,
+    stretch: () => {
+      const frame = last.current
+      if (!frame) return null
+      const over = between(cursors) ?? { from: frame.from, to: frame.to }
+      return { ...over, origin: originOf(frame) }
+    },
+    running: frozen === null,
+    change: JSON.stringify([frozen, cursors]),
+    dark,
   }
   return (
-    <div className="page fill scope-page">
-      <div className="row wrap middle">
-        <h1 className="grow">{t('page.scope')}</h1>
-        <Button onClick={() => setPicking(true)} leftSection={<Icon name="scope" />}>
-          {t('scope.channels', { count: known.length })}
-        </Button>
-        <Button
-          leftSection={<Icon name={stretch || paused ? 'play' : 'pause'} />}
-          onClick={() => {
-            if (stretch || paused) follow()
-            else if (lastFrame.current) {
-              freeze(lastFrame.current)
-              setPaused(false)
-            }
-          }}
-        >
-          {t(stretch ? 'scope.follow' : 'scope.pause')}
-        </Button>
-        <NativeSelect
-          aria-label={t('scope.window')}
-          value={String(window_)}
-          onChange={(event) => {
-            setWindow(Number(event.currentTarget.value))
-            setStretch(null)
-          }}
-          data={WINDOWS.map((each) => ({
-            value: String(each),
-            label: t('scope.seconds', { value: each }),
-          }))}
-        />
-        <ActionIcon aria-label={t('scope.panLeft')} onClick={() => pan(-0.25)}>
-          <Icon name="left" />
-        </ActionIcon>
-        <ActionIcon aria-label={t('scope.panRight')} onClick={() => pan(0.25)}>
-          <Icon name="right" />
-        </ActionIcon>
-        <Button aria-label={t('scope.zoomIn')} onClick={() => zoom(0.5)}>
-          +
-        </Button>
-        <Button aria-label={t('scope.zoomOut')} onClick={() => zoom(2)}>
-          −
-        </Button>
-        <Button aria-pressed={cursors.length > 0} onClick={toggleCursors}>
-          {t('scope.cursors')}
-        </Button>
-        <Button leftSection={<Icon name="download" />} onClick={() => void csv()}>
-          {t('scope.csv')}
-        </Button>
-      </div>
+    <div className="page scope-page">
+      <Toolbar
+        count={shown.length}
+        window_s={setup.window_s}
+        frozen={frozen !== null}
+        cursors={cursors.length > 0}
+        onPick={() => setPicking(true)}
+        onRun={() => {
+          if (frozen) follow()
+          else if (last.current) freeze(last.current)
+        }}
+        onWindow={(window_s) => changeFromNow({ ...setup, window_s })}
+        onMove={move}
+        onCursors={toggleCursors}
+        onCsv={() => void csv()}
+      />
       {problems.map((problem) => (
         <ProblemNote key={problem.detail} problem={problem} />
       ))}
-      {known.length === 0 && <p className="empty">{t('scope.empty')}</p>}
-      {known.length > 0 && (
+      {shown.length === 0 && <p className="empty">{t('scope.empty')}</p>}
+      {shown.length > 0 && (
         <TimePlot
-          series={series}
+          series={shown.map(({ label, unit }, i) => ({ label, unit, color: colors[i] as string }))}
           dark={dark}
           label={t('page.scope')}
           timeLabel={t('scope.time')}
@@ -237,30 +207,101 @@ export function ScopePage() {
           onCursor={(index, time) => setCursors((old) => old.with(index, time))}
         />
       )}
-      {known.length > 0 && (
-        <>
-          <TriggerPanel
-            choice={choice}
-            names={series.map((each) => each.label)}
-            unit={series[choice.index]?.unit ?? ''}
-            waiting={trigger !== null && table !== null && table.triggeredAt === null}
-            onChange={(next) => {
-              setStretch(null)
-              setCursors([])
-              setChoice(next)
-            }}
-          />
-          <Measurements
-            frame={table}
-            series={series}
-            synchronous={described.map((each) => each?.synchronous ?? null)}
-            cursors={cursors}
-          />
-        </>
+      <Cursors
+        cursors={cursors}
+        origin={frozen?.origin ?? 0}
+        onCursor={(index, time) => setCursors((old) => old.with(index, time))}
+      />
+      <TriggerPanel
+        choice={setup.trigger}
+        shown={shown}
+        state={table?.trigger ?? null}
+        persistence={setup.persistence}
+        onChange={(next) => changeFromNow({ ...setup, trigger: next })}
+        onPersistence={(persistence) => changeFromNow({ ...setup, persistence })}
+        onArm={() => {
+          setFrozen(null)
+          setCursors([])
+          setArming((n) => n + 1)
+        }}
+      />
+      <div className="scope-tabs">
+        <SegmentedControl
+          aria-label={t('scope.tabs')}
+          value={tab}
+          onChange={(next) => setTab(next)}
+          data={TABS.map((each) => ({ value: each, label: t(`scope.tab.${each}`) }))}
+        />
+      </div>
+      {tab === 'measure' && shown.length > 0 && (
+        <Measurements frame={table} shown={shown} colors={colors} cursors={cursors} />
       )}
+      {tab === 'spectrum' && <SpectrumPanel {...panel} />}
+      {tab === 'spectrogram' && <SpectrogramPanel {...panel} />}
+      {tab === 'xy' && <XyPanel {...panel} />}
+      {tab === 'maths' && (
+        <MathsPanel setup={setup} onChange={(maths) => change({ ...setup, maths })} />
+      )}
+      {tab === 'keep' && (
+        <KeepPanel
+          {...panel}
+          setup={setup}
+          references={references}
+          onReferences={setReferences}
+          onSetup={changeFromNow}
+        />
+      )}
+      <Losses frame={table} />
       {picking && (
-        <ChannelPicker channels={known} onChange={choose} onClose={() => setPicking(false)} />
+        <ChannelPicker setup={setup} onChange={change} onClose={() => setPicking(false)} />
       )}
     </div>
+  )
+}
+
+const tableDue = (at: number, frozen: boolean) => frozen || performance.now() - at > TABLE_MS
+
+function between(cursors: number[]): { from: number; to: number } | null {
+  return cursors.length === 2 ? { from: Math.min(...cursors), to: Math.max(...cursors) } : null
+}
+
+/** The line of the trigger's level, on the scale of its trace. */
+function levelOf(setup: ScopeSetup, shown: Shown[], colors: string[]) {
+  const { kind, trace, level } = setup.trigger
+  if (needsDrive(kind) || !needsLevel(kind)) return null
+  const place = Math.max(
+    0,
+    shown.findIndex((each) => each.id === trace),
+  )
+  const on = shown[place]
+  return on ? { unit: on.unit, value: level, color: colors[place] as string } : null
+}
+
+/** The stored set-up, or position, speed and torque of the axis where there is none yet. */
+function useFirstSetup(): [ScopeSetup, (setup: ScopeSetup) => void] {
+  const [setup, change, fresh] = useSetup()
+  const link = useLink()
+  const drives = useDrives()
+  const { drive: chosen } = useRoute()
+  const first = chosen ?? drives?.[0]?.id ?? null
+  const rows = useRows(first ?? '')
+  useEffect(() => {
+    if (link.open && first && !contents.rows.has(first)) void live.loadRows(first).catch(() => {})
+  }, [link.open, first])
+  useEffect(() => {
+    if (fresh && first && rows) change(withChannels(setup, usualChannels(first, rows)))
+  }, [fresh, first, rows, setup, change])
+  return [setup, change]
+}
+
+/** What the view lost; it is never more than said here. */
+function Losses({ frame }: { frame: ScopeFrame | null }) {
+  const t = useT()
+  const { dropped = 0, blocks = 0, away = 0 } = frame?.losses ?? {}
+  const any = dropped + blocks + away > 0
+  return (
+    <p className={any ? 'note warn num' : 'dim num'} data-lost={dropped + away} role="status">
+      {any ? t('scope.losses', { dropped, blocks, away }) : t('scope.lossless')}
+    </p>
   )
 }

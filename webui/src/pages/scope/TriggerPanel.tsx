@@ -1,69 +1,119 @@
-import { NativeSelect } from '@mantine/core'
+import { Button, NativeSelect } from '@mantine/core'
+import type { ScopeSetup } from '../../api/schema'
 import { useT } from '../../i18n'
-import type { TriggerSettings } from '../../live/trigger'
+import { useDrives } from '../../live/store'
+import type { ScopeFrame } from '../../live/worker-messages'
 import { NumberField } from '../../widgets/NumberField'
+import { needsBit, needsDrive, needsHigh, needsLevel, type Shown } from './setup'
 
-export interface TriggerChoice {
-  mode: 'off' | 'normal' | 'single'
-  kind: TriggerSettings['kind']
-  level: number
-  before: number
-  index: number
-}
+const MODES = ['off', 'auto', 'normal', 'single'] as const
+const KINDS = [
+  'rising',
+  'falling',
+  'either',
+  'above',
+  'below',
+  'enters',
+  'leaves',
+  'bit_set',
+  'bit_clear',
+  'change',
+  'fault',
+  'motion',
+] as const
+/** A speed above the noise of an encoder at standstill, in rpm. */
+const MOTION_RPM = 30
+
+type Choice = ScopeSetup['trigger']
 
 export function TriggerPanel({
   choice,
-  names,
-  unit,
-  waiting,
+  shown,
+  state,
+  persistence,
   onChange,
+  onPersistence,
+  onArm,
 }: {
-  choice: TriggerChoice
-  names: string[]
-  unit: string
-  waiting: boolean
-  onChange: (choice: TriggerChoice) => void
+  choice: Choice
+  shown: Shown[]
+  state: ScopeFrame['trigger'] | null
+  persistence: number
+  onChange: (choice: Choice) => void
+  onPersistence: (sweeps: number) => void
+  onArm: () => void
 }) {
   const t = useT()
+  const drives = useDrives() ?? []
   const on = choice.mode !== 'off'
+  const { kind } = choice
+  const trace = shown.find((each) => each.id === choice.trace) ?? shown[0]
+  const unit = kind === 'motion' ? 'rpm' : (trace?.unit ?? '')
+  const chooseKind = (next: Choice['kind']) => {
+    const drive = choice.drive || (drives[0]?.id ?? '')
+    const level = next === 'motion' && kind !== 'motion' ? MOTION_RPM : choice.level
+    onChange({ ...choice, kind: next, drive, level })
+  }
   return (
     <div className="row wrap trigger">
       <NativeSelect
         label={t('trigger.mode')}
         value={choice.mode}
         onChange={(event) =>
-          onChange({ ...choice, mode: event.currentTarget.value as TriggerChoice['mode'] })
+          onChange({ ...choice, mode: event.currentTarget.value as Choice['mode'] })
         }
-        data={(['off', 'normal', 'single'] as const).map((mode) => ({
-          value: mode,
-          label: t(`trigger.${mode}`),
-        }))}
+        data={MODES.map((mode) => ({ value: mode, label: t(`trigger.${mode}`) }))}
       />
       {on && (
         <>
           <NativeSelect
-            label={t('trigger.channel')}
-            value={String(choice.index)}
-            onChange={(event) => onChange({ ...choice, index: Number(event.currentTarget.value) })}
-            data={names.map((label, i) => ({ value: String(i), label }))}
-          />
-          <NativeSelect
             label={t('trigger.kind')}
-            value={choice.kind}
-            onChange={(event) =>
-              onChange({ ...choice, kind: event.currentTarget.value as TriggerSettings['kind'] })
-            }
-            data={(['rising', 'falling', 'above', 'below'] as const).map((kind) => ({
-              value: kind,
-              label: t(`trigger.${kind}`),
-            }))}
+            value={kind}
+            onChange={(event) => chooseKind(event.currentTarget.value as Choice['kind'])}
+            data={KINDS.map((each) => ({ value: each, label: t(`trigger.${each}`) }))}
           />
-          <NumberField
-            label={t('trigger.level')}
-            unit={unit}
-            value={choice.level}
-            onChange={(level) => level !== null && onChange({ ...choice, level })}
-          />
+          {needsDrive(kind) ? (
+            <NativeSelect
+              label={t('frame.axis')}
+              value={choice.drive}
+              onChange={(event) => onChange({ ...choice, drive: event.currentTarget.value })}
+              data={drives.map((each) => ({ value: each.id, label: each.name }))}
+            />
+          ) : (
+            <NativeSelect
+              label={t('trigger.channel')}
+              value={trace?.id ?? ''}
+              onChange={(event) => onChange({ ...choice, trace: event.currentTarget.value })}
+              data={shown.map((each) => ({ value: each.id, label: each.label }))}
+            />
+          )}
+          {needsLevel(kind) && (
+            <NumberField
+              label={t(needsHigh(kind) ? 'trigger.low' : 'trigger.level')}
+              unit={unit}
+              value={choice.level}
+              onChange={(level) => level !== null && onChange({ ...choice, level })}
+            />
+          )}
+          {needsHigh(kind) && (
+            <NumberField
+              label={t('trigger.high')}
+              unit={unit}
+              value={choice.high}
+              min={choice.level}
+              onChange={(high) => high !== null && onChange({ ...choice, high })}
+            />
+          )}
+          {needsBit(kind) && (
+            <NumberField
+              label={t('trigger.bit')}
+              integer
+              min={0}
+              max={31}
+              value={choice.bit}
+              onChange={(bit) => bit !== null && onChange({ ...choice, bit })}
+            />
+          )}
           <NativeSelect
             label={t('trigger.before')}
             value={String(choice.before)}
@@ -73,9 +123,19 @@ export function TriggerPanel({
               label: `${part * 100} %`,
             }))}
           />
-          {waiting && (
-            <strong className="waiting" role="status">
-              {t('trigger.waiting')}
+          <NativeSelect
+            label={t('trigger.persistence')}
+            value={String(persistence)}
+            onChange={(event) => onPersistence(Number(event.currentTarget.value))}
+            data={[0, 3, 10, 30].map((sweeps) => ({
+              value: String(sweeps),
+              label: sweeps ? t('trigger.sweeps', { count: sweeps }) : t('trigger.none'),
+            }))}
+          />
+          <Button onClick={onArm}>{t('trigger.arm')}</Button>
+          {state && (
+            <strong className={`trigger-state ${state.state}`} role="status">
+              {t(`trigger.state.${state.state}`, { count: state.count })}
             </strong>
           )}
         </>

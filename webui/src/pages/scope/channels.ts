@@ -1,6 +1,7 @@
 import type { ParameterRow } from '../../api/schema'
 import { isText } from '../../widgets/format'
 import { POSITION_ACTUAL, TORQUE_ACTUAL, VELOCITY_ACTUAL } from '../../widgets/objects'
+import { storedSetup } from './setup'
 
 export interface Channel {
   drive: string
@@ -12,27 +13,10 @@ export const TRACE_COLORS = {
   light: ['#0072b2', '#c24a00', '#00805e', '#a04a8a', '#80650c', '#2b86b8', '#7a4a3f', '#666666'],
   dark: ['#56b4e9', '#ff9248', '#2fd0a0', '#e79ad0', '#f0d850', '#9fc5ff', '#d0a090', '#b8b8b8'],
 }
-export const GREATEST_CHANNELS = 16
 
-const STORED = 'servodeck.scope.channels'
-
-export function storedChannels(): Channel[] | null {
-  try {
-    const found: unknown = JSON.parse(localStorage.getItem(STORED) ?? 'null')
-    if (!Array.isArray(found)) return null
-    return found.filter(isChannel)
-  } catch {
-    return null
-  }
-}
-
-function isChannel(each: unknown): each is Channel {
-  const { drive, key } = (each ?? {}) as Partial<Channel>
-  return typeof drive === 'string' && typeof key === 'string'
-}
-
-export const storeChannels = (channels: Channel[]) =>
-  localStorage.setItem(STORED, JSON.stringify(channels))
+/** Channels that the Scope page of this browser shows. */
+export const storedChannels = (): Channel[] | null =>
+  storedSetup()?.traces.map(({ drive, key }) => ({ drive, key })) ?? null
 
 /** What can be drawn: numbers that can be read. */
 export const drawable = (row: ParameterRow) =>
@@ -43,13 +27,4 @@ export function usualChannels(drive: string, rows: ParameterRow[]): Channel[] {
   return [VELOCITY_ACTUAL, POSITION_ACTUAL, TORQUE_ACTUAL]
     .filter((key) => rows.some((row) => row.key === key && drawable(row)))
     .map((key) => ({ drive, key }))
-}
-
-/** One subscription per drive, since each drive has a time base of its own. */
-export function byDrive(channels: Channel[]): Map<string, Channel[]> {
-  const found = new Map<string, Channel[]>()
-  for (const channel of channels) {
-    found.set(channel.drive, [...(found.get(channel.drive) ?? []), channel])
-  }
-  return found
 }

@@ -1,46 +1,53 @@
-import { useEffect, useRef, useState } from 'react'
+import { useCallback, useEffect, useRef, useState } from 'react'
+import { api, ask, problemOf } from '../../api/client'
+import type { NamedSetup, Problem, ScopeSetup, SnapshotInfo } from '../../api/schema'
 import * as live from '../../live/live'
-import { contents, useStore } from '../../live/store'
-import type { TriggerSettings } from '../../live/trigger'
-import type { ScopeFrame, ScopeView, TraceRef } from '../../live/worker-messages'
-import { byDrive, type Channel } from './channels'
+import { contents, useLink, useStore } from '../../live/store'
+import type { ScopeFrame, ScopeView } from '../../live/worker-messages'
+import { configOf, EMPTY, type Infos, storedSetup, storeSetup, triggerOf } from './setup'
 
-let counter = 0
-const FRAME_MS = 40
-
-/** Subscribes to the channels for as long as the page shows; gives each its trace. */
-export function useSubscriptions(channels: Channel[], period: number): TraceRef[] {
-  const [traces, setTraces] = useState<TraceRef[]>([])
-  const shape = JSON.stringify([channels, period])
-  useEffect(() => {
-    const mine: number[] = []
-    const refs = new Map<Channel, TraceRef>()
-    for (const group of byDrive(channels).values()) {
-      const subscription = ++counter
-      mine.push(subscription)
-      group.forEach((channel, i) => {
-        refs.set(channel, { subscription, channel: i })
-      })
-      live.toScope({
-        kind: 'scopeStart',
-        message: { type: 'scope_start', subscription, channels: group, period_s: period },
-      })
-    }
-    setTraces(channels.flatMap((channel) => refs.get(channel) ?? []))
-    return () => {
-      for (const subscription of mine) live.toScope({ kind: 'scopeStop', subscription })
-    }
-    // `shape` stands for channels and period.
-  }, [shape])
-  return traces
+/** The set-up of this browser, kept from visit to visit. */
+export function useSetup(): [ScopeSetup, (setup: ScopeSetup) => void, boolean] {
+  const [setup, setSetup] = useState(() => storedSetup() ?? EMPTY)
+  const [fresh, setFresh] = useState(() => storedSetup() === null)
+  const change = useCallback((next: ScopeSetup) => {
+    storeSetup(next)
+    setFresh(false)
+    setSetup(next)
+  }, [])
+  return [setup, change, fresh]
 }
 
 export const useScopeInfo = () => useStore('scopeInfo', () => contents.scopeInfo)
+export const useScopeChannels = () => useStore('scopeInfo', () => contents.scopeChannels)
 
-/** Asks the worker for a picture again and again while `running`, and once when the view changes. */
+/** Samples what the set-up names for as long as the page shows. */
+export function useSampling(setup: ScopeSetup, infos: Infos): void {
+  const config = configOf(setup, infos)
+  useEffect(() => {
+    live.toScope({ kind: 'scope', config })
+    // The text stands for the configuration.
+  }, [JSON.stringify(config)])
+  useEffect(
+    () => () => live.toScope({ kind: 'scope', config: { sources: [], maths: [], period: 0 } }),
+    [],
+  )
+}
+
+/** Arms the trigger; `arming` arms it again. */
+export function useTrigger(setup: ScopeSetup, arming: number): void {
+  const trigger = triggerOf(setup)
+  useEffect(() => {
+    live.toScope({ kind: 'trigger', trigger })
+    return () => live.toScope({ kind: 'trigger', trigger: null })
+    // The text stands for the trigger.
+  }, [JSON.stringify(trigger), arming])
+}
+
+/** Asks the worker for a picture every `period` ms, and at once when the view changes. */
 export function useFrames(
   view: () => ScopeView | null,
-  running: boolean,
+  period: number,
   change: string,
   onFrame: (frame: ScopeFrame) => void,
 ): void {
@@ -52,27 +59,38 @@ export function useFrames(
     const round = async () => {
       const wanted = latest.current.view()
       if (wanted) {
-        const frame = await live.scopeFrame(wanted)
+        const frame = await live.askScope('view', wanted)
         if (!alive) return
         latest.current.onFrame(frame)
       }
       // One picture at a time: a slow page asks less often instead of falling behind.
-      if (alive && running)
-        timer = setTimeout(() => requestAnimationFrame(() => void round()), FRAME_MS)
+      if (alive) timer = setTimeout(() => requestAnimationFrame(() => void round()), period)
     }
     void round()
     return () => {
       alive = false
       clearTimeout(timer)
     }
-  }, [running, change])
+  }, [period, change])
 }
 
-export function useTrigger(trace: TraceRef | null, settings: TriggerSettings | null): void {
-  const shape = JSON.stringify([trace, settings])
+/** Set-ups and snapshots that the server keeps. */
+export function useStored() {
+  const { open } = useLink()
+  const [setups, setSetups] = useState<NamedSetup[]>([])
+  const [snapshots, setSnapshots] = useState<SnapshotInfo[]>([])
+  const [problem, setProblem] = useState<Problem | null>(null)
+  const refresh = useCallback(async () => {
+    try {
+      setSetups(await ask(api.GET('/api/v1/scope/setups')))
+      setSnapshots(await ask(api.GET('/api/v1/scope/snapshots')))
+      setProblem(null)
+    } catch (error) {
+      setProblem(problemOf(error))
+    }
+  }, [])
   useEffect(() => {
-    live.toScope({ kind: 'trigger', trace: settings ? trace : null, settings })
-    return () => live.toScope({ kind: 'trigger', trace: null, settings: null })
-    // `shape` stands for both.
-  }, [shape])
+    if (open) void refresh()
+  }, [open, refresh])
+  return { setups, snapshots, refresh, problem }
 }
