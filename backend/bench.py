@@ -10,15 +10,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from backend.access import Leases
+from backend.audit.witness import Witness
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.drive import Drive, Port, Reading
 from backend.drive_list import DriveList, SavedDrive, SavedPort
 from backend.jobs import Job, JobRunner, Progress
 from backend.journal import Journal
-from backend.library import SetLibrary
 from backend.measurements import MeasurementStore
 from backend.monitor import Monitor, Snapshot
+from backend.records import Records
 from backend.scope import ScopeHub
 from drivers.errors import Busy, DriveError, NotAllowed
 from drivers.link import Found, Link, LinkEvent, NeedsProfile
@@ -42,15 +43,22 @@ class Bench:
 
     ``wires`` are the wires of a demo bench: URLs such as ``mlink://virtual0`` and what makes
     their links.
-    ``state_folder`` keeps the list of drives over restarts and the parameter sets.
+    ``state_folder`` keeps the list of drives over restarts, and what `Records` keeps.
     """
 
     def __init__(
-        self, state_folder: Path, wires: Mapping[str, Callable[[], Link]] | None = None
+        self,
+        state_folder: Path,
+        wires: Mapping[str, Callable[[], Link]] | None = None,
+        *,
+        database: str | None = None,
+        blobs: str | None = None,
     ) -> None:
         self.wires = dict(wires or {})
         self.journal = Journal()
-        self.sets = SetLibrary(state_folder / "sets")
+        self.records = Records(state_folder, self.journal, database, blobs)
+        self.audit = self.records.audit
+        self.sets = self.records.sets
         self.measurements = MeasurementStore(state_folder / "measurements")
         self.members: dict[str, Member] = {}
         self.links: dict[str, Link] = {}
@@ -62,7 +70,9 @@ class Bench:
         self.jobs = JobRunner(self._job_changed, self._permit)
         self._stops: set[asyncio.Task[dict[str, str]]] = set()
         self._changing: set[str] = set()
-        self.leases = Leases(lambda _drive: self._drives_changed())
+        self.leases = Leases(self._lease_changed)
+        self._witness = Witness(self.audit, self._name_of)
+        self.on_job.append(self._witness.job_changed)
         self.scope = ScopeHub(lambda drive: self.member(drive).axis)
         self.state_folder = state_folder
         self._list = DriveList(state_folder / "bench.json")
@@ -310,6 +320,7 @@ class Bench:
         member = Member(drive, axis, monitor)
         self.members[drive_id] = member
         drive.listen(lambda readings: self._readings(drive_id, readings))
+        drive.listen_writes(self._witness.wrote)
         monitor.start()
         self._save()
         self.journal.add(f"connected {drive.name} ({drive.profile.title})", drive=drive_id)
@@ -386,6 +397,7 @@ class Bench:
         task = asyncio.create_task(self._stop(members), name="stop")
         self._stops.add(task)
         task.add_done_callback(self._stops.discard)
+        self._witness.stopped(drive_ids)
         return await asyncio.shield(task)
 
     async def _stop(self, members: Sequence[Member]) -> dict[str, str]:
@@ -414,6 +426,14 @@ class Bench:
     def _job_changed(self, job: Job) -> None:
         for listener in self.on_job:
             listener(job)
+
+    def _lease_changed(self, drive_id: str) -> None:
+        self._witness.lease_changed(drive_id, self.leases.holder(drive_id))
+        self._drives_changed()
+
+    def _name_of(self, drive_id: str) -> str:
+        member = self.members.get(drive_id)
+        return member.drive.name if member is not None else drive_id
 
     def _drives_changed(self) -> None:
         for listener in self.on_drives:
@@ -478,6 +498,7 @@ class Bench:
 
     async def restore(self) -> None:
         """Connect the drives of the last session; those that cannot be are logged and kept out."""
+        await self.records.open()
         saved, problems = self._list.load()
         for problem in problems:
             self.journal.add(problem, level="error")
@@ -506,3 +527,4 @@ class Bench:
         await asyncio.gather(
             *(link.close() for link in self.links.values()), return_exceptions=True
         )
+        await self.records.close()

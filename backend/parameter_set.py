@@ -55,6 +55,9 @@ class ParameterSet:
     saved: datetime | None
     notes: str
     rows: tuple[Row, ...]
+    vendor_id: int | None = None
+    product_code: int | None = None
+    revision: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,18 +174,27 @@ def parse(data: bytes, name: str = "the file") -> ParameterSet:
     rows = content.get("parameter", [])
     if not isinstance(rows, list):
         raise BadSet(f"{name}: [[parameter]] rows are missing", remedy="use an undamaged copy")
-    serial = identity.get("serial")
     saved = about.get("saved")
     return ParameterSet(
         profile=str(identity.get("profile", "")),
         drive_name=str(identity.get("drive", "")),
-        serial=serial if isinstance(serial, int) else None,
+        serial=_number(identity, "serial"),
         firmware=str(identity.get("firmware", "")),
         author=str(about.get("author", "")),
         saved=saved if isinstance(saved, datetime) else None,
         notes=str(about.get("notes", "")),
         rows=tuple(_row(row, number) for number, row in enumerate(rows, 1)),
+        vendor_id=_number(identity, "vendor_id"),
+        product_code=_number(identity, "product_code"),
+        revision=_number(identity, "revision"),
     )
+
+
+def _number(table: dict[str, Any], field: str) -> int | None:
+    value = table.get(field)
+    # A database holds 64 bits with sign; identity objects have 32 (CiA 301 clause 7.5.2.19).
+    known = isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 1 << 63
+    return value if known else None
 
 
 def _table(content: dict[str, Any], field: str, name: str) -> dict[str, Any]:

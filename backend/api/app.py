@@ -13,12 +13,14 @@ from fastapi.routing import APIRoute
 import backend
 from backend.api import (
     errors,
+    routes_audit,
     routes_bench,
     routes_description,
     routes_drive,
     routes_ethercat,
     routes_functions,
     routes_io,
+    routes_library,
     routes_lists,
     routes_recordings,
     routes_rerun,
@@ -111,6 +113,8 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
         routes_tune,
         routes_functions,
         routes_io,
+        routes_library,
+        routes_audit,
     ):
         api.include_router(part.router)
     app.include_router(api)

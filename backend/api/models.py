@@ -427,7 +427,11 @@ class LoadSetRequest(Message):
 
     file: str
     keys: list[str] = Field(max_length=5000)
+    version: int | None = Field(default=None, ge=1, description="of the set; the latest if null")
     accept_other_identity: bool = False
+    accept_motor_individual: bool = Field(
+        default=False, description="write values of one motor into another drive all the same"
+    )
 
 
 class MoveRequest(Message):

@@ -270,7 +270,7 @@ async def read_all(bench: TheBench, member: TheMember, request: ReadAllRequest) 
 @router.post("/jobs/load_set", status_code=202)
 async def load_set(bench: TheBench, member: Controlled, request: LoadSetRequest) -> JobInfo:
     """Write chosen rows of a parameter set, each read back."""
-    content = bench.sets.load(request.file)
+    content = await bench.records.store.call(bench.sets.load, request.file, request.version)
     job = bench.jobs.start(
         "load_set",
         f"Load {request.file} into {member.drive.name}",
@@ -281,13 +281,15 @@ async def load_set(bench: TheBench, member: Controlled, request: LoadSetRequest)
             progress,
             library=bench.sets,
             accept_other_identity=request.accept_other_identity,
+            accept_motor_individual=request.accept_motor_individual,
         ),
         drive=member.drive.id,
         # Nothing may move while its settings change; and a set is not left half written.
         motion=True,
         stoppable=False,
     )
-    bench.journal.add(f"{member.drive.name}: load {request.file}", drive=member.drive.id)
+    which = f" version {request.version}" if request.version else ""
+    bench.journal.add(f"{member.drive.name}: load {request.file}{which}", drive=member.drive.id)
     return convert.job(job)
 
 

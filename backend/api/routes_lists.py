@@ -43,7 +43,7 @@ async def export_set(
     Parameters without an object (only Modbus reaches them) are not in a DCF.
     """
     try:
-        content = bench.sets.load(file)
+        content = await bench.records.store.call(bench.sets.load, file)
     except BadSet:
         raise
     except NotAllowed as error:
@@ -85,7 +85,7 @@ async def store_list(
         if len(data) > MAX_BYTES:
             raise BadSet(f"{file} is larger than {MAX_BYTES} bytes", remedy="choose another file")
     text, found = import_list(bytes(data), _family(profile), file, datetime.now(UTC))
-    stored = bench.sets.store(file, text, overwrite=overwrite)
+    stored = await bench.records.store.call(bench.sets.store, file, text, overwrite=overwrite)
     bench.journal.add(f"imported {stored}: {len(found.readings)} parameters")
     return ImportedList(
         file=stored, parameters=len(found.readings), problems=list(found.problems[:200])

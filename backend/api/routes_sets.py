@@ -1,108 +1,107 @@
-"""Routes of parameter-set files and comparisons."""
+"""Routes of parameter sets by name, and comparisons of a drive with them."""
 
 from __future__ import annotations
 
-from datetime import UTC
+from collections.abc import Collection, Iterable
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
 from backend import parameter_set
-from backend.api import convert
+from backend.api import convert, convert_library
 from backend.api.context import Controlled, TheBench, TheMember
 from backend.api.errors import NotFound
-from backend.api.models import Diff, SaveSetRequest, SetFileInfo
+from backend.api.models import Diff, SaveSetRequest
+from backend.api.models_library import StoredSet, ThreeWay
 from backend.bench import Bench
-from backend.drive import Drive
-from backend.parameter_set import MAX_BYTES, BadSet, Difference, Row
+from backend.drive import Drive, Reading
+from backend.library.identity import doubts
+from backend.library.three_way import three_way as compare_three
+from backend.parameter_set import MAX_BYTES, BadSet, ParameterSet, Row
+from backend.people.identity import acting_person
 from backend.tools import parameters
 from drivers.errors import NotAllowed, OutOfRange
 
 router = APIRouter()
 
 
-def _info(bench: Bench, name: str) -> SetFileInfo:
-    try:
-        content = bench.sets.load(name)
-    except BadSet as error:
-        return SetFileInfo(
-            file=name,
-            profile="",
-            drive_name="",
-            serial=None,
-            firmware="",
-            author="",
-            saved=None,
-            notes="",
-            count=0,
-            problem=error.message,
-        )
-    return SetFileInfo(
-        file=name,
-        profile=content.profile,
-        drive_name=content.drive_name,
-        serial=content.serial,
-        firmware=content.firmware,
-        author=content.author,
-        saved=content.saved.astimezone(UTC) if content.saved else None,
-        notes=content.notes,
-        count=len(content.rows),
-    )
+def _listed(bench: Bench) -> list[StoredSet]:
+    """Blocks."""
+    problems = bench.sets.take_in()
+    known = [convert_library.stored_set(entry) for entry in bench.sets.entries()]
+    return known + [convert_library.unusable_set(*problem) for problem in problems.items()]
+
+
+async def _info(bench: Bench, name: str) -> StoredSet:
+    entry = await bench.records.store.call(bench.sets.entry, name)
+    return convert_library.stored_set(entry)
 
 
 @router.get("/sets")
-async def list_sets(bench: TheBench) -> list[SetFileInfo]:
-    """Stored parameter sets, newest first; unusable ones say why."""
-    return [_info(bench, name) for name in bench.sets.names()]
+async def list_sets(bench: TheBench) -> list[StoredSet]:
+    """Stored parameter sets, newest first; at the end unusable files, which say why."""
+    return await bench.records.store.call(_listed, bench)
 
 
 @router.post("/drives/{drive_id}/sets", status_code=201)
-async def save_set(bench: TheBench, member: Controlled, request: SaveSetRequest) -> SetFileInfo:
-    """Read the drive's settings and store them."""
+async def save_set(bench: TheBench, member: Controlled, request: SaveSetRequest) -> StoredSet:
+    """Read the drive's settings and store them; ``overwrite`` makes a new version."""
     name = await parameters.save_set(
         member.drive,
         bench.sets,
         request.file,
-        author=request.author,
+        author=request.author or acting_person(),
         notes=request.notes,
         motor_individual=request.include_motor_individual,
         overwrite=request.overwrite,
     )
     bench.journal.add(f"{member.drive.name}: saved {name}", drive=member.drive.id)
-    return _info(bench, name)
+    return await _info(bench, name)
 
 
-def _existing(bench: Bench, file: str) -> bytes:
+async def _existing(bench: Bench, file: str, version: int | None = None) -> bytes:
     try:
-        return bench.sets.read(file)
+        return await bench.records.store.call(bench.sets.read, file, version)
+    except (BadSet, NotFound):
+        raise
     except NotAllowed as error:
+        if error.kind not in ("not-allowed", "not-found"):
+            raise
         raise NotFound(error.message, value=file, remedy=error.remedy) from error
 
 
+async def _parsed(bench: Bench, file: str, version: int | None) -> ParameterSet:
+    return parameter_set.parse(await _existing(bench, file, version), file)
+
+
 @router.get("/sets/{file}", response_class=Response)
-async def download_set(bench: TheBench, file: str) -> Response:
-    """The file itself."""
-    return Response(_existing(bench, file), media_type="application/toml")
+async def download_set(
+    bench: TheBench, file: str, version: Annotated[int | None, Query(ge=1)] = None
+) -> Response:
+    """The file itself, the latest version or another."""
+    return Response(await _existing(bench, file, version), media_type="application/toml")
 
 
 @router.put("/sets/{file}")
 async def upload_set(
     bench: TheBench, file: str, request: Request, overwrite: bool = False
-) -> SetFileInfo:
+) -> StoredSet:
     """Store a file from elsewhere; what is no usable parameter set is refused."""
     data = bytearray()
     async for chunk in request.stream():
         data += chunk
         if len(data) > MAX_BYTES:
             raise BadSet(f"{file} is larger than {MAX_BYTES} bytes", remedy="choose another file")
-    return _info(bench, bench.sets.store(file, bytes(data), overwrite=overwrite))
+    store = bench.records.store
+    name = await store.call(bench.sets.store, file, bytes(data), overwrite=overwrite)
+    return await _info(bench, name)
 
 
 @router.delete("/sets/{file}", status_code=204)
 async def delete_set(bench: TheBench, file: str) -> Response:
-    """Delete a file."""
-    _existing(bench, file)
-    bench.sets.delete(file)
+    """Put a set aside; it can be taken back on the Files page."""
+    await _existing(bench, file)
+    await bench.records.store.call(bench.sets.delete, file)
     return Response(status_code=204)
 
 
@@ -111,6 +110,7 @@ async def diff(
     bench: TheBench,
     member: TheMember,
     file: Annotated[str | None, Query()] = None,
+    version: Annotated[int | None, Query(ge=1, description="of the file")] = None,
     against: Annotated[str | None, Query(pattern=r"^(defaults|drive:.+)$")] = None,
 ) -> Diff:
     """Compare a drive with a file, with the defaults or with another drive (``drive:ID``).
@@ -121,20 +121,77 @@ async def diff(
     if (file is None) == (against is None):
         raise OutOfRange("give either file or against", remedy="choose one thing to compare with")
     if file is not None:
-        _existing(bench, file)
-        content = bench.sets.load(file)
-        rows, label = list(content.rows), file
-        same_profile = content.profile == drive.profile.drive
-        serial = drive.found.serial if drive.found else None
-        known = content.serial is not None and serial is not None
-        same_serial = content.serial == serial if known else None
+        content = await _parsed(bench, file, version)
+        rows, label = list(content.rows), _label(file, version)
+        same_profile, same_serial, warnings = _identity(content, drive)
     elif against == "defaults":
+        warnings = []
         rows, label, same_profile, same_serial = _defaults(drive), "defaults", True, None
     else:
         other = bench.member((against or "").removeprefix("drive:")).drive
+        warnings = []
         rows, label = await _of_drive(other), other.name
         same_profile, same_serial = other.profile.drive == drive.profile.drive, False
-    return await _compare(drive, rows, label, same_profile, same_serial, full=file is not None)
+        if not same_profile:
+            warnings = [_OTHER_FAMILY]
+    ours = await _read(drive, rows, full=file is not None)
+    return Diff(
+        file=label,
+        drive=drive.id,
+        same_profile=same_profile,
+        same_serial=same_serial,
+        warnings=warnings,
+        rows=[convert.difference(row) for row in parameter_set.compare(drive, rows, ours)],
+    )
+
+
+@router.get("/drives/{drive_id}/three-way")
+async def three_way(
+    bench: TheBench,
+    member: TheMember,
+    base: Annotated[str, Query(description="set that both sides come from")],
+    theirs: Annotated[str, Query(description="set whose changes are to be taken over")],
+    base_version: Annotated[int | None, Query(ge=1)] = None,
+    theirs_version: Annotated[int | None, Query(ge=1)] = None,
+) -> ThreeWay:
+    """What changed since a common base, in another set and in the drive, which is read now."""
+    drive = member.drive
+    before = await _parsed(bench, base, base_version)
+    content = await _parsed(bench, theirs, theirs_version)
+    same_profile, same_serial, warnings = _identity(content, drive)
+    if before.profile != content.profile:
+        warnings.append("the base is of another drive family")
+    ours = await _read(drive, content.rows, full=True)
+    return ThreeWay(
+        base=_label(base, base_version),
+        theirs=_label(theirs, theirs_version),
+        drive=drive.id,
+        same_profile=same_profile,
+        same_serial=same_serial,
+        warnings=warnings,
+        rows=[
+            convert_library.triple(row)
+            for row in compare_three(drive, before.rows, content.rows, ours)
+        ],
+    )
+
+
+_OTHER_FAMILY = "of another drive family: nothing of it can be written here"
+
+
+def _label(file: str, version: int | None) -> str:
+    return file if version is None else f"{file} (version {version})"
+
+
+def _identity(content: ParameterSet, drive: Drive) -> tuple[bool, bool | None, list[str]]:
+    """Same family; same drive, None where that cannot be told; and what to warn of."""
+    same_profile = content.profile == drive.profile.drive
+    differing = doubts(content, drive)
+    serial = drive.found.serial if drive.found else None
+    known = content.serial is not None and serial is not None
+    same_drive = False if any(d.other_drive for d in differing) else (True if known else None)
+    warnings = [] if same_profile else [_OTHER_FAMILY]
+    return same_profile, same_drive, warnings + [str(doubt) for doubt in differing]
 
 
 def _defaults(drive: Drive) -> list[Row]:
@@ -148,31 +205,11 @@ async def _of_drive(other: Drive) -> list[Row]:
     return [Row(r.key, r.raw) for r in readings.values() if r.raw is not None]
 
 
-async def _compare(
-    drive: Drive,
-    rows: list[Row],
-    label: str,
-    same_profile: bool,
-    same_serial: bool | None,
-    *,
-    full: bool,
-) -> Diff:
-    wanted = {p.key for p in parameter_set.storable(drive.profile, motor_individual=False)}
-    wanted = wanted if full else set()
-    wanted |= {row.key for row in rows if row.key in drive.profile.by_key}
+async def _read(drive: Drive, rows: Iterable[Row], *, full: bool) -> dict[str, Reading]:
+    """The drive's values of these rows; with ``full`` also of what belongs into a set."""
+    wanted: Collection[str] = set()
+    if full:
+        wanted = {p.key for p in parameter_set.storable(drive.profile, motor_individual=False)}
+    wanted = {*wanted, *(row.key for row in rows if row.key in drive.profile.by_key)}
     keys = sorted(k for k in wanted if not drive.unreachable_why(drive.parameter(k)))
-    ours = await drive.read_many(keys)
-    warnings = []
-    if not same_profile:
-        warnings.append("of another drive family: nothing of it can be written here")
-    if same_serial is False:
-        warnings.append("saved from another drive (serial number differs)")
-    differences: list[Difference] = parameter_set.compare(drive, rows, ours)
-    return Diff(
-        file=label,
-        drive=drive.id,
-        same_profile=same_profile,
-        same_serial=same_serial,
-        warnings=warnings,
-        rows=[convert.difference(row) for row in differences],
-    )
+    return await drive.read_many(keys)

@@ -14,7 +14,7 @@ from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
 
 from backend.audit.chain import Anchor, Verdict, verify
-from backend.audit.facts import Value, stamp
+from backend.audit.facts import Kind, Value, stamp
 from backend.store.audit_tables import AuditEntry, AuditHead
 from backend.store.database import Store
 
@@ -75,7 +75,7 @@ class Event:
     time: datetime
     station: str
     person: str
-    kind: str
+    kind: Kind
     action: str
     axis: str
     target: str

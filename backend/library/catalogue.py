@@ -11,6 +11,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 
 from sqlalchemy import Select, func, select
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, selectinload
 
 from backend.audit.facts import Fact as AuditFact
@@ -27,7 +28,7 @@ from backend.library.entries import (
     Version,
 )
 from backend.store.blobs import BlobFailed, Blobs
-from backend.store.database import Store
+from backend.store.database import DatabaseFailed, Store
 from backend.store.library_tables import Content, Item, Tag
 from backend.store.library_tables import Version as VersionRow
 from drivers.errors import NotAllowed
@@ -83,6 +84,12 @@ class Library:
         with self.store.reading() as session:
             item = _by_name(session, kind, name, station)
             return _loaded(item) if item is not None and item.deleted is None else None
+
+    def all_of(self, kind: Kind) -> list[Entry]:
+        """All entries of a kind that are not deleted, newest first."""
+        query = rows.matching(Query(kinds=(kind,))).order_by(Item.changed.desc(), Item.id.desc())
+        with self.store.reading() as session:
+            return self._entries(session, query)
 
     def versions(self, entry_id: int) -> list[Version]:
         """All versions, newest first.
@@ -140,10 +147,22 @@ class Library:
         Raises:
             StorageFailed: nothing was stored.
         """
+        if len(data) > INLINE:
+            self.blobs.put(data)
+        try:
+            entry, fresh = self._add(kind, name, data, addition)
+        except DatabaseFailed as error:
+            if not isinstance(error.__cause__, IntegrityError):
+                raise
+            # Another station made the same name, or stored the same contents, at this moment.
+            entry, fresh = self._add(kind, name, data, addition)
+        if fresh:
+            self._tell("saved", entry, bytes=len(data))
+        return entry
+
+    def _add(self, kind: Kind, name: str, data: bytes, addition: Addition) -> tuple[Entry, bool]:
         digest = hashlib.sha256(data).hexdigest()
         place = "database" if len(data) <= INLINE else "blob"
-        if place == "blob":
-            self.blobs.put(data)
         now = datetime.now(UTC)
         with self.store.writing() as session:
             item = _by_name(session, kind, name, lock=True)
@@ -165,10 +184,7 @@ class Library:
                 item.changed = now
             item.words = rows.words(item)
             session.flush()
-            entry = _loaded(item)
-        if fresh:
-            self._tell("saved", entry, bytes=len(data))
-        return entry
+            return _loaded(item), fresh
 
     def annotate(
         self, entry_id: int, *, notes: str | None = None, tags: tuple[str, ...] | None = None
@@ -222,6 +238,10 @@ class Library:
             entry = _loaded(item)
         self._tell("taken back", entry)
         return entry
+
+    def told_deleted(self, entry: Entry) -> None:
+        """A file of this station was deleted for good; the audit is told."""
+        self._tell("deleted", entry)
 
     def purge(self, before: datetime) -> list[Entry]:
         """Delete for good what was put aside before this time, with contents nothing else names.

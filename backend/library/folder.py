@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
 from backend import parameter_set
 from backend.files import checked_name, write_atomically
 from backend.parameter_set import SUFFIX, ParameterSet
 from drivers.errors import NotAllowed
+
+
+class SetStore(Protocol):
+    """Where parameter sets are kept. Everything blocks and belongs on a thread."""
+
+    def load(self, name: str) -> ParameterSet:
+        """Read and parse."""
+        ...
+
+    def store(
+        self, name: str, data: bytes, *, overwrite: bool = False, tags: Sequence[str] = ()
+    ) -> str:
+        """Check and store; returns the name."""
+        ...
 
 
 class SetLibrary:
@@ -48,13 +64,16 @@ class SetLibrary:
         """
         return parameter_set.parse(self.read(name), self._path(name).name)
 
-    def store(self, name: str, data: bytes, *, overwrite: bool = False) -> str:
-        """Check and write a file; returns its name.
+    def store(
+        self, name: str, data: bytes, *, overwrite: bool = False, tags: Sequence[str] = ()
+    ) -> str:
+        """Check and write a file; returns its name. A plain folder keeps no ``tags``.
 
         Raises:
             BadSet: the contents are no parameter set; nothing is written.
             NotAllowed: the name exists and ``overwrite`` is False. StorageFailed: disk.
         """
+        del tags
         path = self._path(name)
         parameter_set.parse(data, path.name)
         if path.exists() and not overwrite:

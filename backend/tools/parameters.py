@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -9,11 +10,15 @@ from datetime import UTC, datetime
 from backend import parameter_set
 from backend.drive import Drive
 from backend.jobs import JobResult
-from backend.library import SetLibrary
+from backend.library import SetStore
+from backend.library.identity import doubts
 from backend.parameter_set import ParameterSet
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
 from drivers.link import Progress
 from profiles.schema import Raw
+
+#: Tag of the sets that are made before something is loaded.
+UNDO = "undo"
 
 
 def readable_keys(drive: Drive) -> list[str]:
@@ -37,7 +42,7 @@ async def read_all(drive: Drive, keys: Sequence[str] | None, progress: Progress)
 
 async def save_set(
     drive: Drive,
-    library: SetLibrary,
+    library: SetStore,
     name: str,
     *,
     author: str,
@@ -63,7 +68,7 @@ async def save_set(
     data = parameter_set.dump(
         drive, readings.values(), author=author, notes=notes, saved=datetime.now(UTC)
     )
-    return library.store(name, data, overwrite=overwrite)
+    return await asyncio.to_thread(library.store, name, data, overwrite=overwrite)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,18 +89,22 @@ async def load_set(
     keys: Sequence[str],
     progress: Progress,
     *,
-    library: SetLibrary,
+    library: SetStore,
     accept_other_identity: bool,
+    accept_motor_individual: bool = False,
 ) -> JobResult:
     """Write the chosen rows one by one, each read back, after storing what was there before.
 
-    All rows are checked before the first is written.
+    All rows are checked before the first is written, and the drive is asked who it is.
 
     Raises:
         NotAllowed: another family's or drive's file without consent, or a chosen row that cannot
             be written; nothing was written.
     """
-    _check_identity(drive, content, accept_other_identity)
+    await drive.confirm_identity()
+    other = _check_identity(drive, content, accept_other_identity)
+    if other and not accept_motor_individual:
+        _refuse_motor_individual(drive, keys)
     rows = {row.key: row for row in content.rows}
     chosen: list[tuple[str, Raw]] = []
     for key in keys:
@@ -122,7 +131,12 @@ async def load_set(
     }
 
 
-def _check_identity(drive: Drive, content: ParameterSet, accepted: bool) -> None:
+def _check_identity(drive: Drive, content: ParameterSet, accepted: bool) -> bool:
+    """Whether it is another drive's file, which the person has accepted.
+
+    Raises:
+        NotAllowed: another family's, or another drive's without consent.
+    """
     if content.profile != drive.profile.drive:
         raise NotAllowed(
             f"the file is of a {content.profile} drive, {drive.name} is a {drive.profile.drive}; "
@@ -132,20 +146,37 @@ def _check_identity(drive: Drive, content: ParameterSet, accepted: bool) -> None
             limit=drive.profile.drive,
             remedy="choose a file of the same drive family",
         )
-    serial = drive.found.serial if drive.found else None
-    other = content.serial is not None and serial is not None and content.serial != serial
+    other = [doubt for doubt in doubts(content, drive) if doubt.other_drive]
     if other and not accepted:
         raise NotAllowed(
-            f"the file was saved from the drive with serial number {content.serial}, "
-            f"{drive.name} has {serial}; nothing was written",
+            f"{drive.name}: the file is of another drive: {other[0]}; nothing was written",
             drive=drive.name,
-            value=content.serial,
-            limit=str(serial),
+            value=other[0].theirs,
+            limit=other[0].ours,
             remedy="compare the values, then accept the other drive explicitly",
         )
+    return bool(other)
 
 
-async def _back_up(drive: Drive, library: SetLibrary, keys: Sequence[str]) -> str:
+def _refuse_motor_individual(drive: Drive, keys: Sequence[str]) -> None:
+    """Values of one motor (commutation offset, encoder bias, address) would harm another.
+
+    Raises:
+        NotAllowed: one of the keys is such a value; nothing was written.
+    """
+    for key in keys:
+        parameter = drive.parameter(key)
+        if parameter.motor_individual:
+            raise NotAllowed(
+                f"{drive.name}: {parameter.key} {parameter.name} belongs to the motor that the "
+                "file was saved with; nothing was written",
+                drive=drive.name,
+                parameter=parameter.key,
+                remedy="untick this row, or accept explicitly that the motor is the same",
+            )
+
+
+async def _back_up(drive: Drive, library: SetStore, keys: Sequence[str]) -> str:
     """The undo: what the chosen parameters are now, as a set of its own."""
     readings = await drive.read_many(keys)
     now = datetime.now(UTC)
@@ -153,7 +184,8 @@ async def _back_up(drive: Drive, library: SetLibrary, keys: Sequence[str]) -> st
         drive, readings.values(), author="servodeck", notes="before loading a set", saved=now
     )
     stamp = now.strftime("%Y-%m-%d %H.%M.%S.%f")[:-3]
-    return library.store(f"before load {drive.id} {stamp}", data)
+    name = f"before load {drive.id} {stamp}"
+    return await asyncio.to_thread(library.store, name, data, tags=(UNDO,))
 
 
 async def _write_verified(drive: Drive, key: str, raw: Raw) -> Written:

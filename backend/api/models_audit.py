@@ -1,0 +1,68 @@
+"""Messages of the audit."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from backend.api.models import Message
+
+AuditKind = Literal[
+    "write", "procedure", "motion", "job", "stop", "lease", "login", "account", "invitation",
+    "file", "station", "audit",
+]  # fmt: skip
+AuditValue = int | float | str | bool | None
+
+
+class AuditEvent(Message):
+    """One entry of the audit."""
+
+    number: int
+    time: datetime
+    station: str
+    person: str
+    kind: AuditKind
+    action: str
+    axis: str
+    target: str
+    old: AuditValue = Field(description="raw value before, where it was known")
+    new: AuditValue = Field(description="raw value read back")
+    outcome: str = Field(description="what went wrong; empty for success")
+    detail: dict[str, AuditValue]
+    hash: str
+
+
+class AuditPage(Message):
+    """Entries, newest first. ``next`` is what to give as ``before`` for the ones after them."""
+
+    events: list[AuditEvent]
+    next: int | None
+
+
+class AuditNames(Message):
+    """What can be chosen in a filter."""
+
+    persons: list[str]
+    axes: list[str]
+    stations: list[str]
+    kinds: list[str]
+
+
+class AuditStatus(Message):
+    """Whether events reach the database."""
+
+    problem: str = Field(description="why they do not; empty while they do")
+    pending: int = Field(description="events that wait")
+    database: str = Field(description="its address, without a password")
+
+
+class AuditVerdict(Message):
+    """Outcome of a check of the whole chain."""
+
+    ok: bool
+    entries: int
+    head: str = Field(description="number:hash of the last good entry; note it as an anchor")
+    broken: int | None = Field(description="number of the first entry that is wrong")
+    why: str

@@ -1,0 +1,128 @@
+"""Messages of the library and of comparisons with its versions."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from backend.api.models import Message, Raw, SetFileInfo
+
+LibraryKind = Literal["set", "recording", "measurement", "report"]
+TagText = Annotated[str, Field(min_length=1, max_length=60)]
+
+
+class AxisInfo(Message):
+    """The drive that something was made with."""
+
+    profile: str
+    name: str
+    vendor_id: int | None
+    product_code: int | None
+    revision: int | None
+    serial: int | None
+    firmware: str
+
+
+class VersionInfo(Message):
+    """One state of an entry; never changed."""
+
+    number: int
+    saved: datetime
+    author: str
+    notes: str
+    bytes: int
+    sha256: str = Field(description="empty where the file lies in a station's folder")
+    axis: AxisInfo
+    facts: dict[str, int | float | str | bool | None] = Field(
+        description="what a list shows of this kind: parameters, channels, duration_s …"
+    )
+
+
+class LibraryEntry(Message):
+    """Something of the library."""
+
+    id: int
+    kind: LibraryKind
+    station: str = Field(description="whose folder it lies in; empty where it is in the store")
+    here: bool = Field(description="its contents can be fetched from this station")
+    name: str
+    notes: str
+    tags: list[str]
+    changed: datetime
+    deleted: datetime | None
+    versions: int
+    latest: VersionInfo
+
+
+class LibraryPage(Message):
+    """A page of a search, newest first."""
+
+    entries: list[LibraryEntry]
+    total: int
+    problems: list[str] = Field(description="files that could not be taken into the library")
+
+
+class TagCount(Message):
+    """A tag and how many entries have it."""
+
+    tag: str
+    count: int
+
+
+class LibraryChange(Message):
+    """Change notes or tags; what is left out stays."""
+
+    notes: str | None = Field(default=None, max_length=4000)
+    tags: list[TagText] | None = Field(default=None, max_length=20)
+    deleted: Literal[False] | None = Field(default=None, description="false takes it back")
+
+
+class StoredSet(SetFileInfo):
+    """A stored parameter set with its place in the library."""
+
+    entry: int | None = Field(default=None, description="id in the library")
+    version: int = 0
+    tags: list[str] = Field(default_factory=list)
+
+
+class ThreeWayRow(Message):
+    """One parameter in base, theirs and drive; see ``status``."""
+
+    key: str
+    name: str
+    group: str
+    unit: str
+    base_raw: Raw | None
+    base_value: Raw | None
+    theirs_raw: Raw | None
+    theirs_value: Raw | None
+    drive_raw: Raw | None
+    drive_value: Raw | None
+    status: Literal[
+        "same",
+        "theirs",
+        "drive",
+        "both",
+        "conflict",
+        "not_in_theirs",
+        "not_in_drive",
+        "invalid",
+        "read_only",
+    ] = Field(description="theirs, drive: changed only there; both: to the same; conflict: not")
+    problem: str = ""
+    motor_individual: bool = False
+    selected: bool = Field(description="proposed for writing")
+
+
+class ThreeWay(Message):
+    """Two sets against a drive, read now."""
+
+    base: str
+    theirs: str
+    drive: str
+    same_profile: bool
+    same_serial: bool | None
+    warnings: list[str]
+    rows: list[ThreeWayRow]

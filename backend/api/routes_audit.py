@@ -1,0 +1,154 @@
+"""Routes of the audit: search, export, check."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from datetime import UTC, datetime
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query
+from fastapi.responses import StreamingResponse
+
+from backend.api.context import TheBench
+from backend.api.models_audit import (
+    AuditEvent,
+    AuditKind,
+    AuditNames,
+    AuditPage,
+    AuditStatus,
+    AuditVerdict,
+)
+from backend.audit.chain import Anchor
+from backend.audit.facts import KINDS
+from backend.audit.trail import Event, Filter
+from drivers.errors import OutOfRange
+
+router = APIRouter(prefix="/audit")
+
+Kinds = Annotated[list[AuditKind] | None, Query()]
+Name = Annotated[str, Query(max_length=200)]
+_CHUNK = 200
+
+
+def _filter(
+    kind: list[AuditKind] | None, person: str, axis: str, station: str, words: str,
+    since: datetime | None, until: datetime | None,
+) -> Filter:  # fmt: skip
+    return Filter(
+        kinds=tuple(kind or ()), person=person, axis=axis, station=station, words=words,
+        since=_zoned(since), until=_zoned(until),
+    )  # fmt: skip
+
+
+def _zoned(moment: datetime | None) -> datetime | None:
+    return moment.replace(tzinfo=UTC) if moment is not None and moment.tzinfo is None else moment
+
+
+def _message(event: Event) -> AuditEvent:
+    return AuditEvent(
+        number=event.number, time=event.time, station=event.station, person=event.person,
+        kind=event.kind, action=event.action, axis=event.axis, target=event.target,
+        old=event.old, new=event.new, outcome=event.outcome, detail=event.detail,
+        hash=event.hash,
+    )  # fmt: skip
+
+
+@router.get("")
+async def search_audit(
+    bench: TheBench,
+    kind: Kinds = None,
+    person: Name = "",
+    axis: Name = "",
+    station: Name = "",
+    words: Annotated[str, Query(max_length=200, description="all must occur")] = "",
+    since: datetime | None = None,
+    until: datetime | None = None,
+    before: Annotated[int | None, Query(ge=1, lt=1 << 63)] = None,
+    limit: Annotated[int, Query(ge=1, le=500)] = 100,
+) -> AuditPage:
+    """Entries, newest first."""
+    wanted = _filter(kind, person, axis, station, words, since, until)
+    records = bench.records
+    found = await records.store.call(records.trail.search, wanted, before=before, limit=limit)
+    last = found[-1].number if len(found) == limit else None
+    return AuditPage(events=[_message(event) for event in found], next=last)
+
+
+@router.get("/names")
+async def audit_names(bench: TheBench) -> AuditNames:
+    """What can be chosen in a filter."""
+    found = await bench.records.store.call(bench.records.trail.names)
+    return AuditNames(
+        persons=found["person"], axes=found["axis"], stations=found["station"], kinds=list(KINDS)
+    )
+
+
+@router.get("/status")
+async def audit_status(bench: TheBench) -> AuditStatus:
+    """Whether events reach the database."""
+    return AuditStatus(
+        problem=bench.audit.problem,
+        pending=bench.audit.pending,
+        database=bench.records.store.shown,
+    )
+
+
+@router.get("/verify")
+async def verify_audit(
+    bench: TheBench,
+    anchor: Annotated[
+        str, Query(pattern=r"^(\d{1,18}:[0-9a-f]{64})?$", description="number:hash noted earlier")
+    ] = "",
+) -> AuditVerdict:
+    """Check the whole chain, and that an entry noted earlier is still in it."""
+    number, _, digest = anchor.partition(":")
+    known = Anchor(int(number), digest) if anchor else None
+    verdict = await bench.records.store.call(bench.records.trail.verify, known)
+    return AuditVerdict(
+        ok=verdict.ok, entries=verdict.entries, head=str(verdict.head), broken=verdict.broken,
+        why=verdict.why,
+    )  # fmt: skip
+
+
+@router.get("/export", response_class=StreamingResponse)
+async def export_audit(
+    bench: TheBench,
+    form: Annotated[Literal["csv", "jsonl"], Query(alias="format")] = "csv",
+    kind: Kinds = None,
+    person: Name = "",
+    axis: Name = "",
+    station: Name = "",
+    words: Annotated[str, Query(max_length=200)] = "",
+    since: datetime | None = None,
+    until: datetime | None = None,
+) -> StreamingResponse:
+    """Entries as a table, or as JSON lines with hashes, oldest first."""
+    wanted = _filter(kind, person, axis, station, words, since, until)
+    if wanted.since and wanted.until and wanted.since >= wanted.until:
+        raise OutOfRange("since must be before until", remedy="exchange the two")
+    lines = bench.records.trail.export(wanted, form)
+    store = bench.records.store
+
+    def some() -> str:
+        """Several lines at once: each trip to a thread has its price."""
+        part = []
+        for line in lines:
+            part.append(line)
+            if len(part) >= _CHUNK:
+                break
+        return "".join(part)
+
+    first = await store.call(some)  # an error of the database is still an answer of its own
+
+    async def body() -> AsyncIterator[str]:
+        part = first
+        while part:
+            yield part
+            part = await store.call(some)
+
+    name = f"audit-{datetime.now(UTC):%Y%m%d-%H%M%S}.{form}"
+    return StreamingResponse(
+        body(),
+        media_type="text/csv; charset=utf-8" if form == "csv" else "application/x-ndjson",
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )

@@ -1,0 +1,193 @@
+"""Routes of the library: search, versions, tags, contents."""
+
+from __future__ import annotations
+
+import mimetypes
+from datetime import UTC, datetime
+from typing import Annotated
+from urllib.parse import quote
+
+from fastapi import APIRouter, Query, Response
+from fastapi.responses import FileResponse
+
+from backend.api import convert_library
+from backend.api.context import TheBench
+from backend.api.errors import NotFound
+from backend.api.models_library import (
+    LibraryChange,
+    LibraryEntry,
+    LibraryKind,
+    LibraryPage,
+    TagCount,
+    VersionInfo,
+)
+from backend.api.routes_recordings import TheRecordings
+from backend.bench import Bench
+from backend.library import NotInLibrary
+from backend.library.entries import Entry
+from backend.library.entries import Query as LibraryQuery
+from backend.recording.service import Recordings
+from drivers.errors import NotAllowed
+
+router = APIRouter(prefix="/library")
+
+
+def _entry(bench: Bench, entry_id: int) -> Entry:
+    """Blocks.
+
+    Raises:
+        NotFound: there is none of this id.
+    """
+    try:
+        return bench.records.library.entry(entry_id)
+    except NotInLibrary as error:
+        raise NotFound(error.message, value=entry_id, remedy=error.remedy) from error
+
+
+def _page(bench: Bench, recordings: Recordings, query: LibraryQuery) -> LibraryPage:
+    """Blocks. Everything is brought up to date first: files come and go by other ways too."""
+    records = bench.records
+    problems = list(records.sets.take_in().values())
+    records.index.refresh(recordings.running)
+    entries, total = records.library.search(query)
+    return LibraryPage(
+        entries=[convert_library.entry(entry, records.station) for entry in entries],
+        total=total,
+        problems=problems,
+    )
+
+
+@router.get("")
+async def search_library(
+    bench: TheBench,
+    recordings: TheRecordings,
+    words: Annotated[str, Query(max_length=200, description="all must occur")] = "",
+    kind: Annotated[list[LibraryKind] | None, Query()] = None,
+    tag: Annotated[str, Query(max_length=60)] = "",
+    axis: Annotated[str, Query(max_length=200, description="its name")] = "",
+    profile: Annotated[str, Query(max_length=100)] = "",
+    serial: Annotated[int | None, Query(ge=0, lt=1 << 63)] = None,
+    since: datetime | None = None,
+    until: datetime | None = None,
+    deleted: Annotated[bool, Query(description="only what was put aside")] = False,
+    limit: Annotated[int, Query(ge=1, le=500)] = 100,
+    offset: Annotated[int, Query(ge=0, le=1_000_000)] = 0,
+) -> LibraryPage:
+    """Entries, newest first."""
+    query = LibraryQuery(
+        words=words,
+        kinds=tuple(kind or ()),
+        tag=tag,
+        axis=axis,
+        profile=profile,
+        serial=serial,
+        since=_zoned(since),
+        until=_zoned(until),
+        deleted=deleted,
+        limit=limit,
+        offset=offset,
+    )
+    return await bench.records.store.call(_page, bench, recordings, query)
+
+
+def _zoned(moment: datetime | None) -> datetime | None:
+    return moment.replace(tzinfo=UTC) if moment is not None and moment.tzinfo is None else moment
+
+
+@router.get("/tags")
+async def library_tags(bench: TheBench) -> list[TagCount]:
+    """Tags in use."""
+    found = await bench.records.store.call(bench.records.library.tags)
+    return [TagCount(tag=tag, count=count) for tag, count in found.items()]
+
+
+@router.get("/{entry_id}")
+async def library_entry(bench: TheBench, entry_id: int) -> LibraryEntry:
+    """One entry, also one that was put aside."""
+    entry = await bench.records.store.call(_entry, bench, entry_id)
+    return convert_library.entry(entry, bench.records.station)
+
+
+@router.get("/{entry_id}/versions")
+async def library_versions(bench: TheBench, entry_id: int) -> list[VersionInfo]:
+    """All versions of an entry, newest first."""
+    await bench.records.store.call(_entry, bench, entry_id)
+    found = await bench.records.store.call(bench.records.library.versions, entry_id)
+    return [convert_library.version(version) for version in found]
+
+
+@router.get("/{entry_id}/content", response_class=Response)
+async def library_content(
+    bench: TheBench, entry_id: int, version: Annotated[int | None, Query(ge=1)] = None
+) -> Response:
+    """Contents of a version as a download, the latest by default."""
+    records = bench.records
+    entry = await records.store.call(_entry, bench, entry_id)
+    kind = mimetypes.guess_type(entry.name)[0] or "application/octet-stream"
+    # Never shown in the page's own origin: a report from elsewhere may carry scripts.
+    headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(entry.name)}"}
+    if entry.station == records.station:
+        path = await records.store.call(records.index.path, entry.kind, entry.name)
+        if path is None:
+            raise NotFound(
+                f"{entry.name} is no longer in its folder", value=entry.name,
+                remedy="it was deleted; search again",
+            )  # fmt: skip
+        return FileResponse(path, media_type=kind, headers=headers)
+    try:
+        data = await records.store.call(records.library.content, entry_id, version)
+    except NotInLibrary as error:
+        raise NotFound(error.message, value=version, remedy=error.remedy) from error
+    return Response(data, media_type=kind, headers=headers)
+
+
+@router.patch("/{entry_id}")
+async def change_library_entry(
+    bench: TheBench, recordings: TheRecordings, entry_id: int, change: LibraryChange
+) -> LibraryEntry:
+    """Change notes or tags, or take back what was put aside."""
+
+    def work() -> Entry:
+        records = bench.records
+        entry = _entry(bench, entry_id)
+        tags = tuple(change.tags) if change.tags is not None else None
+        if entry.kind == "recording" and entry.station == records.station:
+            # A recording's remarks lie beside its file, and go with it.
+            recordings.library.annotate(entry.name, notes=change.notes, tags=tags, kept=None)
+        if change.deleted is False:
+            entry = records.library.undelete(entry_id)
+        if change.notes is not None or tags is not None:
+            entry = records.library.annotate(entry_id, notes=change.notes, tags=tags)
+        return entry
+
+    entry = await bench.records.store.call(work)
+    return convert_library.entry(entry, bench.records.station)
+
+
+@router.delete("/{entry_id}", status_code=204)
+async def delete_library_entry(
+    bench: TheBench, recordings: TheRecordings, entry_id: int
+) -> Response:
+    """Put a parameter set or a shared entry aside; delete a file of this station for good."""
+
+    def work() -> None:
+        records = bench.records
+        entry = _entry(bench, entry_id)
+        if entry.station not in ("", records.station):
+            raise NotAllowed(
+                f"{entry.name} lies on station {entry.station}",
+                value=entry.name,
+                remedy="delete it there",
+            )
+        if entry.station == "":
+            records.library.delete(entry_id)
+            return
+        if entry.kind == "recording":
+            recordings.library.delete(entry.name)
+        elif (path := records.index.path(entry.kind, entry.name)) is not None:
+            path.unlink(missing_ok=True)
+        records.library.told_deleted(entry)
+        records.index.refresh(recordings.running)
+
+    await bench.records.store.call(work)
+    return Response(status_code=204)

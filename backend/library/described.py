@@ -1,0 +1,94 @@
+"""What the index says of a recording, a measurement and a report."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+
+from backend import measurements
+from backend.library.entries import Addition, AxisIdentity
+from backend.library.index import Described, Folder
+from backend.recording.chunks import SUFFIX as RECORDING
+from backend.recording.library import RecordingLibrary
+
+_REPORT = re.compile(r"^\d{8}-\d{6}-report-(?P<axis>.+?)(-\d+)?\.\w+$")
+
+
+def folders(state: Path) -> list[Folder]:
+    """The folders of a station that are indexed."""
+    recordings = RecordingLibrary(state / "recordings")
+    return [
+        Folder(
+            "recording", recordings.folder, (RECORDING,),
+            lambda path: _recording(recordings, path), beside=".json",
+        ),
+        Folder("measurement", state / "measurements", (measurements.SUFFIX,), _measurement),
+        Folder("report", state / "reports", (".html", ".pdf"), _report),
+    ]  # fmt: skip
+
+
+def _recording(library: RecordingLibrary, path: Path) -> Described:
+    stored = library.describe(path.name)
+    tags, notes = stored.remarks.tags, stored.remarks.notes
+    if stored.summary is None:
+        return Described(Addition(facts={"problem": stored.problem}), notes, tags)
+    header = stored.summary.header
+    axes = [axis for axis in header.get("axes", []) if isinstance(axis, dict)]
+    return Described(
+        Addition(
+            axis=_axis(axes[0]) if axes else AxisIdentity(),
+            author=str(header.get("person", "")),
+            notes=str(header.get("notes", "")),
+            saved=datetime.fromtimestamp(stored.summary.clock.epoch_s, UTC),
+            facts={
+                "channels": len(stored.summary.channels),
+                "duration_s": round(stored.summary.duration_s, 3),
+                "state": stored.summary.state,
+                "words": stored.words(),
+            },
+        ),
+        notes,
+        (*(str(tag) for tag in header.get("tags", [])), *tags),
+    )
+
+
+def _measurement(path: Path) -> Described:
+    head = measurements.unpack_head(path)
+    identity = head.meta.get("identity")
+    facts = {"measurement": head.kind, "words": f"{head.kind} {head.drive}"}
+    axis = dict(identity) if isinstance(identity, dict) else {}
+    axis |= {"name": head.drive, "profile": head.meta.get("profile")}
+    return Described(
+        Addition(
+            axis=_axis(axis), author=str(head.meta.get("person") or ""),
+            notes=str(head.meta.get("notes") or ""),
+            saved=head.saved.astimezone(UTC), facts=facts,
+        )
+    )  # fmt: skip
+
+
+def _report(path: Path) -> Described:
+    named = _REPORT.match(path.name)
+    axis = AxisIdentity(name=named["axis"] if named else "")
+    return Described(Addition(axis=axis, facts={"format": path.suffix.removeprefix(".")}))
+
+
+def _axis(facts: Mapping[str, object]) -> AxisIdentity:
+    """An identity as headers of files have it; what is no number there is left out."""
+
+    def number(name: str) -> int | None:
+        value = facts.get(name)
+        known = isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 1 << 63
+        return value if known and isinstance(value, int) else None
+
+    return AxisIdentity(
+        profile=str(facts.get("profile") or ""),
+        name=str(facts.get("name") or ""),
+        vendor_id=number("vendor_id"),
+        product_code=number("product_code"),
+        revision=number("revision"),
+        serial=number("serial"),
+        firmware=str(facts.get("firmware") or ""),
+    )

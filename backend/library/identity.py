@@ -1,0 +1,53 @@
+"""Whether a set was made with the drive that it is to be written to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from backend.drive import Drive
+from backend.parameter_set import ParameterSet
+
+What = Literal["vendor", "product", "serial", "revision", "firmware"]
+#: What makes it another drive: writing needs consent. The others are only told.
+_OTHER_DRIVE = frozenset({"vendor", "product", "serial"})
+_WORDS: dict[What, str] = {
+    "vendor": "vendor id", "product": "product code", "serial": "serial number",
+    "revision": "revision", "firmware": "firmware",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """Something of the identity that differs. ``other_drive``: it is another one for certain."""
+
+    what: What
+    theirs: str
+    ours: str
+
+    @property
+    def other_drive(self) -> bool:
+        """Whether writing needs consent."""
+        return self.what in _OTHER_DRIVE
+
+    def __str__(self) -> str:
+        return f"it was saved from {_WORDS[self.what]} {self.theirs}, this drive has {self.ours}"
+
+
+def doubts(content: ParameterSet, drive: Drive) -> list[Doubt]:
+    """What differs of what both sides know, the gravest first (CiA 301, object 1018h)."""
+    found = drive.found
+    if found is None:
+        return []
+    pairs: list[tuple[What, object, object]] = [
+        ("vendor", content.vendor_id, found.vendor_id),
+        ("product", content.product_code, found.product_code),
+        ("serial", content.serial, found.serial),
+        ("revision", content.revision, found.revision),
+        ("firmware", content.firmware or None, found.firmware or None),
+    ]
+    return [
+        Doubt(what, str(theirs), str(ours))
+        for what, theirs, ours in pairs
+        if theirs is not None and ours is not None and theirs != ours
+    ]

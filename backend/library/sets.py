@@ -1,0 +1,154 @@
+"""Parameter sets in the library, by name; and the folder from which plain files are taken in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC
+from pathlib import Path
+
+from backend import parameter_set
+from backend.files import StorageFailed, checked_name
+from backend.library.catalogue import Library
+from backend.library.entries import Addition, AxisIdentity, Entry
+from backend.parameter_set import SUFFIX, BadSet, ParameterSet
+from drivers.errors import NotAllowed
+
+_TAKEN = "imported"
+
+
+def addition_of(content: ParameterSet, *, tags: Sequence[str] = ()) -> Addition:
+    """What the library keeps of a set beside its text."""
+    return Addition(
+        axis=AxisIdentity(
+            profile=content.profile,
+            name=content.drive_name,
+            vendor_id=content.vendor_id,
+            product_code=content.product_code,
+            revision=content.revision,
+            serial=content.serial,
+            firmware=content.firmware,
+        ),
+        author=content.author,
+        notes=content.notes,
+        saved=content.saved.astimezone(UTC) if content.saved else None,
+        facts={"parameters": len(content.rows)},
+        tags=tuple(tags),
+    )
+
+
+class LibrarySets:
+    """Sets of the library under their file names (``….sdset``). All of it blocks.
+
+    Files that lie in ``folder`` (from an earlier version, or put there by hand) are taken in when
+    sets are listed, and then lie in its sub-folder ``imported``; those that are no sets stay.
+    """
+
+    def __init__(self, library: Library, folder: Path) -> None:
+        self.library = library
+        self.folder = folder
+
+    def names(self) -> list[str]:
+        """Names, newest first; at their end those of files that cannot be taken in."""
+        problems = self.take_in()
+        return [entry.name for entry in self.entries()] + sorted(problems)
+
+    def entries(self) -> list[Entry]:
+        """Sets that are not deleted, newest first."""
+        return self.library.all_of("set")
+
+    def entry(self, name: str) -> Entry:
+        """The set of this name.
+
+        Raises:
+            NotAllowed: there is none.
+        """
+        name = checked_name(name, SUFFIX)
+        entry = self.library.named("set", name)
+        if entry is None:
+            raise NotAllowed(
+                f"there is no parameter set {name}",
+                value=name,
+                remedy="choose one from the Files page",
+            )
+        return entry
+
+    def read(self, name: str, number: int | None = None) -> bytes:
+        """Contents of a version, the latest by default.
+
+        Raises:
+            NotAllowed: no such set or version. BlobFailed: damaged.
+        """
+        path = self.folder / checked_name(name, SUFFIX)
+        if self.library.named("set", path.name) is None and path.is_file():
+            return path.read_bytes()  # one that cannot be taken in
+        return self.library.content(self.entry(name).id, number)
+
+    def load(self, name: str, number: int | None = None) -> ParameterSet:
+        """Read and parse.
+
+        Raises:
+            NotAllowed: no such set or version. BadSet: not usable.
+        """
+        return parameter_set.parse(self.read(name, number), checked_name(name, SUFFIX))
+
+    def store(
+        self, name: str, data: bytes, *, overwrite: bool = False, tags: Sequence[str] = ()
+    ) -> str:
+        """Check and store a new set, or with ``overwrite`` a new version; returns its name.
+
+        Raises:
+            BadSet: the contents are no parameter set. NotAllowed: the name exists and
+            ``overwrite`` is False. StorageFailed: disk or database. Nothing is stored then.
+        """
+        name = checked_name(name, SUFFIX)
+        content = parameter_set.parse(data, name)
+        if not overwrite and self.library.named("set", name) is not None:
+            raise NotAllowed(
+                f"{name} exists already",
+                value=name,
+                remedy="choose another name, or allow a new version of it",
+            )
+        return self.library.add("set", name, data, addition_of(content, tags=tags)).name
+
+    def delete(self, name: str) -> None:
+        """Put a set aside.
+
+        Raises:
+            NotAllowed: there is none of this name.
+        """
+        path = self.folder / checked_name(name, SUFFIX)
+        if self.library.named("set", path.name) is None and path.is_file():
+            path.unlink()
+            return
+        self.library.delete(self.entry(name).id)
+
+    def take_in(self) -> dict[str, str]:
+        """Take in the files of the folder; returns those that cannot be, and why.
+
+        A file is moved after its contents are stored: a crash between stores nothing twice.
+        """
+        problems: dict[str, str] = {}
+        for path in sorted(self.folder.glob(f"*{SUFFIX}"), key=lambda p: p.stat().st_mtime):
+            if path.name.startswith("."):
+                continue
+            try:
+                data = path.read_bytes()
+                name = checked_name(path.name, SUFFIX)
+                self.library.add("set", name, data, addition_of(parameter_set.parse(data, name)))
+                _put_aside(path)
+            except StorageFailed:
+                raise
+            except (BadSet, NotAllowed) as error:
+                problems[path.name] = error.message
+            except OSError as error:
+                problems[path.name] = f"{path.name} cannot be read: {error.strerror}"
+        return problems
+
+
+def _put_aside(path: Path) -> None:
+    folder = path.parent / _TAKEN
+    folder.mkdir(exist_ok=True)
+    goal, number = folder / path.name, 2
+    while goal.exists():
+        goal, number = folder / f"{path.stem} {number}{path.suffix}", number + 1
+    path.rename(goal)

@@ -1,0 +1,71 @@
+"""Three-way comparison: what changed since a common base, there and in the drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from backend.drive import Drive, Reading
+from backend.parameter_set import Row, compare
+from profiles.schema import Parameter, Raw
+
+Status = Literal[
+    "same", "theirs", "drive", "both", "conflict",
+    "not_in_theirs", "not_in_drive", "invalid", "read_only",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Triple:
+    """One parameter in base, theirs and drive; raw values, None where absent.
+
+    ``theirs``: changed only there. ``drive``: changed only in the drive. ``both``: changed to the
+    same. ``conflict``: changed differently, or the base does not know it; a person must choose.
+    """
+
+    parameter: Parameter | None
+    key: str
+    base: Raw | None
+    theirs: Raw | None
+    ours: Raw | None
+    status: Status
+    problem: str = ""
+    selected: bool = False
+
+
+def three_way(
+    drive: Drive, base: Iterable[Row], theirs: Iterable[Row], ours: dict[str, Reading]
+) -> list[Triple]:
+    """Rows of two sets against readings of the drive. Only clear changes there are selected."""
+    before = {row.key: row.raw for row in base}
+    result = []
+    for row in compare(drive, theirs, ours):
+        known = before.get(row.key)
+        status: Status
+        match row.status:
+            case "same":
+                status = "same" if known is None or known == row.theirs else "both"
+            case "differs" if known is not None and known == row.ours:
+                status = "theirs"
+            case "differs" if known is not None and known == row.theirs:
+                status = "drive"
+            case "differs":
+                status = "conflict"
+            case "not_in_file":
+                status = "not_in_theirs"
+            case other:
+                status = other
+        result.append(
+            Triple(
+                row.parameter,
+                row.key,
+                known,
+                row.theirs,
+                row.ours,
+                status,
+                row.problem,
+                selected=row.selected and status == "theirs",
+            )
+        )
+    return result

@@ -1,0 +1,62 @@
+"""What a station keeps: the database with library and audit, and the folders beside it."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from pathlib import Path
+
+from backend.audit import AuditLog
+from backend.audit.trail import Trail
+from backend.journal import Journal
+from backend.library import Library, LibrarySets
+from backend.library.described import folders
+from backend.library.index import Index
+from backend.store import DatabaseFailed, Store
+from backend.store.blobs import Blobs
+
+
+class Records:
+    """Database, audit and library of one station. Making it touches nothing.
+
+    ``database`` and ``blobs`` are URLs (see docs/library.md); None means the state folder.
+    """
+
+    def __init__(
+        self, folder: Path, journal: Journal, database: str | None = None, blobs: str | None = None
+    ) -> None:
+        self.station = socket.gethostname()
+        self.store = Store(folder, database)
+        self.audit = AuditLog(self.store, self.station, changed=self._audit_changed)
+        self.trail = Trail(self.store)
+        self.library = Library(self.store, Blobs(blobs or str(folder / "blobs")), self.audit.add)
+        self.sets = LibrarySets(self.library, folder / "sets")
+        self.index = Index(self.store, self.station, folders(folder))
+        self._journal = journal
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    async def open(self) -> None:
+        """Open the database and take up what was left over. A station without it still works:
+        drives are moved and stopped, and what needs the database says what is wrong with it.
+        """
+        self._loop = asyncio.get_running_loop()
+        self.audit.start()
+        try:
+            await self.store.call(self.sets.take_in)
+        except DatabaseFailed as error:
+            self._journal.add(error.message, level="error")
+
+    async def close(self) -> None:
+        """Write down what is left."""
+        self._loop = None
+        await asyncio.to_thread(self.audit.close)
+        await asyncio.to_thread(self.store.close)
+
+    def _audit_changed(self, problem: str) -> None:
+        """Called on the audit's thread."""
+        loop = self._loop
+        if loop is not None and not loop.is_closed():
+            text = f"the audit waits: {problem}" if problem else "the audit is up to date again"
+            loop.call_soon_threadsafe(
+                lambda: self._journal.add(text, level="error" if problem else "info")
+            )
