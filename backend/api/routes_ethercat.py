@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable, Coroutine
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -25,7 +26,8 @@ from backend.bench import Bench, Member
 from backend.jobs import JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
-from drivers.ethercat import permissions
+from drivers.ethercat import firmware, permissions
+from drivers.ethercat.al_status import AlState
 from drivers.ethercat.link import EthercatLink
 from drivers.ethercat.survey import ExchangeFigures, Survey, SurveyedStation
 
@@ -139,6 +141,9 @@ async def load_firmware(
     request: Request,
     file: Annotated[str, Query(min_length=1, max_length=100, description="name for the drive")],
     password: Annotated[int, Query(ge=0, le=0xFFFFFFFF)] = 0,
+    state: Annotated[
+        firmware.Where, Query(description="auto: in BOOT where the drive has it, else in PREOP")
+    ] = "auto",
     confirmed: Annotated[bool, Query()] = False,
     connection: Connection = None,
 ) -> JobInfo:
@@ -150,16 +155,15 @@ async def load_firmware(
     _require_calm(bench, link, connection)
     _require_confirmed(confirmed, _FIRMWARE_WARNING)
     data = await _body(request, file)
-    await member.drive.confirm_identity()
-    if await member.axis.state() in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
-        raise NotAllowed(
-            f"{member.drive.name} is enabled", drive=member.drive.name, remedy="disable it first"
-        )
+    await _require_loadable(member, link, station)
 
     async def work(progress: Progress) -> JobResult:
-        await _to_the_end(link, station, file, data, password, progress)
+        def load(tell: Callable[[float, str], None]) -> Coroutine[None, None, str]:
+            return link.load_firmware(station, file, data, tell, password=password, where=state)
+
+        where = await _to_the_end(load, progress)
         bench.journal.add(f"{member.drive.name}: {file} loaded", drive=member.drive.id)
-        return {"bytes": len(data), "file": file}
+        return {"bytes": len(data), "file": file, "state": where}
 
     title = f"Load firmware {file} into {member.drive.name}"
     job = bench.jobs.start(
@@ -169,18 +173,40 @@ async def load_firmware(
     return convert.job(job)
 
 
+async def _require_loadable(member: Member, link: EthercatLink, station: int) -> None:
+    """The drive is the one that was connected, and not enabled.
+
+    A drive without valid firmware stays in INIT or BOOT: it cannot be enabled, and only its
+    EEPROM tells which it is.
+    """
+    drive = member.drive
+    seen = next((s for s in (await link.survey()).stations if s.station == station), None)
+    if seen is not None and seen.al & 0x0F in (AlState.INIT, AlState.BOOT):
+        known = drive.found
+        told = (seen.vendor_id, seen.product_code)
+        expected = (known.vendor_id, known.product_code) if known else told
+        if told != expected and None not in expected:
+            raise NotAllowed(
+                f"{drive.name}: another drive answers at station {station}",
+                drive=drive.name,
+                remedy="check the cables, then scan",
+            )
+        return
+    await drive.confirm_identity()
+    if await member.axis.state() in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
+        raise NotAllowed(f"{drive.name} is enabled", drive=drive.name, remedy="disable it first")
+
+
 async def _to_the_end(
-    link: EthercatLink, station: int, file: str, data: bytes, password: int, progress: Progress
-) -> None:
+    load: Callable[[Callable[[float, str], None]], Coroutine[None, None, str]], progress: Progress
+) -> str:
     """Load, and do not let a cancellation leave the drive with half a file."""
     words = ""
 
     def tell(share: float, text: str) -> None:
         progress(share, words + text)
 
-    loading = asyncio.ensure_future(
-        link.load_firmware(station, file, data, tell, password=password)
-    )
+    loading = asyncio.ensure_future(load(tell))
     while not loading.done():
         try:
             await asyncio.shield(loading)
@@ -189,7 +215,7 @@ async def _to_the_end(
                 raise
             words = "not cancelled, the drive would be left without firmware: "
             progress(progress.fraction, words + "wait for the end")
-    loading.result()
+    return loading.result()
 
 
 async def _body(request: Request, file: str) -> bytes:

@@ -8,6 +8,9 @@ from collections.abc import Callable
 from drivers.errors import DriveError, ProtocolError, Rejected
 from drivers.ethercat.mailbox import FOE, Mail, Mailbox, Pause, Steps
 
+ERASE_S, PACKET_S = 30.0, 10.0
+"""Drives that erase their memory first, or check the whole file at the end, take their time."""
+
 _WRITE, _DATA, _ACK, _ERROR, _BUSY = 2, 3, 4, 5, 6
 
 _ERRORS = {
@@ -39,17 +42,18 @@ def write_file(
     *,
     password: int,
     on_progress: Callable[[int], None],
-    timeout_s: float = 10.0,
 ) -> Steps[None]:
     """Send ``data`` as file ``name``; ``on_progress`` gets the number of bytes taken so far.
 
     Raises:
         Rejected: the drive refused, with its error code and text.
         LinkTimeout, LinkLost: the transfer broke off; the file in the drive is unusable.
+
+    The drive may take `ERASE_S` for the first and the last answer, `PACKET_S` for the others.
     """
     request = struct.pack("<BxI", _WRITE, password) + name.encode("ascii", "replace")
     room = box.payload_size - 6
-    yield from _until_acknowledged(box, request, 0, timeout_s)
+    yield from _until_acknowledged(box, request, 0, ERASE_S)
     sent = 0
     packet = 0
     while True:
@@ -57,6 +61,7 @@ def write_file(
         part = data[sent : sent + room]
         packet += 1
         mail = struct.pack("<BxI", _DATA, packet) + part
+        timeout_s = PACKET_S if len(part) == room else ERASE_S
         yield from _until_acknowledged(box, mail, packet, timeout_s)
         sent += len(part)
         on_progress(sent)

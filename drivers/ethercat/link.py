@@ -14,7 +14,7 @@ from typing import Any
 from drivers import cia402
 from drivers.codec import size_of
 from drivers.errors import DriveError, NotAllowed, ProtocolError
-from drivers.ethercat import coe, permissions
+from drivers.ethercat import coe, firmware, permissions
 from drivers.ethercat.al_status import AlState
 from drivers.ethercat.hostprocess import HostProcess
 from drivers.ethercat.protocol import Message, error_from_wire
@@ -253,14 +253,25 @@ class EthercatLink:
         await self._call({"op": "alias", "station": station, "alias": alias}, _ANSWER_S)
 
     async def load_firmware(
-        self, station: int, name: str, data: bytes, progress: Progress, *, password: int = 0
-    ) -> None:
-        """Send a file by FoE. An interrupted download can leave a drive without firmware.
+        self,
+        station: int,
+        name: str,
+        data: bytes,
+        progress: Progress,
+        *,
+        password: int = 0,
+        where: firmware.Where = "auto",
+    ) -> str:
+        """Send a file by FoE and bring the drive back to PREOP; see `firmware.load`.
 
-        The station must be in the state that its manual asks for (PREOP, or BOOT).
+        An interrupted download can leave a drive without firmware. Returns the state in which
+        the drive took the file: BOOT, or PREOP where it has no BOOT.
         """
         message = {"op": "foe", "station": station, "name": name, "data": data}
-        await self._call(message | {"password": password}, _FOE_S, progress=progress)
+        message |= {"password": password, "where": where}
+        answer: Message = await self._call(message, _FOE_S, progress=progress)
+        state: str = answer["state"]
+        return state
 
     def permissions(self) -> permissions.Permissions:
         """What is missing on the interface, with the commands that grant it."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
@@ -11,7 +10,7 @@ from typing import Any
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed, OutOfRange, ProtocolError
-from drivers.ethercat import coe, esc, foe, sii
+from drivers.ethercat import coe, esc, firmware, sii
 from drivers.ethercat import station as transactions
 from drivers.ethercat.al_status import AlState, state_name
 from drivers.ethercat.cyclic import CyclicLoop
@@ -144,12 +143,14 @@ class Operations:
     # Parameters ----------------------------------------------------------------------------
 
     def _read(self, message: Message, done: Done) -> None:
-        station = self.roster.station(message)
+        station = self._calm_station(message)
+        station.require_parameters()
         steps = coe.upload(station.box, message["index"], message["subindex"])
         self.lanes.submit(station.number, "mailbox", steps, done)
 
     def _read_many(self, message: Message, done: Done) -> None:
-        station = self.roster.station(message)
+        station = self._calm_station(message)
+        station.require_parameters()
         items = [tuple(item) for item in message["items"]]
         steps = transactions.read_items(station, items, lambda _count: None)
 
@@ -162,16 +163,12 @@ class Operations:
         self.lanes.submit(station.number, "mailbox", steps, finished)
 
     def _write(self, message: Message, done: Done) -> None:
-        station = self.roster.station(message)
+        station = self._calm_station(message)
+        station.require_parameters()
         index, subindex, data = message["index"], message["subindex"], message["data"]
         if self.roster.exchange.route_write(station.number, index, subindex, data):
             done(None, None)
             return
-        if station.number in self._loading:
-            raise Busy(
-                f"station {station.number} is being loaded with firmware and cannot move",
-                remedy="wait for the end of the download",
-            )
         if (index, subindex) == (_CONTROL_WORD, 0) and cia402.stops(_word(data)):
             station.box.stopping = True
             steps = coe.stop_write(station.box, index, subindex, data)
@@ -181,7 +178,8 @@ class Operations:
         self.lanes.submit(station.number, "mailbox", steps, done, Urgency.WRITE)
 
     def _enumerate(self, message: Message, done: Done) -> None:
-        station = self.roster.station(message)
+        station = self._calm_station(message)
+        station.require_parameters()
 
         def progress(number: int, total: int) -> None:
             self._progress(message, number / max(total, 1), f"object {number} of {total}")
@@ -204,7 +202,7 @@ class Operations:
     # State, ports, alias, firmware ---------------------------------------------------------
 
     def _state(self, message: Message, done: Done) -> None:
-        station = self.roster.station(message)
+        station = self._calm_station(message)
         if self.loop is not None:
             raise Busy("the cyclic exchange owns the states", remedy="stop it first")
         target = AlState[message["state"]]
@@ -260,45 +258,58 @@ class Operations:
         self.lanes.submit(station.number, "register", transactions.clear_ports(station), done)
 
     def _alias(self, message: Message, done: Done) -> None:
-        station = self.roster.station(message)
+        station = self._calm_station(message)
         alias = int(message["alias"])
         if not 0 <= alias <= 0xFFFF:
             raise OutOfRange(f"{alias} is no alias", value=alias, limit="0…65535")
         if self.loop is not None:
             raise Busy("the segment is busy", remedy="stop the cyclic exchange first")
-        slave = self.segment.slaves[station.number - 1]
-        self._ring.host_lives_until(time.monotonic_ns() + 10_000_000_000, "writing the alias")
-        words = bytearray(b"".join(slave.eeprom_read(word)[:2] for word in range(sii.CONFIG_WORDS)))
-        words[2 * sii.ALIAS_WORD : 2 * sii.ALIAS_WORD + 2] = struct.pack("<H", alias)
-        slave.eeprom_write(sii.ALIAS_WORD, struct.pack("<H", alias))
-        slave.eeprom_write(sii.CHECKSUM_WORD, struct.pack("<H", sii.checksum(bytes(words))))
-        told = int.from_bytes(slave.eeprom_read(sii.ALIAS_WORD)[:2], "little")
-        self.segment.forget_errors()
-        if told != alias:
-            raise ProtocolError(f"the alias reads back as {told}, {alias} was written")
-        self.roster.new_aliases.add(station.number)
-        done({"alias": told}, None)
+
+        def ended(told: int | None, error: DriveError | None) -> None:
+            if error is None and told != alias:
+                error = ProtocolError(f"the alias reads back as {told}, {alias} was written")
+            if error is None:
+                self.roster.new_aliases.add(station.number)
+            done({"alias": told}, error)
+
+        steps = sii.write_alias(alias, time.monotonic)
+        self.lanes.submit(station.number, "register", steps, ended)
 
     def _foe(self, message: Message, done: Done) -> None:
-        station = self.roster.station(message)
+        station = self._calm_station(message)
         if self.loop is not None:
             raise Busy("the cyclic exchange runs", remedy="stop it before loading firmware")
-        data: bytes = message["data"]
 
-        def progress(sent: int) -> None:
-            share = sent / max(len(data), 1)
-            self._progress(message, share, f"{sent} of {len(data)} bytes: do not switch off")
-
-        steps = foe.write_file(
-            station.box, message["name"], data, password=message["password"], on_progress=progress
-        )
-
-        def ended(result: object, error: DriveError | None) -> None:
+        def ended(where: str | None, error: DriveError | None) -> None:
             self._loading.discard(station.number)
-            done(result, error)
+            done({"state": where}, error)
 
+        steps = firmware.load(
+            station,
+            message["name"],
+            message["data"],
+            password=message["password"],
+            where=message["where"],
+            managers=self.roster.managers(station.number),
+            clock=time.monotonic,
+            tell=lambda share, text: self._progress(message, share, text),
+        )
         self._loading.add(station.number)
         self.lanes.submit(station.number, "mailbox", steps, ended)
+
+    def _calm_station(self, message: Message) -> Station:
+        """The station a message is about.
+
+        Raises:
+            Busy: firmware is being loaded into it.
+        """
+        station = self.roster.station(message)
+        if station.number in self._loading:
+            raise Busy(
+                f"station {station.number} is being loaded with firmware and cannot move",
+                remedy="wait for the end of the download",
+            )
+        return station
 
     # Cyclic --------------------------------------------------------------------------------
 

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 
 from drivers.errors import Busy, DriveError, LinkLost
-from drivers.ethercat import sii
 from drivers.ethercat import station as transactions
 from drivers.ethercat.al_status import ERROR_BIT, AlState, al_status_text, state_name
 from drivers.ethercat.exchange import Exchange
@@ -21,6 +20,7 @@ from drivers.ethercat.station import Station
 
 _FIND_S, _WATCH_S, _REOPEN_S = 30.0, 0.25, 1.0
 _MIN_MAILBOX = 16
+_FIND_TRIES = 5
 
 Send = Callable[[Message], None]
 
@@ -81,9 +81,11 @@ class Roster:
             return
         self._next_open = now + _REOPEN_S
         before = len(self.stations)
+        self._search_due = False
         self.attach_and_identify()
-        if len(self.stations) == before:
-            self._search_due = False
+        if len(self.stations) != before:
+            self._search_due = True
+        elif not self._search_due:
             for number in self.new_aliases:
                 self.event("back", number, f"station {number} was switched on again")
             self.new_aliases.clear()
@@ -219,10 +221,14 @@ class Roster:
     def _make_station(self, number: int) -> Station:
         slave = self.segment.slaves[number - 1]
         station = Station(number, slave.man, slave.id, slave.rev, slave.name)
-        serial = int.from_bytes(slave.eeprom_read(sii.SERIAL_WORD), "little")
-        station.serial = serial or None
-        managers = self.segment.read(number, 0x800, 16)
-        if managers is not None:
+        managers = None
+        for _ in range(_FIND_TRIES):
+            managers = managers or self.segment.read(number, 0x800, 16)
+        if managers is None:
+            # Not a device without mailbox: one that does not answer. It is taken up when it does.
+            self._search_due = True
+            station.notes.append("it did not answer while it was being found")
+        else:
             self._managers[number] = managers
             out_at, out_size, in_at, in_size = struct.unpack("<HH4xHH4x", managers)
             if min(out_size, in_size) >= _MIN_MAILBOX:
@@ -230,6 +236,10 @@ class Roster:
                     out_at, out_size, in_at, in_size, time.monotonic, self._emergency(number)
                 )
         return station
+
+    def managers(self, number: int) -> bytes:
+        """Registers of the sync managers 0 and 1 of a station in PREOP."""
+        return self._managers[number]
 
     def station(self, message: Message) -> Station:
         """The station a message is about; searches the segment if that was not done yet."""

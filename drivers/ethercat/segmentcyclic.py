@@ -291,6 +291,7 @@ class EthercatCyclic:
 
     async def _forget(self) -> None:
         self._wanted = False
+        self._played.clear()
         await self._recovery.end()
 
     def _raise_if_halted(self, station: int) -> None:

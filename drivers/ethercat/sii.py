@@ -1,12 +1,39 @@
-"""The slave information interface (EEPROM): identity words and their checksum.
+"""The slave information interface (EEPROM): access, identity words, checksum.
 
-Source: ETG.1000.6 clause 5.4 and table 16 (word addresses), ETG.2010.
+Transactions of steps; no I/O. While the master reads, the EEPROM is taken from the slave's own
+processor, and always given back: some drives refuse states without it (AL status 0050h).
+Source: ETG.1000.4 clause 6.4 (registers 0500h to 0508h), ETG.1000.6 clause 5.4 and ETG.2010.
 """
 
 from __future__ import annotations
 
-ALIAS_WORD, CHECKSUM_WORD, SERIAL_WORD = 0x0004, 0x0007, 0x000E
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError
+from drivers.ethercat.mailbox import Pause, Read, Steps, Write
+
+ALIAS_WORD, CHECKSUM_WORD, SERIAL_WORD, BOOT_WORD = 0x0004, 0x0007, 0x000E, 0x0014
 CONFIG_WORDS = 7
+
+_OWNER, _CONTROL, _DATA = 0x500, 0x502, 0x508
+_READ, _WRITE, _ENABLE_WRITE = 0x0100, 0x0200, 0x0001
+_BUSY, _FAILED = 0x8000, 0x6000
+_TAKE, _MASTER, _SLAVE = b"\x02", b"\x00", b"\x01"
+_TIMEOUT_S, _POLL_S = 0.5, 0.0005
+_TRIES = 3
+_LEAST_MAILBOX, _RAM = 16, 0x1000
+
+
+@dataclass(frozen=True, slots=True)
+class BootMailbox:
+    """Where the mailboxes are in BOOT, seen from the slave: ``out`` is what it receives."""
+
+    out_address: int
+    out_size: int
+    in_address: int
+    in_size: int
 
 
 def checksum(words: bytes) -> int:
@@ -20,3 +47,91 @@ def checksum(words: bytes) -> int:
         for _ in range(8):
             crc = (crc << 1 ^ 0x07) & 0xFF if crc & 0x80 else crc << 1
     return crc
+
+
+def read(word: int, count: int, clock: Callable[[], float]) -> Steps[bytes]:
+    """``count`` words from ``word``; two at a time, as every controller can.
+
+    Raises:
+        LinkTimeout: the EEPROM stays busy. LinkLost: the station does not answer.
+        ProtocolError: the controller reports an error.
+    """
+    data = bytearray()
+    yield from _take()
+    try:
+        for place in range(word, word + count, 2):
+            yield from _command(_READ, place, clock)
+            data += yield from _register(_DATA, 4)
+    except DriveError:
+        yield Write(_OWNER, _SLAVE)
+        raise
+    yield Write(_OWNER, _SLAVE)
+    return bytes(data[: 2 * count])
+
+
+def write(word: int, value: int, clock: Callable[[], float]) -> Steps[None]:
+    """Write one word; errors as `read`."""
+    yield from _take()
+    try:
+        yield from _ready(clock)
+        yield Write(_DATA, struct.pack("<H", value))
+        yield from _command(_WRITE | _ENABLE_WRITE, word, clock)
+    except DriveError:
+        yield Write(_OWNER, _SLAVE)
+        raise
+    yield Write(_OWNER, _SLAVE)
+
+
+def write_alias(alias: int, clock: Callable[[], float]) -> Steps[int]:
+    """Write the alias and the checksum that goes with it; returns what reads back."""
+    words = bytearray((yield from read(0, CONFIG_WORDS, clock)))
+    struct.pack_into("<H", words, 2 * ALIAS_WORD, alias)
+    yield from write(ALIAS_WORD, alias, clock)
+    yield from write(CHECKSUM_WORD, checksum(bytes(words)), clock)
+    return int.from_bytes((yield from read(ALIAS_WORD, 1, clock)), "little")
+
+
+def boot_mailbox(clock: Callable[[], float]) -> Steps[BootMailbox | None]:
+    """The mailboxes of BOOT; None where the slave names none."""
+    told = BootMailbox(*struct.unpack("<HHHH", (yield from read(BOOT_WORD, 4, clock))))
+    sane = min(told.out_size, told.in_size) >= _LEAST_MAILBOX and told.out_address >= _RAM
+    return told if sane and 0xFFFF not in (told.out_size, told.in_size) else None
+
+
+def _take() -> Steps[None]:
+    """From the slave's processor, by force: one that was switched off holds it for ever."""
+    yield Write(_OWNER, _TAKE)
+    yield Write(_OWNER, _MASTER)
+
+
+def _command(command: int, word: int, clock: Callable[[], float]) -> Steps[None]:
+    yield from _ready(clock)
+    yield Write(_CONTROL, struct.pack("<HI", command, word))
+    status = yield from _ready(clock)
+    if status & _FAILED:
+        raise ProtocolError(
+            f"the drive's EEPROM refuses word {word:#06x} (status {status:#06x})",
+            remedy="switch the drive off and on and try again",
+        )
+
+
+def _ready(clock: Callable[[], float]) -> Steps[int]:
+    deadline = clock() + _TIMEOUT_S
+    while True:
+        status = int.from_bytes((yield from _register(_CONTROL, 2)), "little")
+        if not status & _BUSY:
+            return status
+        if clock() > deadline:
+            raise LinkTimeout(
+                f"the drive's EEPROM stays busy for {_TIMEOUT_S:g} s",
+                remedy="try again; if it stays so, switch the drive off and on",
+            )
+        yield Pause(_POLL_S)
+
+
+def _register(register: int, size: int) -> Steps[bytes]:
+    for _ in range(_TRIES):
+        data = yield Read(register, size)
+        if data is not None:
+            return data
+    raise LinkLost("the station does not answer", remedy="check its supply and cable")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError, Rejected
-from drivers.ethercat import coe, esc
+from drivers.ethercat import coe, esc, sii
 from drivers.ethercat.al_status import ERROR_BIT, AlState, al_status_text, state_name
 from drivers.ethercat.mailbox import Gap, Mailbox, Pause, Read, Steps, Write
 
@@ -73,6 +73,22 @@ class Station:
         if self.mailbox is None:
             raise NotAllowed(f"station {self.number} ({self.name}) has no mailbox: no parameters")
         return self.mailbox
+
+    def require_parameters(self) -> None:
+        """Its state is one in which a drive answers for parameters.
+
+        Raises:
+            LinkLost: it is known to be in INIT or BOOT, with the reason that it gives.
+        """
+        if self.al_state & 0x0F not in (AlState.INIT, AlState.BOOT):
+            return
+        told = al_status_text(self.al_code) if self.al_state & ERROR_BIT else None
+        why = f": {told.text} (AL status {self.al_code:#06x})" if told else ""
+        raise LinkLost(
+            f"station {self.number} is in {state_name(self.al_state)}{why}: no parameter can be"
+            " read or written",
+            remedy=(told.remedy if told else "") or "it may still be starting: try again",
+        )
 
 
 def al_status(station: Station) -> Steps[bool]:
@@ -156,26 +172,32 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
 
     What a slave does not have stays empty; a slave that refuses PREOP keeps a note in words.
     """
-    alias = yield Read(0x12, 2)
+    station.notes.clear()
+    alias = yield from _read_again(0x12, 2)
     station.alias = int.from_bytes(alias or b"\0\0", "little")
-    features = yield Read(0x08, 2)
+    features = yield from _read_again(0x08, 2)
     station.distributed_clock = bool(features and features[0] & 0x04)
     if (yield from read_ports(station)):
         station.wiring = station.ports
+    try:
+        serial = yield from sii.read(sii.SERIAL_WORD, 2, clock)
+        station.serial = int.from_bytes(serial, "little") or None
+    except DriveError as error:
+        station.notes.append(error.message)
     if station.mailbox is None:
         yield from al_status(station)
         station.notes.append("no mailbox: only process data")
         return
     try:
         yield from change_state(station, AlState.PREOP, clock)
-        serial = yield from _try_read(station, 0x1018, 4)
-        if serial is not None and len(serial) == 4:
-            station.serial = int.from_bytes(serial, "little") or station.serial
+        told = yield from _try_read(station, 0x1018, 4)
+        if told is not None and len(told) == 4:
+            station.serial = int.from_bytes(told, "little") or station.serial
         for key, index in (("name", 0x1008), ("hardware", 0x1009), ("firmware", 0x100A)):
             text = yield from _try_read(station, index, 0)
             if text is not None:
-                told = text.split(b"\0", 1)[0].decode("utf-8", "replace").strip()
-                setattr(station, key, told or getattr(station, key))
+                words = text.split(b"\0", 1)[0].decode("utf-8", "replace").strip()
+                setattr(station, key, words or getattr(station, key))
         yield from _compare_identity(station)
     except DriveError as error:
         station.notes.append(error.message)

@@ -123,7 +123,25 @@ def test_firmware_is_loaded_to_the_end_even_if_cancelled(station: Station) -> No
     station.http.post("/stop", json={})
     ended = station.ok(station.http.delete(f"/jobs/{job['id']}"))
     assert ended["state"] == "done", ended
-    assert ended["result"] == {"bytes": 20_000, "file": "app.efw"}
+    assert ended["result"] == {"bytes": 20_000, "file": "app.efw", "state": "BOOT"}
+    until(lambda: view(station)["stations"][0]["state"] == "PREOP", 10, "up again")
+
+
+def test_firmware_that_fails_says_how_far_it_came_and_what_to_do(station: Station) -> None:
+    segment = station.drives.segments[URL]
+    segment.command("timing", slave=0, sdo_s=0.0)
+    segment.command("firmware", slave=0, fail_at=1999)
+    job = station.ok(load(station, "a", bytes(4000), confirmed=True))
+    until(lambda: station.ok(station.http.get(f"/jobs/{job['id']}"))["state"] != "running", 20)
+    ended = station.ok(station.http.get(f"/jobs/{job['id']}"))
+    assert ended["state"] == "failed", ended
+    told = ended["problem"]["detail"]
+    assert "flash memory error" in told
+    assert "after 1500 of 4000 bytes" in told
+    assert "it may be without firmware" in told
+    segment.command("firmware", slave=0)
+    job = station.ok(load(station, "a", bytes(4000), confirmed=True))
+    until(lambda: station.ok(station.http.get(f"/jobs/{job['id']}"))["state"] == "done", 20)
 
 
 def test_permissions_of_an_interface_that_is_not_there(station: Station) -> None:

@@ -300,7 +300,7 @@ async def test_a_power_cycle_in_motion_ends_it_and_the_drive_comes_back_disabled
         await bus.link.process_data.run([move(1, ramp(rig, 0, count=30))])
 
 
-async def test_killing_the_host_in_motion_stops_the_axis_and_restarts_it(rig: Rig) -> None:
+async def test_killing_the_host_in_motion_stops_the_axis_and_recovers_disabled(rig: Rig) -> None:
     async with running(rig) as bus:
         await enable(bus, 1)
         await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=5)])
@@ -312,11 +312,36 @@ async def test_killing_the_host_in_motion_stops_the_axis_and_restarts_it(rig: Ri
         took = await until(lambda: rig.truth(0, 0x606C) == 0, 1.0)
         assert took < 0.2
         await bus.told("died", "started again")
-        await bus.told("runs again")
-        found = await bus.link.scan(lambda _s, _t: None)
-        assert len(found) == 2
-        with pytest.raises(NotAllowed, match="does not run"):
+        await bus.told("the cyclic exchange broke off")
+        await bus.told("the cyclic exchange runs again; every axis is disabled", within_s=15)
+        assert bus.link.process_data.running
+        assert not bus.link.process_data.trouble
+        with pytest.raises(LinkLost, match="broke off, the motion has ended"):
             await bus.link.process_data.renew(1)
+        here = rig.truth(0, 0x6064)
+        await asyncio.sleep(0.3)
+        assert rig.truth(0, 0x6064) == here, "nothing moves by itself"
+        assert in_state(bus, 1) != "Operation enabled"
+        # The bus was lost while it was enabled, which this drive keeps as a fault.
+        await bus.link.process_data.reset_fault(1)
+        await until(lambda: in_state(bus, 1) == "Switch on disabled", 3.0)
+        await enable(bus, 1)
+        await bus.link.process_data.run([move(1, ramp(rig, 0, count=50))])
+
+
+async def test_another_drive_after_a_break_is_refused_in_words(rig: Rig) -> None:
+    async with running(rig) as bus:
+        cyclic = bus.link.process_data
+        cyclic._setup["identities"][2][2] = 4711
+        os.kill(bus.link._host.pid or 0, signal.SIGKILL)
+        await bus.told("could not be set up again: another drive than before answers at station 2")
+        assert not cyclic.running
+        assert "another drive" in cyclic.trouble
+        with pytest.raises(NotAllowed, match="no axis can be enabled before that"):
+            await bus.link.write(1, Address(0x6040, 0, "UINT16"), b"\x0f\0")
+        await bus.link.write(1, Address(0x6040, 0, "UINT16"), b"\x02\0")
+        await cyclic.stop()
+        assert not cyclic.trouble, "nobody wants it any more"
 
 
 async def test_killing_the_server_in_motion_stops_the_axis(rig: Rig) -> None:

@@ -88,6 +88,8 @@ class Wire:
         self.slaves = [Slave(device, self.clock) for device in drives]
         self.segment = Segment(self.slaves, self.clock)
         self._counter = 0
+        self.boxes = (MBX_OUT, MBX_IN, MBX_SIZE)
+        """Addresses and size of the two mailboxes."""
 
     @property
     def device(self) -> DictionaryDevice:
@@ -126,8 +128,9 @@ class Wire:
         return self.state(station)
 
     def set_mailbox(self, station: int = 0x1001) -> None:
-        managers = struct.pack("<HHBBBB", MBX_OUT, MBX_SIZE, 0x26, 0, 1, 0)
-        managers += struct.pack("<HHBBBB", MBX_IN, MBX_SIZE, 0x22, 0, 1, 0)
+        out, back, size = self.boxes
+        managers = struct.pack("<HHBBBB", out, size, 0x26, 0, 1, 0)
+        managers += struct.pack("<HHBBBB", back, size, 0x22, 0, 1, 0)
         self.write(0x0800, managers, station)
 
     def to_preop(self) -> None:
@@ -172,7 +175,7 @@ class Wire:
             self._counter = self._counter % 7 + 1
             counter = self._counter
         message = struct.pack("<HHBB", len(payload), 0, 0, kind | counter << 4) + payload
-        return self.write(MBX_OUT, message.ljust(MBX_SIZE, b"\0"))
+        return self.write(self.boxes[0], message.ljust(self.boxes[2], b"\0"))
 
     def fetch(self) -> bytes:
         """Payload of the answer, with its mailbox type checked to be CoE."""
@@ -182,7 +185,7 @@ class Wire:
         return raw[6 : 6 + length]
 
     def fetch_raw(self) -> bytes:
-        answer = self.read(MBX_IN, MBX_SIZE)
+        answer = self.read(self.boxes[1], self.boxes[2])
         assert answer.wkc == 1, "no answer in the mailbox"
         return answer.data
 

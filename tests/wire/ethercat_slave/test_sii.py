@@ -112,7 +112,8 @@ def test_a_drive_with_foe_says_so_and_has_a_boot_mailbox() -> None:
     wire.number()
     raw = image(wire)
     assert struct.unpack_from("<H", raw, 0x38)[0] == 0x0C
-    assert struct.unpack_from("<HHHH", raw, 0x28) == (0x1000, 256, 0x1100, 256)
+    assert struct.unpack_from("<HHHH", raw, 0x28) == (0x1000, 512, 0x1200, 512)
+    assert struct.unpack_from("<HHHH", raw, 0x30) == (0x1000, 256, 0x1100, 256)
     general = categories(raw)[30]
     assert (general[5], general[6]) == (0x0F, 1)
 

@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from .frames import BOOT, IN, INIT, OP, OUT, PREOP, SAFEOP, Wire
+from .frames import BOOT, IN, INIT, MBX_IN, MBX_OUT, MBX_SIZE, OP, OUT, PREOP, SAFEOP, Wire
 
 ERROR, ACK = 0x10, 0x10
 
@@ -180,16 +180,46 @@ def test_leaving_op_tells_the_drive_and_coming_back_does_not() -> None:
     assert wire.device.lost == ["state SAFEOP"]
 
 
-def test_boot_and_firmware_transfer() -> None:
+def boot() -> Wire:
+    """A drive in BOOT with the mailboxes that its EEPROM names for it."""
     wire = Wire(foe=True)
     wire.number()
     wire.set_mailbox()
-    assert wire.request(BOOT) == (BOOT, 0)
-    content = bytes(range(256)) * 2  # 244 + 244 + 24: a mailbox holds 256 - 6 - 6
+    assert wire.request(BOOT) == (INIT | ERROR, 0x0015), "not with the usual mailboxes"
+    wire.boxes = (0x1000, 0x1200, 512)
+    wire.set_mailbox()
+    assert wire.request(BOOT | ACK) == (BOOT, 0)
+    return wire
+
+
+def test_boot_knows_only_files_and_one_way_out() -> None:
+    wire = boot()
+    wire.post(struct.pack("<HBHB4x", 0x2000, 0x40, 0x1000, 0))
+    assert wire.fetch_raw()[5] & 0x0F == 0, "CoE is answered by a mailbox error"
+    assert wire.request(PREOP) == (BOOT | ERROR, 0x0011)
+    assert wire.request(INIT | ACK) == (INIT, 0)
+    wire.boxes = (MBX_OUT, MBX_IN, MBX_SIZE)
+    wire.set_mailbox()
+    assert wire.request(PREOP) == (PREOP, 0)
+
+
+def test_a_download_that_breaks_off_in_boot_leaves_a_drive_without_firmware() -> None:
+    wire = boot()
     wire.post(struct.pack("<BBI", 2, 0, 0) + b"drive.bin", kind=4)
     assert wire.fetch_raw()[6:12] == struct.pack("<BBI", 4, 0, 0)
-    for number, start in enumerate((0, 244, 488), 1):
-        part = content[start : start + 244]
+    assert wire.request(INIT) == (INIT, 0)
+    wire.boxes = (MBX_OUT, MBX_IN, MBX_SIZE)
+    wire.set_mailbox()
+    assert wire.request(PREOP) == (INIT | ERROR, 0x0014)
+
+
+def test_boot_and_firmware_transfer() -> None:
+    wire = boot()
+    content = bytes(range(256)) * 4 + b"end"  # a mailbox of 512 holds 500: 500 + 500 + 27
+    wire.post(struct.pack("<BBI", 2, 0, 0) + b"drive.bin", kind=4)
+    assert wire.fetch_raw()[6:12] == struct.pack("<BBI", 4, 0, 0)
+    for number, start in enumerate((0, 500, 1000), 1):
+        part = content[start : start + 500]
         wire.post(struct.pack("<BBI", 3, 0, number) + part, kind=4)
         assert wire.fetch_raw()[6:12] == struct.pack("<BBI", 4, 0, number)
     files = wire.slaves[0].files

@@ -1,0 +1,172 @@
+"""Loading firmware: to BOOT and back where the drive has that state, in PREOP where it has not.
+
+Source: ETG.1000.6 clauses 6.4 (BOOT) and 5.8 (FoE), ETG.5003-2 (firmware update): INIT, mailboxes
+as the EEPROM gives them for BOOT, BOOT, the file, INIT, and up again.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from typing import Literal
+
+from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
+from drivers.ethercat import foe, sii
+from drivers.ethercat.al_status import AlState
+from drivers.ethercat.mailbox import Mailbox, Pause, Steps, Write
+from drivers.ethercat.setup import SYNC_MANAGERS, restore_mailbox
+from drivers.ethercat.station import Station, change_state, identify
+
+Where = Literal["auto", "BOOT", "PREOP"]
+Tell = Callable[[float, str], None]
+
+_NO_BOOT = 0x0013
+_BACK_S = 60.0
+_BACK_PAUSE_S = 0.5
+
+
+def load(
+    station: Station,
+    name: str,
+    data: bytes,
+    *,
+    password: int,
+    where: Where,
+    managers: bytes,
+    clock: Callable[[], float],
+    tell: Tell,
+) -> Steps[str]:
+    """Send a file and bring the drive back to PREOP; returns the state in which it was taken.
+
+    ``managers`` are the registers of sync managers 0 and 1 for PREOP. "auto" means BOOT where the
+    EEPROM names mailboxes for it.
+
+    Raises:
+        Rejected, NotAllowed: the drive refused, in words; it is back in PREOP if it can be.
+        LinkTimeout, LinkLost: the transfer broke off; the message says how far it came.
+    """
+    boot = yield from sii.boot_mailbox(clock)
+    if where == "BOOT" and boot is None:
+        raise NotAllowed(
+            f"station {station.number} names no mailboxes for BOOT in its EEPROM",
+            remedy="load the file in PREOP",
+        )
+    if boot is not None and where != "PREOP":
+        entered = yield from _enter_boot(station, boot, managers, clock, tell, where)
+        if entered:
+            yield from _in_boot(
+                station, boot, name, data, password=password, managers=managers, clock=clock,
+                tell=tell,
+            )  # fmt: skip
+            return "BOOT"
+    yield from change_state(station, AlState.PREOP, clock)
+    yield from _send(station.box, name, data, password=password, tell=tell)
+    tell(1.0, "the file is in the drive")
+    yield from identify(station, clock)
+    return "PREOP"
+
+
+def _enter_boot(
+    station: Station,
+    boot: sii.BootMailbox,
+    managers: bytes,
+    clock: Callable[[], float],
+    tell: Tell,
+    where: Where,
+) -> Steps[bool]:
+    """False where the drive has no BOOT after all, and is in PREOP again."""
+    tell(0.0, "going to BOOT")
+    yield from change_state(station, AlState.INIT, clock)
+    for number, (address, size, control) in enumerate(
+        ((boot.out_address, boot.out_size, 0x26), (boot.in_address, boot.in_size, 0x22))
+    ):
+        manager = struct.pack("<HHBBBB", address, size, control, 0, 1, 0)
+        yield Write(SYNC_MANAGERS + 8 * number, manager)
+    try:
+        yield from change_state(station, AlState.BOOT, clock)
+    except NotAllowed:
+        missing = station.al_code == _NO_BOOT
+        yield from restore_mailbox(station, managers, clock)
+        if missing and where == "auto":
+            return False
+        raise
+    return True
+
+
+def _in_boot(
+    station: Station,
+    boot: sii.BootMailbox,
+    name: str,
+    data: bytes,
+    *,
+    password: int,
+    managers: bytes,
+    clock: Callable[[], float],
+    tell: Tell,
+) -> Steps[None]:
+    box = Mailbox(
+        boot.out_address, boot.out_size, boot.in_address, boot.in_size, clock, lambda _data: None
+    )
+    try:
+        yield from _send(box, name, data, password=password, tell=tell)
+    except DriveError as error:
+        error.message += yield from _words_after_failure(station, managers, clock)
+        raise
+    tell(1.0, "the file is in the drive: it starts with it, do not switch off")
+    yield from _back(station, managers, clock)
+    yield from identify(station, clock)
+
+
+def _words_after_failure(
+    station: Station, managers: bytes, clock: Callable[[], float]
+) -> Steps[str]:
+    """Try to bring the drive back; what the user must know of how that went."""
+    try:
+        yield from restore_mailbox(station, managers, clock)
+    except DriveError as error:
+        return (
+            f"; the drive does not come back ({error.message}): it may be without firmware, load"
+            " it again before you switch anything off"
+        )
+    return "; the drive is back in PREOP"
+
+
+def _back(station: Station, managers: bytes, clock: Callable[[], float]) -> Steps[None]:
+    """Up again; a drive that restarts with its new firmware is away for a while.
+
+    Raises:
+        LinkLost: it did not come back within a minute.
+    """
+    deadline = clock() + _BACK_S
+    while True:
+        try:
+            yield from restore_mailbox(station, managers, clock)
+        except (LinkLost, LinkTimeout) as error:
+            if clock() > deadline:
+                raise LinkLost(
+                    f"station {station.number} took the file and did not come back within"
+                    f" {_BACK_S:g} s ({error.message})",
+                    remedy="switch the drive off and on, then scan",
+                ) from error
+        else:
+            return
+        yield Pause(_BACK_PAUSE_S)
+
+
+def _send(box: Mailbox, name: str, data: bytes, *, password: int, tell: Tell) -> Steps[None]:
+    sent = 0
+
+    def progress(now: int) -> None:
+        nonlocal sent
+        sent = now
+        tell(now / max(len(data), 1), f"{now} of {len(data)} bytes: do not switch off")
+
+    try:
+        yield from foe.write_file(box, name, data, password=password, on_progress=progress)
+    except Rejected as error:
+        error.message += f", after {sent} of {len(data)} bytes"
+        raise
+    except DriveError as error:
+        error.message = f"the download broke off after {sent} of {len(data)} bytes: {error.message}"
+        error.remedy = "load the file again before you switch anything off"
+        raise
