@@ -36,7 +36,7 @@ ELSEWHERE = {
     "POST /ethercat/alias": "asks for the drive at the station",
     "POST /ethercat/counters/clear": "counters only",
 }
-FILES = ("/sets", "/descriptions", "/recordings", "/bundles", "/measurements")
+FILES = ("/sets", "/library", "/descriptions", "/recordings", "/bundles", "/measurements")
 
 
 @pytest.fixture
