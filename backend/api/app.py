@@ -28,6 +28,7 @@ from backend.api import (
     routes_sets,
     routes_tune,
 )
+from backend.api.audited import AuditedAnswers
 from backend.api.errors import NotFound, answer, problem_of
 from backend.api.live import LiveHub
 from backend.api.models import Problem
@@ -118,6 +119,7 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
     ):
         api.include_router(part.router)
     app.include_router(api)
+    app.add_middleware(AuditedAnswers, audit=bench.audit, stop_path=f"{PREFIX}/stop")
 
     @app.websocket(f"{PREFIX}/live")
     async def live_socket(socket: WebSocket) -> None:
