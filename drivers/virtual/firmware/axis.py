@@ -220,10 +220,10 @@ class VirtualAxis:
     # --- commands --------------------------------------------------------------------------
     def _begin(self, generator: int, loop: int) -> None:
         p, s = self.p, self.s
-        was = int(p[k.P_LOOP])
+        was, braking = int(p[k.P_LOOP]), p[k.P_GEN] == k.GEN_TORQUE_STOP
         p[k.P_GEN], p[k.P_LOOP], p[k.P_STOPPING] = generator, loop, 0.0
         s[k.S_STOPPED] = s[k.S_ARRIVED] = s[k.S_POSITION_T] = s[k.S_SPEED_T] = 0.0
-        if loop in (k.LOOP_POSITION, k.LOOP_SPEED) and was == k.LOOP_TORQUE:
+        if loop in (k.LOOP_POSITION, k.LOOP_SPEED) and was == k.LOOP_TORQUE and not braking:
             s[k.S_INTEGRAL] = s[k.S_TORQUE_COMMAND]
 
     @property

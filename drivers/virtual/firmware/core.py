@@ -154,6 +154,12 @@ class Core:
         )
         self.apply_motion()
 
+    def _zero_speed(self) -> float:
+        """606Fh or the family's own threshold (P04.11 of R6L, P160 of EP3E); 10 rpm without one."""
+        key = self.family.traits.zero_speed_key
+        speed = self.number(key) * RPM if key is not None else abs(self.speed_at("606F:00"))
+        return speed or 10 * RPM
+
     def limit_mode(self) -> float:
         """What a limit switch does outside a search (LIMIT_*)."""
         limits = self.family.traits.limits
@@ -172,7 +178,7 @@ class Core:
         self.axis.apply_windows(
             self.number(in_place) / per_rad,
             abs(self.speed_at("606D:00")),
-            abs(self.speed_at("606F:00")),
+            self._zero_speed(),
             math.inf if following == 2**32 - 1 else following / per_rad,
         )
         self.axis.p[k.P_LIMIT_DEC] = self.deceleration(self.family.traits.stops.quick_ramp_key)

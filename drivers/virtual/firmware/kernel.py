@@ -317,9 +317,10 @@ def _generate(p, s):  # type: ignore[no-untyped-def]
             s[S_T_DEMAND] += _clamp(goal - s[S_T_DEMAND], -slope, slope)
             s[S_ARRIVED] = 1.0 if s[S_T_DEMAND] == goal else 0.0
         else:
-            # The braking torque fades out near rest so that it cannot start the other way.
-            near = _clamp(s[S_OMEGA] / max(p[P_STOP_SPEED], 1e-3), -1.0, 1.0)
-            s[S_T_DEMAND] = -near * p[P_STOP_TORQUE]
+            # The speed controller against zero speed, limited to the braking torque: it does not
+            # overshoot as a constant torque would.
+            limit = p[P_STOP_TORQUE]
+            s[S_T_DEMAND] = _clamp(-p[P_KP_SPEED_1] * s[S_OMEGA], -limit, limit)
         s[S_V_DEMAND] = s[S_OMEGA]
         s[S_A_DEMAND] = 0.0
         s[S_P_DEMAND] = s[S_THETA]

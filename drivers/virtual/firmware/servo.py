@@ -38,6 +38,7 @@ _RESET_AFTER_STEPS: Final = 400
 _BOOT_S: Final = 0.3
 #: Set-points that the cyclic modes and bit 4 of the control word fetch by themselves.
 _FETCHED: Final = frozenset({"607A:00", "60B0:00", "60B1:00", "60B2:00", "60FE:01", "60FE:02"})
+_OPTION_CODES: Final = frozenset({"605A:00", "605B:00", "605C:00", "605D:00", "605E:00"})
 #: Standard objects that change how the loops are set, not only windows and limits.
 _UNIT_OBJECTS: Final = frozenset({0x6065, 0x6066, 0x607E, 0x608F, 0x6091, 0x6092})
 
@@ -223,10 +224,22 @@ class VirtualServo:
         """What an ordinary parameter that acts at once sets in motion."""
         if entry.key in _FETCHED:
             return None
+        listed = self._family.traits.listed_options_only and bool(entry.parameter.enum)
+        if listed and entry.key in _OPTION_CODES:
+            return self._listed_option(entry)
         index = entry.parameter.index or 0
         if index < 0x6000 or index in _UNIT_OBJECTS:
             return self._setting_changed
         return self._motion_object_changed
+
+    def _listed_option(self, entry: Entry) -> Callable[[Raw], None]:
+        """Only the values that the manual lists (M6-L 000:3017, EP3E 001:885)."""
+
+        def check(value: Raw) -> None:
+            if int(value) not in entry.parameter.enum:
+                raise SdoAbort(ABORT_VALUE_RANGE)
+
+        return check
 
     def _setting_changed(self, _: Raw) -> None:
         self.core.apply_settings()

@@ -252,6 +252,7 @@ class Traits:
     limit_bits_swapped: bool = False
     autosave: tuple[Autosave, ...] = ()
     torque_speed_limit_key: str | None = None
+    zero_speed_key: str | None = None
     second_gains: GainKeys | None = None
     switching: SwitchKeys | None = None
     compensation: CompensationKeys | None = None

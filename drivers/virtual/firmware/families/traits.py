@@ -164,6 +164,7 @@ R6L = Traits(
         Autosave("2008:0C", 4, 0x6000, 0x6FFF),
     ),
     limit_bits_swapped=True,
+    zero_speed_key="2004:0C",
     home_found_bit=15,
     home_offset="at_home",
     feed_forward=FeedForward(
@@ -246,6 +247,7 @@ EP3E = Traits(
     speed_filter=("2013:00", "ms"),
     feed_forward=FeedForward(speed_gain="2015:00", speed_filter="2016:00"),
     disabled_bits=0x60,
+    zero_speed_key="20A0:00",
     listed_options_only=True,
 )
 
