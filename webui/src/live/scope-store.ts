@@ -325,10 +325,11 @@ export class ScopeStore {
     if ('from' in view.show) return view.show
     const end = newest ?? 0
     if ('window' in view.show) return { from: end - view.show.window, to: end }
-    if (this.free(newest)) {
-      return { from: end - (this.finder?.trigger.settings.window ?? 0), to: end }
-    }
-    return this.sweeps.at(-1) ?? { from: 0, to: 0 }
+    const window = this.finder?.trigger.settings.window ?? 1
+    if (this.free(newest)) return { from: end - window, to: end }
+    // Until the first trigger: what would lie before it if it came now.
+    const before = window * (this.finder?.trigger.settings.before ?? 0)
+    return this.sweeps.at(-1) ?? { from: end - before, to: end - before + window }
   }
 
   /** Sweeps before the newest one, oldest first. */

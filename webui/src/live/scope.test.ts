@@ -430,6 +430,15 @@ describe('scope store', () => {
       expect([found.from, found.to]).toEqual([at - 1, at + 1])
     }
   })
+  it('shows what would lie before the trigger while it waits for one', () => {
+    const { store: scope } = store()
+    scope.configure(config(source('c1', 'a')))
+    scope.setTrigger(rising)
+    scope.block(frame({ t0: 5, dt: 1, rows: [[0], [0]] }))
+    const found = seen(scope)
+    expect([found.from, found.to]).toEqual([5, 7])
+    expect(found.columns[0]).toEqual([5, 6])
+  })
   it('runs free in automatic mode when no trigger comes, and says so', () => {
     const { store: scope } = store()
     scope.configure(config(source('c1', 'a')))

@@ -45,6 +45,9 @@ const NO_UNIT = '–'
 const LEFT = 3
 const RIGHT = 1
 const GRAB_PX = 14
+const SHORTEST_S = 1e-5
+/** Narrower than this the y axes make room for the traces. */
+const NARROW_PX = 500
 const WHEEL_ZOOM = 1.25
 
 /**
@@ -105,7 +108,9 @@ export function TimePlot({
             [times.map((time) => time - next.origin), ...rest] as uPlot.AlignedData,
             false,
           )
-          plot.setScale('x', { min: next.from - next.origin, max: next.to - next.origin })
+          // A scale of no width would keep uPlot looking for ticks for ever.
+          const end = Math.max(next.to, next.from + SHORTEST_S)
+          plot.setScale('x', { min: next.from - next.origin, max: end - next.origin })
           for (const name of units(series)) plot.setScale(name, yRange(plot, series, name, next))
         })
       },
@@ -195,7 +200,7 @@ function options(
         axis({
           scale: name,
           ...(name === NO_UNIT ? {} : { label: name, labelSize: 18 }),
-          size: 60,
+          size: size.width < NARROW_PX ? 44 : 60,
           // eslint-disable-next-line @typescript-eslint/no-unsafe-enum-assignment -- see LEFT
           side: i % 2 === 0 ? LEFT : RIGHT,
           grid: { show: i === 0, stroke: grid, width: 1 },

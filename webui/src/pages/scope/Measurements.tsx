@@ -47,6 +47,7 @@ export function Measurements({
           <tr>
             <th>{t('scope.trace')}</th>
             <th>{t('column.unit')}</th>
+            <th>{t('scope.timing')}</th>
             {a !== undefined && (
               <>
                 <th className="right">A</th>
@@ -59,7 +60,6 @@ export function Measurements({
                 {t(`measure.${name}` as 'measure.min')}
               </th>
             ))}
-            <th>{t('scope.timing')}</th>
           </tr>
         </thead>
         <tbody>
@@ -74,6 +74,9 @@ export function Measurements({
                   <span className="dim num">{each.id}</span> {each.label}
                 </td>
                 <td className="unit">{each.unit}</td>
+                <td className="dim num timing">
+                  <Timing frame={frame} i={i} shown={each} />
+                </td>
                 {a !== undefined && (
                   <>
                     <td className="num right" data-figure="a">
@@ -92,9 +95,6 @@ export function Measurements({
                     {figure(m && of(m))}
                   </td>
                 ))}
-                <td className="dim num timing">
-                  <Timing frame={frame} i={i} shown={each} />
-                </td>
               </tr>
             )
           })}

@@ -67,6 +67,7 @@ export function ScopePage() {
   const plot = useRef<PlotHandle | null>(null)
   const last = useRef<ScopeFrame | null>(null)
   const tableAt = useRef(0)
+  const tabs = useRef<HTMLDivElement>(null)
   const trigger = triggerOf(setup)
   useSampling(setup, infos)
   useTrigger(setup, arming)
@@ -225,7 +226,7 @@ export function ScopePage() {
           setArming((n) => n + 1)
         }}
       />
-      <div className="scope-tabs">
+      <div className="scope-tabs" ref={tabs}>
         <SegmentedControl
           aria-label={t('scope.tabs')}
           value={tab}
