@@ -6,6 +6,7 @@ import { contents, useDrives, useLink } from '../live/store'
 import { AlarmsPage } from '../pages/alarms/AlarmsPage'
 import { ConnectPage } from '../pages/connect/ConnectPage'
 import { FilesPage } from '../pages/files/FilesPage'
+import { GainsPage } from '../pages/gains/GainsPage'
 import { IoPage } from '../pages/io/IoPage'
 import { MotionPage } from '../pages/motion/MotionPage'
 import { OverviewPage } from '../pages/overview/OverviewPage'
@@ -13,6 +14,7 @@ import { ParametersPage } from '../pages/parameters/ParametersPage'
 import { RerunPage } from '../pages/rerun/RerunPage'
 import { ResponsePage } from '../pages/response/ResponsePage'
 import { ScopePage } from '../pages/scope/ScopePage'
+import { SetupPage } from '../pages/setup/SetupPage'
 import { TunePage } from '../pages/tune/TunePage'
 import { Frame } from './Frame'
 import { isAxisPage, useRoute } from './router'
@@ -34,6 +36,8 @@ const AXIS = {
   motion: MotionPage,
   tune: TunePage,
   response: ResponsePage,
+  gains: GainsPage,
+  setup: SetupPage,
   io: IoPage,
   alarms: AlarmsPage,
 }

@@ -6,6 +6,8 @@ export const AXIS_PAGES = [
   'motion',
   'tune',
   'response',
+  'gains',
+  'setup',
   'io',
   'alarms',
 ] as const

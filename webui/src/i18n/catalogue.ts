@@ -1,6 +1,7 @@
 import { axis } from './texts/axis'
 import { bench } from './texts/bench'
 import { frame } from './texts/frame'
+import { functions } from './texts/functions'
 import { notListed } from './texts/notlisted'
 import { parameters } from './texts/parameters'
 import { recordings } from './texts/recordings'
@@ -13,6 +14,7 @@ export const catalogue = {
   ...frame,
   ...bench,
   ...axis,
+  ...functions,
   ...parameters,
   ...recordings,
   ...notListed,

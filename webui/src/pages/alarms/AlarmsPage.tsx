@@ -8,8 +8,9 @@ import { FaultList } from '../../widgets/FaultList'
 import { dateTime } from '../../widgets/format'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
-import { ProcedureButton } from '../../widgets/Procedures'
 import { useAction } from '../../widgets/useAction'
+import { Bundles } from './Bundles'
+import { History } from './History'
 
 export function AlarmsPage({ drive }: { drive: string }) {
   const t = useT()
@@ -31,26 +32,23 @@ export function AlarmsPage({ drive }: { drive: string }) {
       <Panel
         title={t('faults.active')}
         tools={
-          <>
-            <Button
-              disabled={!state?.fresh || state.faults.length === 0}
-              loading={reset.busy}
-              onClick={() =>
-                void reset.run(async () =>
-                  setState(
-                    await ask(
-                      api.POST('/api/v1/drives/{drive_id}/fault-reset', {
-                        params: { path: { drive_id: drive } },
-                      }),
-                    ),
+          <Button
+            disabled={!state?.fresh || state.faults.length === 0}
+            loading={reset.busy}
+            onClick={() =>
+              void reset.run(async () =>
+                setState(
+                  await ask(
+                    api.POST('/api/v1/drives/{drive_id}/fault-reset', {
+                      params: { path: { drive_id: drive } },
+                    }),
                   ),
-                )
-              }
-            >
-              {t('faults.reset')}
-            </Button>
-            <ProcedureButton drive={drive} name="clear_history" label={t('faults.clearHistory')} />
-          </>
+                ),
+              )
+            }
+          >
+            {t('faults.reset')}
+          </Button>
         }
       >
         <ProblemNote problem={reset.problem} onClose={reset.clear} />
@@ -62,6 +60,10 @@ export function AlarmsPage({ drive }: { drive: string }) {
           <FaultList faults={warnings} />
         </Panel>
       )}
+      <div className="columns">
+        <History drive={drive} />
+        <Bundles />
+      </div>
       <Log drive={drive} />
     </div>
   )

@@ -1,52 +1,113 @@
 import { useEffect } from 'react'
-import type { ParameterRow } from '../../api/schema'
+import { api, ask } from '../../api/client'
+import type { IoInfo, ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
 import * as live from '../../live/live'
-import { useDrive, useLink, useReading, useRows } from '../../live/store'
+import { useAxisState, useDrive, useLink, useReading, useRows } from '../../live/store'
 import { clock, hexadecimal } from '../../widgets/format'
 import { DIGITAL_INPUTS, DIGITAL_OUTPUTS } from '../../widgets/objects'
 import { Panel } from '../../widgets/Panel'
+import { ParameterFields } from '../../widgets/ParameterFields'
+import { ProblemNote } from '../../widgets/ProblemNote'
 import { bitFields, getField } from '../../widgets/parse'
+import { useFetched, useFunctions } from '../../widgets/useFunctions'
+import { ForcingPanel } from './ForcingPanel'
+import { probeKeys } from './probe'
+import { ProbePanel } from './ProbePanel'
+import { TerminalTable } from './TerminalTable'
 
 const PERIOD_S = 0.1
 
-/** Digital inputs and outputs as the drive reports them (60FDh, 60FEh). */
+/** Terminals: as they are, what they are for, overruling them, and touch probes. */
 export function IoPage({ drive }: { drive: string }) {
   const t = useT()
   const rows = useRows(drive)
   const summary = useDrive(drive)
+  const state = useAxisState(drive)
+  const functions = useFunctions(drive)
   const { open } = useLink()
-  const shown = (rows ?? []).filter(
+  const io = useFetched<IoInfo>(
+    () => ask(api.GET('/api/v1/drives/{drive_id}/io', { params: { path: { drive_id: drive } } })),
+    [drive],
+  )
+  const reachable = new Set((rows ?? []).filter((row) => row.reachable).map((row) => row.key))
+  const objects = (rows ?? []).filter(
     (row) => row.reachable && (row.key === DIGITAL_INPUTS || row.key === DIGITAL_OUTPUTS),
   )
-  const keys = shown.map((row) => row.key).join(' ')
+  const watched = [
+    ...new Set([
+      ...objects.map((row) => row.key),
+      ...(functions?.terminals.states ?? []).map((place) => place.key),
+      ...probeKeys(functions?.probe ?? null),
+    ]),
+  ]
+    .filter((key) => reachable.has(key))
+    .join(' ')
   useEffect(() => {
     if (open && rows === null) void live.loadRows(drive).catch(() => {})
   }, [drive, open, rows])
   useEffect(() => {
-    if (keys === '') return
+    if (watched === '') return
     live.stand(`values ${drive}`, {
       type: 'watch_values',
       drive,
-      keys: keys.split(' '),
+      keys: watched.split(' '),
       period_s: PERIOD_S,
     })
     return () => {
       live.stand(`values ${drive}`, null)
       live.send({ type: 'watch_values', drive, keys: [], period_s: PERIOD_S })
     }
-  }, [drive, keys])
+  }, [drive, watched])
+  const terminals = io.data?.terminals ?? []
+  const enabled = state?.state === 'Operation enabled'
+  const groups = functions?.groups.filter((group) => group.page === 'io') ?? []
+  const nothing =
+    rows && io.data && objects.length === 0 && terminals.length === 0 && !functions?.probe
   return (
     <div className="page">
       <h1>
         {t('page.io')} <small className="dim">{summary?.name}</small>
       </h1>
+      <ProblemNote problem={io.problem} />
+      {enabled && terminals.length > 0 && <p className="note info">{t('io.stopFirst')}</p>}
       <div className="columns">
-        {shown.map((row) => (
+        {(['in', 'out'] as const).map((direction) => {
+          const shown = terminals.filter((each) => each.direction === direction)
+          return (
+            shown.length > 0 && (
+              <Panel key={direction} title={t(direction === 'in' ? 'io.inputs' : 'io.outputs')}>
+                <TerminalTable
+                  drive={drive}
+                  terminals={shown}
+                  states={functions?.terminals.states ?? []}
+                  onChanged={() => void io.read()}
+                />
+              </Panel>
+            )
+          )
+        })}
+        {io.data?.forcing.map((forcing) => (
+          <ForcingPanel
+            key={forcing.name}
+            drive={drive}
+            forcing={forcing}
+            onChanged={() => void io.read()}
+          />
+        ))}
+        {functions?.probe && <ProbePanel drive={drive} probe={functions.probe} />}
+        {groups.map((group) => (
+          <Panel key={group.name} title={group.title}>
+            {group.help && <p className="dim">{group.help}</p>}
+            <ParameterFields drive={drive} keys={group.keys} />
+          </Panel>
+        ))}
+        {objects.map((row) => (
           <Bits key={row.key} drive={drive} row={row} />
         ))}
       </div>
-      {rows && shown.length === 0 && <p className="empty">{t('io.none')}</p>}
+      {io.data?.notes && <p className="dim">{io.data.notes}</p>}
+      {nothing && <p className="empty">{t('io.none')}</p>}
     </div>
   )
 }
@@ -57,7 +118,7 @@ function Bits({ drive, row }: { drive: string; row: ParameterRow }) {
   const raw = typeof reading.raw === 'number' ? reading.raw : null
   const fields = bitFields(row)
   return (
-    <Panel title={row.name}>
+    <Panel title={`${t('io.objects')}: ${row.name}`}>
       <p className="dim mono">
         {row.key} {raw !== null && hexadecimal(raw, row.type)}{' '}
         {t('io.at', { time: clock(reading.time) })}

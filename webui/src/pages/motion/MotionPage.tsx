@@ -12,9 +12,10 @@ import { HomingPanel } from './HomingPanel'
 import { JogPanel } from './JogPanel'
 import { MovePanel } from './MovePanel'
 import { SequencePanel } from './SequencePanel'
+import { SettingsPanel } from './SettingsPanel'
 import { SignalPanel, useCyclic } from './SignalPanel'
 
-const TABS = ['jog', 'move', 'sequence', 'homing', 'signal'] as const
+const TABS = ['jog', 'move', 'sequence', 'homing', 'signal', 'settings'] as const
 
 export function MotionPage({ drive }: { drive: string }) {
   const t = useT()
@@ -40,6 +41,7 @@ export function MotionPage({ drive }: { drive: string }) {
       <div className="columns motion-columns">
         <div>
           <SegmentedControl
+            className="motion-tabs"
             fullWidth
             value={tab}
             onChange={(next) => setTab(next)}
@@ -53,11 +55,12 @@ export function MotionPage({ drive }: { drive: string }) {
           {tab === 'sequence' && <SequencePanel drive={drive} state={state} onStarted={started} />}
           {tab === 'signal' && <SignalPanel drive={summary} state={state} onStarted={started} />}
           {tab === 'homing' && <HomingPanel drive={drive} state={state} onStarted={started} />}
+          {tab === 'settings' && <SettingsPanel drive={drive} />}
           {moving && moving.id !== mine && moving.kind !== 'jog' && <JobNote id={moving.id} />}
           <JobNote id={mine} onClose={() => started('')} />
         </div>
         <Panel title={t('overview.now')}>
-          <Quantities state={state} />
+          <Quantities drive={drive} state={state} />
           <p>
             {t('motion.state')} <strong>{state ? known(t, 'state', state.state) : '—'}</strong> ·{' '}
             {state && known(t, 'mode', state.mode_name)}

@@ -9,7 +9,10 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { Procedures } from '../../widgets/Procedures'
 import { useAction } from '../../widgets/useAction'
+import { useRecord } from '../../widgets/useFunctions'
 import { StateMachine } from './StateMachine'
+import { travelOf } from './travel'
+import { WatchPanel } from './WatchPanel'
 
 export function OverviewPage({ drive }: { drive: string }) {
   const t = useT()
@@ -63,9 +66,10 @@ export function OverviewPage({ drive }: { drive: string }) {
       <div className="columns">
         <div className="stack">
           <Panel title={t('overview.now')}>
-            <Quantities state={state} />
+            <Quantities drive={drive} state={state} />
             <Words state={state} />
           </Panel>
+          <WatchPanel drive={drive} />
           <Procedures drive={drive} />
         </div>
         <Panel title={t('overview.machine')}>
@@ -93,8 +97,9 @@ const QUANTITIES = [
   'temperature',
 ] as const
 
-export function Quantities({ state }: { state: AxisState | null }) {
+export function Quantities({ drive, state }: { drive: string; state: AxisState | null }) {
   const t = useT()
+  const travel = travelOf(useRecord(drive), state)
   return (
     <dl className={`quantities ${state?.fresh ? '' : 'stale'}`}>
       {QUANTITIES.filter((name) => !state || state[name] !== null).map((name) => (
@@ -103,6 +108,14 @@ export function Quantities({ state }: { state: AxisState | null }) {
           <dd>
             <span className="num">{quantity(state?.[name], state?.units[name] ?? '')}</span>{' '}
             <span className="unit">{state?.units[name]}</span>
+          </dd>
+        </div>
+      ))}
+      {travel.map(({ name, value, unit }) => (
+        <div key={name}>
+          <dt>{t(`travel.${name}`)}</dt>
+          <dd>
+            <span className="num">{value}</span> <span className="unit">{unit}</span>
           </dd>
         </div>
       ))}

@@ -99,7 +99,16 @@ export function Detail({
   )
 }
 
-function Editor({ drive, row }: { drive: string; row: ParameterRow }) {
+/** The editor of one parameter; `compact` leaves its name to what surrounds it. */
+export function Editor({
+  drive,
+  row,
+  compact = false,
+}: {
+  drive: string
+  row: ParameterRow
+  compact?: boolean
+}) {
   const t = useT()
   const reading = useReading(drive, row.key) ?? row.reading
   const edit = useEdits(drive).edits.get(row.key)
@@ -117,7 +126,7 @@ function Editor({ drive, row }: { drive: string; row: ParameterRow }) {
   if (Object.keys(row.enum).length > 0) {
     return (
       <NativeSelect
-        label={t('parameters.newValue')}
+        {...(compact ? { 'aria-label': row.name } : { label: t('parameters.newValue') })}
         value={text}
         className={edit ? 'edited-field' : ''}
         onChange={(event) => keep(event.currentTarget.value, true)}
@@ -134,7 +143,7 @@ function Editor({ drive, row }: { drive: string; row: ParameterRow }) {
   return (
     <>
       <TextInput
-        label={t('parameters.newValue')}
+        {...(compact ? { 'aria-label': row.name } : { label: t('parameters.newValue') })}
         description={range(row, asRaw)}
         className={edit ? 'edited-field' : ''}
         rightSection={asRaw ? null : <span className="unit">{row.unit}</span>}
@@ -150,7 +159,7 @@ function Editor({ drive, row }: { drive: string; row: ParameterRow }) {
         }}
         onBlur={() => setTyping(null)}
       />
-      {(row.scale !== 1 || row.offset !== 0) && (
+      {!compact && (row.scale !== 1 || row.offset !== 0) && (
         <Checkbox
           label={t('parameters.typeRaw')}
           checked={asRaw}

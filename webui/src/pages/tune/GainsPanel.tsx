@@ -2,6 +2,7 @@ import { Button, Modal, NativeSelect } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { GainWrite } from '../../api/schema'
+import { href } from '../../app/router'
 import { useT } from '../../i18n'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -71,6 +72,9 @@ export function GainsPanel({
       title={t('gains.title')}
       tools={<Button onClick={() => void of.read()}>{t('notch.read')}</Button>}
     >
+      <p>
+        <a href={href('gains', drive)}>{t('gains.toPage')}</a>
+      </p>
       <p>
         {gains.level !== null
           ? t('gains.byLevel', { level: gains.level })

@@ -1,0 +1,56 @@
+import { Button } from '@mantine/core'
+import { API_ROOT, api, ask } from '../../api/client'
+import type { BundleList } from '../../api/schema'
+import { useT } from '../../i18n'
+import { dateTime } from '../../widgets/format'
+import { Icon } from '../../widgets/Icon'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { useFetched } from '../../widgets/useFunctions'
+
+const SHOWN = 5
+
+/** Everything that a helper far away needs, in one file. */
+export function Bundles() {
+  const t = useT()
+  const act = useAction()
+  const { data, problem, read } = useFetched<BundleList>(() => ask(api.GET('/api/v1/bundles')), [])
+  const make = () =>
+    act.run(async () => {
+      await ask(api.POST('/api/v1/bundles', { body: { reason: t('bundle.make') } }))
+      await read()
+    })
+  return (
+    <Panel
+      title={t('bundle.title')}
+      tools={
+        <Button loading={act.busy} onClick={() => void make()}>
+          {t('bundle.make')}
+        </Button>
+      }
+    >
+      <p className="prose">{t('bundle.help')}</p>
+      {data && <p className="dim">{t(data.armed ? 'bundle.armed' : 'bundle.notArmed')}</p>}
+      <ProblemNote problem={act.problem ?? problem} onClose={act.clear} />
+      {data?.bundles.length === 0 && <p className="dim">{t('bundle.none')}</p>}
+      <ul className="plain-list">
+        {data?.bundles.slice(0, SHOWN).map((bundle) => (
+          <li key={bundle.name}>
+            <a
+              className="download"
+              href={`${API_ROOT}/api/v1/bundles/${encodeURIComponent(bundle.name)}`}
+              download={bundle.name}
+            >
+              <Icon name="download" /> {bundle.name}
+            </a>{' '}
+            <span className="dim num">
+              {dateTime(bundle.created)} ·{' '}
+              {t('bundle.size', { kib: Math.ceil(bundle.bytes / 1024) })}
+            </span>
+          </li>
+        ))}
+      </ul>
+    </Panel>
+  )
+}

@@ -1,0 +1,139 @@
+import '../../widgets/functions.css'
+import { Button } from '@mantine/core'
+import { api, ask } from '../../api/client'
+import type { FaultHistoryInfo, PastFaultInfo } from '../../api/schema'
+import { useT } from '../../i18n'
+import { useRows } from '../../live/store'
+import { dateTime, shown } from '../../widgets/format'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProcedureButton } from '../../widgets/Procedures'
+import { useAction } from '../../widgets/useAction'
+import { useFetched } from '../../widgets/useFunctions'
+
+/** What the drive itself remembers, with the values that it froze. */
+export function History({ drive }: { drive: string }) {
+  const t = useT()
+  const { data, problem, read, setData } = useFetched<FaultHistoryInfo>(
+    () =>
+      ask(
+        api.GET('/api/v1/drives/{drive_id}/fault-history', {
+          params: { path: { drive_id: drive } },
+        }),
+      ),
+    [drive],
+  )
+  const act = useAction()
+  const readNow = () =>
+    act.run(async () =>
+      setData(
+        await ask(
+          api.POST('/api/v1/drives/{drive_id}/fault-history/read', {
+            params: { path: { drive_id: drive } },
+          }),
+        ),
+      ),
+    )
+  if (!data) return <ProblemNote problem={problem} />
+  const readable = data.kind === 'slots' || data.kind === 'selected'
+  return (
+    <Panel
+      title={t('history.title')}
+      tools={
+        <>
+          {readable && (
+            <Button
+              loading={act.busy}
+              onClick={() => void (data.kind === 'slots' ? act.run(read) : readNow())}
+            >
+              {t('history.read')}
+            </Button>
+          )}
+          <ProcedureButton
+            drive={drive}
+            name="clear_history"
+            label={t('faults.clearHistory')}
+            onEnd={() => void (data.kind === 'selected' ? readNow() : read())}
+          />
+        </>
+      }
+    >
+      <ProblemNote problem={act.problem ?? problem} onClose={act.clear} />
+      {data.kind === 'unknown' && <p className="dim">{t('history.unknown')}</p>}
+      {data.size > 0 && (
+        <p className="dim">
+          {t('history.count', { size: data.size })}{' '}
+          {!data.newest_first && t('history.orderUnknown')}{' '}
+          {data.kind === 'selected' && data.read_at === null && t('history.notRead')}
+          {data.read_at && dateTime(data.read_at)}
+        </p>
+      )}
+      {data.notes && <p className="prose">{data.notes}</p>}
+      {data.read_at && data.entries.length === 0 && (
+        <p className="good-text">{t('history.empty')}</p>
+      )}
+      <ul className="past-faults">
+        {data.entries.map((entry) => (
+          <Past key={entry.name} drive={drive} entry={entry} />
+        ))}
+      </ul>
+      {data.source && <p className="dim">{t('source', { source: data.source })}</p>}
+    </Panel>
+  )
+}
+
+function Past({ drive, entry }: { drive: string; entry: PastFaultInfo }) {
+  const t = useT()
+  const rows = useRows(drive) ?? []
+  const values = entry.values.flatMap((value) => {
+    const row = rows.find((each) => each.key === value.key)
+    return row ? [{ row, value }] : []
+  })
+  if (entry.error) {
+    return (
+      <li>
+        <strong>{entry.name}</strong> <span className="warn-text">{entry.error}</span>
+      </li>
+    )
+  }
+  return (
+    <li className={entry.kind ?? ''}>
+      <h3>
+        <small className="dim">{entry.name}</small> <span className="mono">{entry.code}</span>{' '}
+        {entry.known ? entry.title : t('history.notInProfile')}
+      </h3>
+      {values.length > 0 && (
+        <details>
+          <summary>{t('history.values')}</summary>
+          <dl className="facts">
+            {values.map(({ row, value }) => (
+              <div key={row.key} className="pair">
+                <dt>{row.name}</dt>
+                <dd className="num">
+                  {value.error || `${shown(row, value.value, value.raw)} ${row.unit}`}
+                </dd>
+              </div>
+            ))}
+          </dl>
+        </details>
+      )}
+      {(entry.causes.length > 0 || entry.remedies.length > 0) && (
+        <details>
+          <summary>{t('history.why')}</summary>
+          <h4>{t('faults.causes')}</h4>
+          <ul>
+            {entry.causes.map((text) => (
+              <li key={text}>{text}</li>
+            ))}
+          </ul>
+          <h4>{t('faults.remedies')}</h4>
+          <ul>
+            {entry.remedies.map((text) => (
+              <li key={text}>{text}</li>
+            ))}
+          </ul>
+        </details>
+      )}
+    </li>
+  )
+}

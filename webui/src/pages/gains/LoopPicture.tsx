@@ -1,0 +1,144 @@
+import '../../widgets/functions.css'
+import type { GainBlock } from '../../api/schema'
+import { useT } from '../../i18n'
+
+type Block = GainBlock['block']
+
+const WIDTH = 124
+const HEIGHT = 46
+
+/** Where each block of the loops is drawn: centre, in the units of the drawing. */
+const PLACES: { block: Block; x: number; y: number }[] = [
+  { block: 'speed_ff', x: 366, y: 36 },
+  { block: 'torque_ff', x: 524, y: 36 },
+  { block: 'command_filter', x: 78, y: 112 },
+  { block: 'position', x: 262, y: 112 },
+  { block: 'speed', x: 446, y: 112 },
+  { block: 'torque_filter', x: 630, y: 112 },
+  { block: 'notch', x: 778, y: 112 },
+  { block: 'current', x: 926, y: 112 },
+  { block: 'feedback_filter', x: 630, y: 200 },
+]
+/** Those that act on several loops stand below, without wires. */
+const BESIDE: Block[] = ['level', 'inertia', 'switching', 'adaptive', 'compensation', 'limits']
+
+const SUM_POSITION = 168
+const SUM_SPEED = 356
+const SUM_TORQUE = 540
+const MOTOR = { x: 1068, y: 112 }
+const LINE = 112
+
+/** The control loops of a drive; a block is a button that goes to its parameters. */
+export function LoopPicture({
+  present,
+  onBlock,
+}: {
+  present: ReadonlySet<string>
+  onBlock: (block: Block) => void
+}) {
+  const t = useT()
+  const beside = BESIDE.filter((block) => present.has(block))
+  const has = (block: Block) => present.has(block)
+  const wires = [
+    `M140 ${LINE}H${SUM_POSITION - 9}`,
+    `M${SUM_POSITION + 9} ${LINE}H200`,
+    `M324 ${LINE}H${SUM_SPEED - 9}`,
+    `M${SUM_SPEED + 9} ${LINE}H384`,
+    `M508 ${LINE}H${SUM_TORQUE - 9}`,
+    `M${SUM_TORQUE + 9} ${LINE}H568`,
+    `M692 ${LINE}H716`,
+    `M840 ${LINE}H864`,
+    `M988 ${LINE}H${MOTOR.x - 40}`,
+    // Speed feedback through its filter, and position feedback below it.
+    `M${MOTOR.x} 135V200H692`,
+    `M568 200H${SUM_SPEED}V${LINE + 9}`,
+    `M${MOTOR.x} 200V246H${SUM_POSITION}V${LINE + 9}`,
+    ...(has('speed_ff') ? [`M152 ${LINE}V36H304`, `M428 36H440V80H${SUM_SPEED}V${LINE - 9}`] : []),
+    ...(has('torque_ff') ? [`M446 36H462`, `M586 36H598V76H${SUM_TORQUE}V${LINE - 9}`] : []),
+  ]
+  return (
+    <div className="loop-picture">
+      <svg viewBox="0 0 1120 330" role="group" aria-label={t('gains.picture')}>
+        <title>{t('gains.picture')}</title>
+        <defs>
+          <marker
+            id="loop-tip"
+            viewBox="0 0 8 8"
+            refX="7"
+            refY="4"
+            markerWidth="7"
+            markerHeight="7"
+            orient="auto"
+          >
+            <path d="M0 0 8 4 0 8z" className="tip" />
+          </marker>
+        </defs>
+        {wires.map((path) => (
+          <path key={path} d={path} className="wire" markerEnd="url(#loop-tip)" />
+        ))}
+        {[SUM_POSITION, SUM_SPEED, SUM_TORQUE].map((x) => (
+          <circle key={x} cx={x} cy={LINE} r={9} className="sum" />
+        ))}
+        {PLACES.map(({ block, x, y }) => (
+          <Box key={block} block={block} x={x} y={y} present={has(block)} onBlock={onBlock} />
+        ))}
+        <g className="motor">
+          <circle cx={MOTOR.x} cy={MOTOR.y} r={38} />
+          <text x={MOTOR.x} y={MOTOR.y + 5}>
+            {t('block.motor')}
+          </text>
+        </g>
+        {beside.map((block, i) => (
+          <Box
+            key={block}
+            block={block}
+            x={78 + (i * (1120 - 156)) / Math.max(1, BESIDE.length - 1)}
+            y={298}
+            present
+            onBlock={onBlock}
+          />
+        ))}
+      </svg>
+    </div>
+  )
+}
+
+function Box({
+  block,
+  x,
+  y,
+  present,
+  onBlock,
+}: {
+  block: Block
+  x: number
+  y: number
+  present: boolean
+  onBlock: (block: Block) => void
+}) {
+  const t = useT()
+  const drawing = (
+    <>
+      <rect x={x - WIDTH / 2} y={y - HEIGHT / 2} width={WIDTH} height={HEIGHT} rx={4} />
+      <text x={x} y={y + 5}>
+        {t(`block.${block}`)}
+      </text>
+    </>
+  )
+  if (!present) return <g className="box absent">{drawing}</g>
+  return (
+    <g
+      className="box"
+      role="button"
+      tabIndex={0}
+      onClick={() => onBlock(block)}
+      onKeyDown={(event) => {
+        if (event.key !== 'Enter' && event.key !== ' ') return
+        event.preventDefault()
+        onBlock(block)
+      }}
+    >
+      {drawing}
+    </g>
+  )
+}

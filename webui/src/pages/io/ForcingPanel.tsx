@@ -1,0 +1,142 @@
+import { Button, Checkbox, SegmentedControl } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask, problemOf } from '../../api/client'
+import type { ForcingInfo } from '../../api/schema'
+import { useT } from '../../i18n'
+import { useJob } from '../../live/store'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+
+/** The server lets go five seconds after the last sign of life. */
+const ALIVE_MS = 1000
+
+/**
+ * Overruling terminals: only for a while, only by the page that began it, and put back when it
+ * ends, however it ends.
+ */
+export function ForcingPanel({
+  drive,
+  forcing,
+  onChanged,
+}: {
+  drive: string
+  forcing: ForcingInfo
+  onChanged: () => void
+}) {
+  const t = useT()
+  const [agreed, setAgreed] = useState(false)
+  const [mine, setMine] = useState<ForcingInfo | null>(null)
+  const act = useAction()
+  const job = useJob(mine?.job ?? forcing.job ?? null)
+  const path = { drive_id: drive, name: forcing.name }
+  const over = mine !== null && job !== null && job.state !== 'running'
+  useEffect(() => {
+    if (!mine || over) return
+    const end = () =>
+      void api.DELETE('/api/v1/drives/{drive_id}/io/forcing/{name}', { params: { path } })
+    const timer = setInterval(() => {
+      // A page that nobody looks at must not hold terminals.
+      if (document.hidden) return
+      ask(
+        api.PUT('/api/v1/drives/{drive_id}/io/forcing/{name}', {
+          params: { path },
+          body: { values: {} },
+        }),
+      ).catch((error: unknown) => act.setProblem(problemOf(error)))
+    }, ALIVE_MS)
+    return () => {
+      clearInterval(timer)
+      end()
+    }
+  }, [mine !== null, over, drive, forcing.name])
+  useEffect(() => {
+    if (over) onChanged()
+  }, [over])
+  const begin = () =>
+    act.run(async () => {
+      setMine(
+        await ask(
+          api.POST('/api/v1/drives/{drive_id}/io/forcing/{name}', {
+            params: { path },
+            body: { confirmed: agreed },
+          }),
+        ),
+      )
+      setAgreed(false)
+    })
+  const set = (terminal: string, value: boolean | null) =>
+    act.run(async () =>
+      setMine(
+        await ask(
+          api.PUT('/api/v1/drives/{drive_id}/io/forcing/{name}', {
+            params: { path },
+            body: { values: { [terminal]: value } },
+          }),
+        ),
+      ),
+    )
+  const holding = mine !== null && !over
+  return (
+    <Panel title={forcing.title}>
+      <p className="prose">{forcing.help}</p>
+      <p className="note warn">{forcing.warning}</p>
+      {forcing.notes && <p className="dim">{forcing.notes}</p>}
+      {over && job?.problem && <ProblemNote problem={job.problem} onClose={() => setMine(null)} />}
+      {over && !job?.problem && (
+        <p className="note info" role="status">
+          {typeof job?.result?.reason === 'string' ? job.result.reason : ''}
+        </p>
+      )}
+      {!holding && forcing.running && !mine ? (
+        <p className="note warn">{t('io.force.other')}</p>
+      ) : (
+        !holding && (
+          <>
+            <Checkbox
+              label={t('io.force.agree')}
+              checked={agreed}
+              onChange={(event) => setAgreed(event.currentTarget.checked)}
+            />
+            <Button disabled={!agreed} loading={act.busy} onClick={() => void begin()}>
+              {t('io.force.begin')}
+            </Button>
+          </>
+        )
+      )}
+      {holding && (
+        <>
+          <p className="note fault" role="status">
+            {t('io.force.running')}
+          </p>
+          <ul className="forced">
+            {forcing.terminals.map((terminal) => {
+              const value = mine.values[terminal]
+              return (
+                <li key={terminal}>
+                  <strong>{terminal}</strong>
+                  <SegmentedControl
+                    aria-label={t('io.force.value', { name: terminal })}
+                    disabled={act.busy}
+                    value={value === undefined ? 'own' : value ? 'on' : 'off'}
+                    onChange={(next) => void set(terminal, next === 'own' ? null : next === 'on')}
+                    data={[
+                      { value: 'own', label: t('io.force.own') },
+                      { value: 'on', label: t('io.force.on') },
+                      ...(forcing.two_way ? [{ value: 'off', label: t('io.force.off') }] : []),
+                    ]}
+                  />
+                </li>
+              )
+            })}
+          </ul>
+          <Button variant="filled" onClick={() => setMine(null)}>
+            {t('io.force.end')}
+          </Button>
+        </>
+      )}
+      <ProblemNote problem={act.problem} onClose={act.clear} />
+      <p className="dim">{t('source', { source: forcing.source })}</p>
+    </Panel>
+  )
+}

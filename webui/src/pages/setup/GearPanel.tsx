@@ -1,0 +1,329 @@
+import { Button, Modal, SegmentedControl } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { GearPlanInfo, GearWritten } from '../../api/schema'
+import { known, useT } from '../../i18n'
+import { figure } from '../../widgets/format'
+import { NumberField } from '../../widgets/NumberField'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProcedureButton } from '../../widgets/Procedures'
+import { useAction } from '../../widgets/useAction'
+import { setRecord, useRecord } from '../../widgets/useFunctions'
+import { complete, type Form, formOf, START, toMechanics } from './mechanics'
+
+/** From screw, belt, rack or table to the gear of the drive, shown before it is written. */
+export function GearPanel({ drive }: { drive: string }) {
+  const t = useT()
+  const record = useRecord(drive)
+  const [form, setForm] = useState<Form>(START)
+  const [plan, setPlan] = useState<GearPlanInfo | null>(null)
+  const [asked, setAsked] = useState(false)
+  const [written, setWritten] = useState<GearWritten | null>(null)
+  const act = useAction()
+  const kept = JSON.stringify(record?.mechanics ?? null)
+  useEffect(() => {
+    if (record?.mechanics) setForm(formOf(record.mechanics))
+  }, [drive, kept])
+  const change = (part: Partial<Form>) => {
+    setForm({ ...form, ...part })
+    setPlan(null)
+    setWritten(null)
+  }
+  const mechanics = complete(form) ? toMechanics(form) : null
+  const calculate = () =>
+    act.run(async () => {
+      if (!mechanics) return
+      setPlan(
+        await ask(
+          api.POST('/api/v1/drives/{drive_id}/gear/plan', {
+            params: { path: { drive_id: drive } },
+            body: mechanics,
+          }),
+        ),
+      )
+    })
+  const write = () =>
+    act.run(async () => {
+      if (!mechanics) return
+      const done = await ask(
+        api.POST('/api/v1/drives/{drive_id}/gear/write', {
+          params: { path: { drive_id: drive } },
+          body: mechanics,
+        }),
+      )
+      setWritten(done)
+      setRecord(
+        drive,
+        await ask(
+          api.GET('/api/v1/drives/{drive_id}/record', { params: { path: { drive_id: drive } } }),
+        ),
+      )
+    })
+  const keep = (value: typeof mechanics) =>
+    act.run(async () =>
+      setRecord(
+        drive,
+        await ask(
+          api.PUT('/api/v1/drives/{drive_id}/mechanics', {
+            params: { path: { drive_id: drive } },
+            body: { mechanics: value },
+          }),
+        ),
+      ),
+    )
+  return (
+    <div className="columns">
+      <Panel title={t('setup.gear')}>
+        <p className="prose">{t('setup.gearHelp')}</p>
+        <SegmentedControl
+          fullWidth
+          value={form.kind}
+          onChange={(kind) => change({ kind: kind })}
+          data={(['screw', 'belt', 'rack', 'rotary'] as const).map((value) => ({
+            value,
+            label: t(`gear.kind.${value}`),
+          }))}
+        />
+        <MechanicsFields form={form} change={change} />
+        <div className="row wrap">
+          <Button
+            variant="filled"
+            disabled={!mechanics}
+            loading={act.busy}
+            onClick={() => void calculate()}
+          >
+            {t('gear.plan')}
+          </Button>
+          <Button disabled={!mechanics || act.busy} onClick={() => void keep(mechanics)}>
+            {t('gear.keep')}
+          </Button>
+          {record?.mechanics && (
+            <Button disabled={act.busy} onClick={() => void keep(null)}>
+              {t('gear.forget')}
+            </Button>
+          )}
+        </div>
+        <ProblemNote problem={act.problem} onClose={act.clear} />
+      </Panel>
+      {plan && (
+        <PlanPanel plan={plan} busy={act.busy} onWrite={() => setAsked(true)}>
+          {written && (
+            <Written
+              drive={drive}
+              written={written}
+              onUndone={() => {
+                setWritten(null)
+                void calculate()
+              }}
+            />
+          )}
+        </PlanPanel>
+      )}
+      {asked && (
+        <Modal opened onClose={() => setAsked(false)} title={t('gear.write')}>
+          <p className="note warn">{t('gear.confirm')}</p>
+          {plan && plan.counted.length > 0 && (
+            <p>{t('gear.counted', { keys: plan.counted.join(', ') })}</p>
+          )}
+          <div className="row end">
+            <Button onClick={() => setAsked(false)}>{t('cancel')}</Button>
+            <Button
+              variant="filled"
+              onClick={() => {
+                setAsked(false)
+                void write()
+              }}
+            >
+              {t('gear.write')}
+            </Button>
+          </div>
+        </Modal>
+      )}
+    </div>
+  )
+}
+
+function Written({
+  drive,
+  written,
+  onUndone,
+}: {
+  drive: string
+  written: GearWritten
+  onUndone: () => void
+}) {
+  const t = useT()
+  const undo = useAction()
+  const waits = [...new Set(Object.values(written.waits))]
+  const back = () =>
+    undo.run(async () => {
+      for (const [key, raw] of Object.entries(written.before).toReversed()) {
+        await ask(
+          api.PUT('/api/v1/drives/{drive_id}/parameters/{key}', {
+            params: { path: { drive_id: drive, key } },
+            body: { raw, value: null },
+          }),
+        )
+      }
+      onUndone()
+    })
+  return (
+    <div className="note good" role="status">
+      <p>
+        {t('gear.written')}{' '}
+        {waits.length > 0 &&
+          t('gear.waits', { what: waits.map((why) => known(t, 'effective', why)).join(', ') })}
+      </p>
+      <div className="row wrap">
+        {waits.includes('write_settings') && (
+          <ProcedureButton drive={drive} name="write_settings" label={t('gear.applyNow')} />
+        )}
+        {Object.keys(written.before).length > 0 && (
+          <Button loading={undo.busy} onClick={() => void back()}>
+            {t('gear.undo')}
+          </Button>
+        )}
+      </div>
+      <ProblemNote problem={undo.problem} onClose={undo.clear} />
+    </div>
+  )
+}
+
+function MechanicsFields({ form, change }: { form: Form; change: (part: Partial<Form>) => void }) {
+  const t = useT()
+  const unit = form.kind === 'rotary' ? '°' : 'mm'
+  const number = (
+    name: 'lead_mm' | 'diameter_mm' | 'pitch_mm' | 'module_mm' | 'resolution',
+    label: string,
+    of = 'mm',
+  ) => (
+    <NumberField
+      label={label}
+      unit={of}
+      value={form[name]}
+      onChange={(value) => change({ [name]: value })}
+      above={0}
+    />
+  )
+  const count = (name: 'teeth' | 'motor_turns' | 'load_turns', label: string) => (
+    <NumberField
+      label={label}
+      value={form[name]}
+      onChange={(value) => change({ [name]: value })}
+      min={1}
+      max={100000}
+      integer
+    />
+  )
+  const ways = { belt: ['diameter', 'teeth'], rack: ['module', 'pitch'] } as const
+  const way = form.kind === 'belt' ? form.belt : form.rack
+  return (
+    <>
+      {(form.kind === 'belt' || form.kind === 'rack') && (
+        <SegmentedControl
+          value={way}
+          onChange={(next) =>
+            change(
+              form.kind === 'belt'
+                ? { belt: next as Form['belt'] }
+                : { rack: next as Form['rack'] },
+            )
+          }
+          data={ways[form.kind].map((value) => ({ value, label: t(`gear.by.${value}`) }))}
+        />
+      )}
+      <div className="fields">
+        {form.kind === 'screw' && number('lead_mm', t('gear.lead'))}
+        {form.kind === 'belt' &&
+          form.belt === 'diameter' &&
+          number('diameter_mm', t('gear.diameter'))}
+        {((form.kind === 'belt' && form.belt === 'teeth') ||
+          (form.kind === 'rack' && form.rack === 'pitch')) &&
+          number('pitch_mm', t('gear.pitch'))}
+        {form.kind === 'rack' && form.rack === 'module' && number('module_mm', t('gear.module'))}
+        {(form.kind === 'rack' || (form.kind === 'belt' && form.belt === 'teeth')) &&
+          count('teeth', t('gear.teeth'))}
+        {count('motor_turns', t('gear.motorTurns'))}
+        {count('load_turns', t('gear.loadTurns'))}
+        {number('resolution', t('gear.resolution'), unit)}
+      </div>
+    </>
+  )
+}
+
+function PlanPanel({
+  plan,
+  busy,
+  onWrite,
+  children,
+}: {
+  plan: GearPlanInfo
+  busy: boolean
+  onWrite: () => void
+  children: React.ReactNode
+}) {
+  const t = useT()
+  const same = plan.values.every((value) => value.now === value.raw)
+  const facts: [string, string][] = [
+    [t('gear.perTurn'), `${figure(plan.travel_per_motor_turn, 7)} ${plan.unit}`],
+    [t('gear.increments'), figure(plan.reached, 9)],
+    [t('gear.error'), `${figure(plan.error_ppm, 2)} ppm`],
+    [t('gear.encoder'), `${figure(plan.encoder_travel, 4)} ${plan.unit}`],
+    ...(plan.max_speed !== null && plan.max_speed_rpm !== null
+      ? [
+          [
+            t('gear.speed', { rpm: plan.max_speed_rpm }),
+            `${figure(plan.max_speed, 5)} ${plan.unit}/s`,
+          ] as [string, string],
+        ]
+      : []),
+    [t('gear.range'), `± ${figure(plan.range_travel, 6)} ${plan.unit}`],
+  ]
+  return (
+    <Panel title={t('gear.result')}>
+      <dl className="facts">
+        {facts.map(([name, text]) => (
+          <div key={name} className="pair">
+            <dt>{name}</dt>
+            <dd className="num">{text}</dd>
+          </div>
+        ))}
+      </dl>
+      <table>
+        <thead>
+          <tr>
+            <th>{t('column.name')}</th>
+            <th className="right">{t('gear.now')}</th>
+            <th className="right">{t('gear.new')}</th>
+          </tr>
+        </thead>
+        <tbody className="num">
+          {plan.values.map((value) => (
+            <tr key={value.key} className={value.now === value.raw ? '' : 'changed'}>
+              <td>
+                {value.name} <small className="dim mono">{value.key}</small>
+              </td>
+              <td className="right">{value.now ?? '—'}</td>
+              <td className="right">
+                <strong>{value.raw}</strong>
+              </td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+      {plan.warnings.map((text) => (
+        <p key={text} className="note warn">
+          {text}
+        </p>
+      ))}
+      {plan.acts && <p>{t('gear.acts', { acts: plan.acts })}</p>}
+      {plan.notes && <p className="dim">{plan.notes}</p>}
+      {plan.source && <p className="dim">{t('source', { source: plan.source })}</p>}
+      <Button variant="filled" disabled={same} loading={busy} onClick={onWrite}>
+        {t('gear.write')}
+      </Button>
+      {children}
+    </Panel>
+  )
+}

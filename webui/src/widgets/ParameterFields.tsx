@@ -1,0 +1,148 @@
+import './functions.css'
+import { Button } from '@mantine/core'
+import { useEffect } from 'react'
+import { api, ask } from '../api/client'
+import type { ParameterRow } from '../api/schema'
+import { useT } from '../i18n'
+import { contents, setJob, useLink, useReading, useRows } from '../live/store'
+import { Editor } from '../pages/parameters/Detail'
+import { setEdit, useEdits, writeEdits } from '../pages/parameters/edits'
+import { editable } from '../pages/parameters/Grid'
+import { readingText } from '../pages/parameters/GridRow'
+import { ProblemNote } from './ProblemNote'
+import { useAction } from './useAction'
+
+/** Rows of these keys that a connected port can carry, in the order of the keys. */
+export function useReachable(drive: string, keys: readonly string[]): ParameterRow[] {
+  const rows = useRows(drive) ?? []
+  return keys.flatMap((key) => rows.filter((row) => row.key === key && row.reachable))
+}
+
+/** Read parameters whose values are not known yet, or all of them. */
+export async function readKeys(drive: string, keys: string[]): Promise<void> {
+  if (keys.length === 0) return
+  setJob(
+    await ask(
+      api.POST('/api/v1/drives/{drive_id}/jobs/read_all', {
+        params: { path: { drive_id: drive } },
+        body: { keys },
+      }),
+    ),
+  )
+}
+
+/** Raw values as they are before a write, to take it back. */
+export function rawsOf(drive: string, keys: string[]): Record<string, number> {
+  const readings = contents.readings.get(drive)
+  const found: Record<string, number> = {}
+  for (const key of keys) {
+    const raw = readings?.get(key)?.raw
+    if (typeof raw === 'number') found[key] = raw
+  }
+  return found
+}
+
+/**
+ * A few parameters as a form, in words where the manual has words. Typed values are marked and
+ * written together; each is read back.
+ */
+export function ParameterFields({
+  drive,
+  keys,
+  onWritten,
+}: {
+  drive: string
+  keys: readonly string[]
+  onWritten?: (before: Record<string, number>) => void
+}) {
+  const t = useT()
+  const { open } = useLink()
+  const rows = useReachable(drive, keys)
+  const { edits, problems } = useEdits(drive)
+  const act = useAction()
+  const edited = rows.filter((row) => edits.has(row.key)).map((row) => row.key)
+  const wanted = rows
+    .filter((row) => row.access !== 'wo')
+    .map((row) => row.key)
+    .join(' ')
+  useEffect(() => {
+    if (open && wanted) void act.run(() => readKeys(drive, wanted.split(' ')))
+  }, [drive, open, wanted, act.run])
+  const write = () =>
+    act.run(async () => {
+      const before = rawsOf(drive, edited)
+      const problem = await writeEdits(drive, edited)
+      if (problem) act.setProblem(problem)
+      const now = rawsOf(drive, edited)
+      const changed = Object.fromEntries(
+        Object.entries(before).filter(([key, raw]) => now[key] !== raw),
+      )
+      if (Object.keys(changed).length > 0) onWritten?.(changed)
+    })
+  if (rows.length === 0) {
+    return <p className="dim">{t('fields.none')}</p>
+  }
+  return (
+    <>
+      <ul className="parameter-fields">
+        {rows.map((row) => (
+          <li key={row.key}>
+            <Field drive={drive} row={row} />
+            <ProblemNote problem={problems.get(row.key) ?? null} />
+          </li>
+        ))}
+      </ul>
+      <div className="row wrap">
+        {edited.length > 0 && (
+          <>
+            <Button variant="filled" loading={act.busy} onClick={() => void write()}>
+              {t('fields.write', { count: edited.length })}
+            </Button>
+            <Button
+              onClick={() => {
+                for (const key of edited) setEdit(drive, key, null)
+              }}
+            >
+              {t('fields.discard')}
+            </Button>
+          </>
+        )}
+      </div>
+      <ProblemNote problem={act.problem} onClose={act.clear} />
+    </>
+  )
+}
+
+function Field({ drive, row }: { drive: string; row: ParameterRow }) {
+  const t = useT()
+  const reading = useReading(drive, row.key) ?? row.reading
+  return (
+    <>
+      <div className="field-head">
+        <span className="grow">
+          {row.name} <small className="dim mono">{row.number ?? row.key}</small>
+        </span>
+        <strong className="num">
+          {readingText(row, reading, false)} <span className="unit">{row.unit}</span>
+        </strong>
+      </div>
+      {(reading.pending || reading.unsaved) && (
+        <div className="row">
+          {reading.pending && <span className="mark unsaved">{t('fields.waits')}</span>}
+          {reading.unsaved && <span className="mark unsaved">{t('fields.unsaved')}</span>}
+        </div>
+      )}
+      {editable(row) && <Editor drive={drive} row={row} compact />}
+      {(row.help || row.notes || row.settable === 'stopped') && (
+        <details>
+          <summary>?</summary>
+          {row.help && <p className="prose">{row.help}</p>}
+          {row.settable === 'stopped' && <p>{t('fields.stopped')}</p>}
+          {row.notes && <p className="dim">{row.notes}</p>}
+          <p className="dim">{t('source', { source: row.source })}</p>
+        </details>
+      )}
+      {reading.error && <p className="note warn">{reading.error}</p>}
+    </>
+  )
+}
