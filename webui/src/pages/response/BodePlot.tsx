@@ -257,7 +257,10 @@ function drawMarkers(plot: uPlot, markers: Marker[], named: boolean): void {
   const { ctx, bbox } = plot
   ctx.save()
   ctx.lineWidth = 1.5 * devicePixelRatio
+  ctx.textAlign = 'left'
+  ctx.textBaseline = 'alphabetic'
   ctx.font = `bold ${13 * devicePixelRatio}px sans-serif`
+  const labels: number[] = []
   for (const marker of markers) {
     const x = plot.valToPos(marker.frequency, 'x', true)
     if (x < bbox.left || x > bbox.left + bbox.width) continue
@@ -269,7 +272,10 @@ function drawMarkers(plot: uPlot, markers: Marker[], named: boolean): void {
     ctx.stroke()
     if (!named) continue
     ctx.fillStyle = marker.color
-    ctx.fillText(marker.label, x + 4, bbox.top + 14 * devicePixelRatio)
+    // Labels that would lie on each other stand in rows.
+    const row = labels.filter((each) => Math.abs(each - x) < 28 * devicePixelRatio).length
+    labels.push(x)
+    ctx.fillText(marker.label, x + 4, bbox.top + (14 + 16 * row) * devicePixelRatio)
   }
   ctx.restore()
 }

@@ -29,6 +29,7 @@ export function MeasurementList({
 }) {
   const t = useT()
   const act = useAction()
+  const kind = list.find((each) => each.file === shown)?.kind
   const [doomed, setDoomed] = useState<string | null>(null)
   const upload = (file: File) =>
     act.run(async () => {
@@ -88,7 +89,8 @@ export function MeasurementList({
                 <Button
                   aria-pressed={over === each.file}
                   variant={over === each.file ? 'filled' : 'default'}
-                  disabled={shown === null || shown === each.file}
+                  disabled={shown === null || shown === each.file || each.kind !== kind}
+                  title={shown !== null && each.kind !== kind ? t('measured.otherKind') : undefined}
                   onClick={() => onOver(over === each.file ? null : each.file)}
                 >
                   {t('measured.compare')}

@@ -145,7 +145,14 @@ const MARGINS: { key: string; text: Key; show: (value: number) => string; at?: s
 ]
 
 /** Bandwidths and margins of a loop, with the frequencies at which they were read. */
-export function MarginList({ margins }: { margins: Margins }) {
+export function MarginList({
+  margins,
+  over = null,
+}: {
+  margins: Margins
+  /** Those of a loop that it is compared with. */
+  over?: Margins | null
+}) {
   const t = useT()
   if (Object.keys(margins).length === 0) return null
   return (
@@ -162,6 +169,14 @@ export function MarginList({ margins }: { margins: Margins }) {
                 {typeof value === 'number' ? show(value) : '—'}
                 {typeof value === 'number' && typeof where === 'number' && (
                   <small className="dim"> {t('margin.at', { frequency: hertz(where) })}</small>
+                )}
+                {over && (
+                  <small className="dim">
+                    {' '}
+                    {t('margin.before', {
+                      value: typeof over[key] === 'number' ? show(over[key]) : '—',
+                    })}
+                  </small>
                 )}
               </dd>
             </div>

@@ -18,12 +18,14 @@ export function StepPlot({
   label,
   timeLabel,
   dark,
+  height = 260,
 }: {
   traces: Trace[]
   unit: string
   label: string
   timeLabel: string
   dark: boolean
+  height?: number
 }) {
   const box = useRef<HTMLDivElement>(null)
   const plotted = useRef<uPlot | null>(null)
@@ -31,7 +33,7 @@ export function StepPlot({
   useEffect(() => {
     const element = box.current
     if (!element) return
-    const size = () => ({ width: Math.max(200, element.clientWidth), height: 260 })
+    const size = () => ({ width: Math.max(200, element.clientWidth), height })
     const plot = new uPlot(options(traces, unit, timeLabel, size()), data(traces), element)
     plotted.current = plot
     const observer = new ResizeObserver(() => plot.setSize(size()))

@@ -81,6 +81,7 @@ export interface Step {
   time_s: number[]
   demand: number[]
   actual: number[]
+  torque_percent: number[]
   step: {
     overshoot_percent: number
     rise_s: number | null

@@ -4,16 +4,16 @@ import { api, ask } from '../../api/client'
 import { known, useT } from '../../i18n'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
-import { fixed, hertz, measuredCurve } from '../response/bode'
+import { hertz, measuredCurve } from '../response/bode'
 import { BodePlot } from '../response/BodePlot'
 import { Legend } from '../response/Legend'
 import { MarginList, ResonanceTable } from '../response/Readings'
-import { type Autotune, filesOf, type Step } from '../response/results'
-import { StepPlot } from '../response/StepPlot'
+import { type Autotune, filesOf } from '../response/results'
 import { usePrediction } from '../response/usePrediction'
 import { TRACE_COLORS } from '../scope/channels'
 import { CandidateTable } from './CandidateTable'
 import { InertiaResult } from './InertiaPanel'
+import { StepNumbers } from './StepNumbers'
 
 const undone = new Set<string>()
 
@@ -159,78 +159,6 @@ function Verification({ drive, result }: { drive: string; result: Autotune }) {
         onMarker={() => {}}
       />
       <MarginList margins={verified.sweep.margins} />
-    </>
-  )
-}
-
-/** A step's curve and its read-outs. */
-export function StepNumbers({ step }: { step: Step }) {
-  const t = useT()
-  const dark = useComputedColorScheme('light') === 'dark'
-  const colors = TRACE_COLORS[dark ? 'dark' : 'light']
-  const traces = useMemo(
-    () => [
-      {
-        label: t('step.demand'),
-        color: colors[1] ?? '',
-        dashed: true,
-        time: step.time_s,
-        value: step.demand,
-      },
-      { label: t('step.actual'), color: colors[0] ?? '', time: step.time_s, value: step.actual },
-    ],
-    [step, dark, t('step.demand')],
-  )
-  const ms = (s: number | null | undefined) => fixed(s == null ? null : s * 1000, 1, 'ms')
-  return (
-    <>
-      <h3>{t('predict.step')}</h3>
-      <Legend of={traces} />
-      <StepPlot
-        traces={traces}
-        unit={step.unit}
-        label={t('predict.step')}
-        timeLabel={t('predict.time')}
-        dark={dark}
-      />
-      <dl className="counters num">
-        {step.step && (
-          <>
-            <div>
-              <dt>{t('candidate.overshoot')}</dt>
-              <dd>{fixed(step.step.overshoot_percent, 1, '%')}</dd>
-            </div>
-            <div>
-              <dt>{t('step.rise')}</dt>
-              <dd>{ms(step.step.rise_s)}</dd>
-            </div>
-            <div>
-              <dt>{t('candidate.settling')}</dt>
-              <dd>{ms(step.step.settling_s)}</dd>
-            </div>
-          </>
-        )}
-        {step.move && (
-          <>
-            <div>
-              <dt>{t('step.following')}</dt>
-              <dd>{fixed(step.move.following_peak, 4, step.unit)}</dd>
-            </div>
-            <div>
-              <dt>{t('candidate.settling')}</dt>
-              <dd>{ms(step.move.settling_s)}</dd>
-            </div>
-          </>
-        )}
-        <div>
-          <dt>{t('step.torquePeak')}</dt>
-          <dd>{fixed(step.torque_peak_percent, 0, '%')}</dd>
-        </div>
-        <div>
-          <dt>{t('step.torqueRms')}</dt>
-          <dd>{fixed(step.torque_rms_percent, 0, '%')}</dd>
-        </div>
-      </dl>
     </>
   )
 }

@@ -99,7 +99,7 @@ export function CandidatesPanel({
         </p>
       ) : (
         <>
-          <div className="fields">
+          <div className="fields wide">
             <NativeSelect
               label={t('candidate.from')}
               value={file}

@@ -1,27 +1,33 @@
-import { Button, SegmentedControl } from '@mantine/core'
+import { Button, NativeSelect, SegmentedControl } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
+import type { MeasurementInfo } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setJob } from '../../live/store'
-import { JobNote } from '../../widgets/JobNote'
+import { dateTime } from '../../widgets/format'
+import { JobNote, useJobEnd } from '../../widgets/JobNote'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import type { Limits } from '../response/limits'
-import { asStep } from '../response/results'
+import { asStep, filesOf } from '../response/results'
+import { useMeasurement } from '../response/useMeasurements'
 import { useToolJob } from '../response/useToolJob'
-import { StepNumbers } from './AutotuneReport'
+import { StepNumbers } from './StepNumbers'
 
 /** A step of speed or a move, as a check of what the gains do. */
 export function StepPanel({
   drive,
   limits,
   able,
+  stored,
 }: {
   drive: string
   limits: Limits | null
   able: boolean
+  /** Earlier steps of this axis, newest first. */
+  stored: MeasurementInfo[]
 }) {
   const t = useT()
   const [kind, setKind] = useState<'speed' | 'move'>('speed')
@@ -30,7 +36,23 @@ export function StepPanel({
   const [acceleration, setAcceleration] = useState<number | null>(6000)
   const start = useAction()
   const { job, note, dismiss } = useToolJob(drive, 'step')
-  const result = asStep(job?.result)
+  const [shown, setShown] = useState('')
+  const [over, setOver] = useState('')
+  useJobEnd(job?.id ?? null, (ended) => {
+    const file = filesOf(ended.result).at(-1)
+    if (file === undefined || file === shown) return
+    // What was shown until now, or else the newest of before, is what it is compared with.
+    setOver(shown || (stored.find((each) => each.file !== file)?.file ?? ''))
+    setShown(file)
+  })
+  const now = useMeasurement(shown || null)
+  const before = useMeasurement(over || null)
+  const result = asStep(now.content?.result)
+  const earlier = asStep(before.content?.result)
+  const names = stored.map((each) => ({
+    value: each.file,
+    label: `${each.drive} · ${dateTime(each.saved)}`,
+  }))
   const go = () =>
     start.run(async () => {
       if (!limits || size === null || speed === null || acceleration === null) return
@@ -98,7 +120,29 @@ export function StepPanel({
       </Button>
       <ProblemNote problem={start.problem} onClose={start.clear} />
       <JobNote id={note} onClose={dismiss} />
-      {result && <StepNumbers step={result} />}
+      {stored.length > 0 && (
+        <div className="fields wide">
+          <NativeSelect
+            label={t('step.shown')}
+            value={shown}
+            onChange={(event) => setShown(event.currentTarget.value)}
+            data={[{ value: '', label: '—' }, ...names]}
+          />
+          <NativeSelect
+            label={t('step.compare')}
+            value={over}
+            onChange={(event) => setOver(event.currentTarget.value)}
+            data={[{ value: '', label: '—' }, ...names.filter(({ value }) => value !== shown)]}
+          />
+        </div>
+      )}
+      <ProblemNote problem={now.problem ?? before.problem} />
+      {result && earlier && earlier.kind !== result.kind && (
+        <p className="note warn">{t('step.otherKind')}</p>
+      )}
+      {result && (
+        <StepNumbers step={result} over={earlier?.kind === result.kind ? earlier : null} />
+      )}
     </Panel>
   )
 }

@@ -1,11 +1,12 @@
-import { href } from '../../app/router'
 import { useT } from '../../i18n'
 import { useAxisState, useDrive } from '../../live/store'
-import { Panel } from '../../widgets/Panel'
+import { useJobEnd } from '../../widgets/JobNote'
 import { useBuses } from '../connect/useBuses'
 import { useCyclic } from '../motion/SignalPanel'
 import { useLimits } from '../response/limits'
+import '../response/response.css'
 import { asAutotune, asInertia } from '../response/results'
+import { useChanges } from '../response/undo'
 import { useGains } from '../response/useGains'
 import { useMeasurements } from '../response/useMeasurements'
 import { useToolJob } from '../response/useToolJob'
@@ -13,7 +14,10 @@ import { AutotunePanel } from './AutotunePanel'
 import { CandidatesPanel } from './CandidatesPanel'
 import { GainsPanel } from './GainsPanel'
 import { InertiaPanel } from './InertiaPanel'
+import type { Known } from './path'
+import { PathNav } from './PathNav'
 import { PreChecks } from './PreChecks'
+import { ReportPanel, useReports } from './ReportPanel'
 import { StepPanel } from './StepPanel'
 import { preChecks, ready } from './steps'
 
@@ -26,9 +30,19 @@ export function TunePage({ drive }: { drive: string }) {
   const possible = useCyclic(summary, state)
   const limits = useLimits(drive)
   const gains = useGains(drive)
-  const measured = useMeasurements()
+  const measured = useMeasurements('')
+  const reports = useReports()
+  const changes = useChanges(drive)
   const inertiaJob = useToolJob(drive, 'inertia').job
-  const tuned = asAutotune(useToolJob(drive, 'autotune').job?.result)
+  const tuneJob = useToolJob(drive, 'autotune').job
+  const stepJob = useToolJob(drive, 'step').job
+  useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(stepJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(tuneJob?.id ?? null, () => {
+    void measured.refresh()
+    void gains.read()
+  })
+  const tuned = asAutotune(tuneJob?.result)
   if (!summary) return null
   const bus =
     buses.find(
@@ -42,30 +56,45 @@ export function TunePage({ drive }: { drive: string }) {
     gains.gains !== null &&
     gains.gains.convention !== 'unit' &&
     gains.gains.current_bandwidth_hz !== null
+  const ours = measured.list.filter(
+    (each) => each.profile === summary.profile && each.drive === summary.name,
+  )
   const mechanics = measured.list.filter(
     (each) => each.kind === 'sweep-mechanics' && each.profile === summary.profile,
   )
+  const path: Known = {
+    ready: able,
+    inertia: si !== null,
+    changed: later(changes.at(-1)?.time ?? null, tuned?.applied ? (tuneJob?.ended ?? null) : null),
+    measured: ours,
+    reported: reports.list[0]?.made ?? null,
+  }
   return (
     <div className="page">
       <h1>
         {t('page.tune')} <small className="dim">{summary.name}</small>
       </h1>
+      {possible && <PathNav drive={drive} known={path} />}
       {state && !possible && <p className="note info">{t('tune.needsCyclic')}</p>}
       <div className="columns">
         <div className="stack">
-          <PreChecks drive={summary} checks={checks} bus={bus} limits={limits} onChange={refresh} />
+          <div id="step-checks">
+            <PreChecks
+              drive={summary}
+              checks={checks}
+              bus={bus}
+              limits={limits}
+              onChange={refresh}
+            />
+          </div>
           {possible && (
-            <InertiaPanel drive={drive} state={state} limits={limits.limits} able={able} />
+            <div id="step-inertia">
+              <InertiaPanel drive={drive} state={state} limits={limits.limits} able={able} />
+            </div>
           )}
-          <GainsPanel drive={drive} of={gains} inertia={si} />
-          {possible && (
-            <Panel title={t('tune.response')}>
-              <p>{t('tune.responseText')}</p>
-              <a className="big" href={href('response', drive)}>
-                {t('page.response')}
-              </a>
-            </Panel>
-          )}
+          <div id="step-gains">
+            <GainsPanel drive={drive} of={gains} inertia={si} />
+          </div>
         </div>
         <div className="stack">
           {possible && designable && (
@@ -77,7 +106,17 @@ export function TunePage({ drive }: { drive: string }) {
               onChanged={() => void gains.read()}
             />
           )}
-          {possible && <StepPanel drive={drive} limits={limits.limits} able={able} />}
+          {possible && (
+            <StepPanel
+              drive={drive}
+              limits={limits.limits}
+              able={able}
+              stored={ours.filter((each) => each.kind === 'step')}
+            />
+          )}
+          <div id="step-report">
+            <ReportPanel drive={drive} of={reports} />
+          </div>
         </div>
       </div>
       {designable && gains.gains && (
@@ -91,4 +130,10 @@ export function TunePage({ drive }: { drive: string }) {
       )}
     </div>
   )
+}
+
+/** The later of two times; null is before all. */
+function later(a: string | null, b: string | null): string | null {
+  if (a === null || b === null) return a ?? b
+  return Date.parse(a) > Date.parse(b) ? a : b
 }

@@ -1,0 +1,42 @@
+import { describe, expect, it } from 'vitest'
+import { type Known, nextStep, stepsDone } from './path'
+
+const at = (minute: number) => new Date(Date.UTC(2026, 2, 1, 12, minute)).toISOString()
+const start: Known = { ready: false, inertia: false, changed: null, measured: [], reported: null }
+
+describe('the guided path', () => {
+  it('begins with what must be right before anything moves', () => {
+    expect(nextStep(stepsDone(start))).toBe('checks')
+    expect(nextStep(stepsDone({ ...start, ready: true }))).toBe('inertia')
+  })
+  it('asks for a verification after every change', () => {
+    const measured = [
+      { kind: 'sweep-speed_loop', saved: at(5) },
+      { kind: 'sweep-mechanics', saved: at(3) },
+      { kind: 'inertia', saved: at(2) },
+    ]
+    const known = { ...start, ready: true, changed: at(4), measured }
+    expect(stepsDone(known).verify).toBe(true)
+    expect(nextStep(stepsDone(known))).toBe('report')
+    expect(nextStep(stepsDone({ ...known, changed: at(6) }))).toBe('verify')
+  })
+  it('asks for a new report after a new verification', () => {
+    const measured = [{ kind: 'sweep-speed_loop', saved: at(5) }]
+    const known = { ...start, changed: at(4), measured }
+    expect(stepsDone({ ...known, reported: at(3) }).report).toBe(false)
+    expect(stepsDone({ ...known, reported: at(6) }).report).toBe(true)
+  })
+  it('ends', () => {
+    const all = stepsDone({
+      ready: true,
+      inertia: true,
+      changed: at(4),
+      measured: [
+        { kind: 'sweep-position_loop', saved: at(5) },
+        { kind: 'sweep-mechanics', saved: at(3) },
+      ],
+      reported: at(6),
+    })
+    expect(nextStep(all)).toBeNull()
+  })
+})

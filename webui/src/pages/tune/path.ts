@@ -1,0 +1,48 @@
+import type { MeasurementInfo } from '../../api/schema'
+
+export const STEPS = [
+  'checks',
+  'inertia',
+  'gains',
+  'response',
+  'notches',
+  'verify',
+  'report',
+] as const
+export type StepName = (typeof STEPS)[number]
+
+/** What is known of the axis when the path is drawn. */
+export interface Known {
+  ready: boolean
+  inertia: boolean
+  /** When a change was written last, as the page remembers it; null: never. */
+  changed: string | null
+  /** Usable measurements of this axis, newest first. */
+  measured: Pick<MeasurementInfo, 'kind' | 'saved'>[]
+  /** When a report was made last. */
+  reported: string | null
+}
+
+const newest = (known: Known, kinds: string[]): string | null =>
+  known.measured.find((each) => kinds.includes(each.kind))?.saved ?? null
+const after = (time: string | null, other: string | null) =>
+  time !== null && (other === null || Date.parse(time) >= Date.parse(other))
+
+/** Which steps of the path are done: measured, written, and verified since the last change. */
+export function stepsDone(known: Known): Record<StepName, boolean> {
+  const verified = newest(known, ['sweep-speed_loop', 'sweep-position_loop'])
+  const changed = known.changed
+  const done = {
+    checks: known.ready,
+    inertia: known.inertia || newest(known, ['inertia']) !== null,
+    gains: changed !== null,
+    response: newest(known, ['sweep-mechanics']) !== null,
+    notches: changed !== null && newest(known, ['sweep-mechanics']) !== null,
+    verify: verified !== null && after(verified, changed),
+  }
+  return { ...done, report: done.verify && after(known.reported, verified) }
+}
+
+/** The first step that is not done; null at the end of the path. */
+export const nextStep = (done: Record<StepName, boolean>): StepName | null =>
+  STEPS.find((each) => !done[each]) ?? null
