@@ -14,9 +14,9 @@ from typing import Annotated
 import typer
 
 from backend.bench import Bench
-from backend.commands import measure, params, profile, report
+from backend.commands import measure, params, people, profile, report
+from backend.commands.serve import Serving, state_folder
 from backend.commands.serve import serve as run_server
-from backend.commands.serve import state_folder
 from backend.commands.session import opened, run, show_progress
 from backend.demo import DemoBench
 from backend.matching import match_profiles
@@ -29,25 +29,61 @@ app = typer.Typer(
 )
 app.add_typer(params.app, name="params")
 app.add_typer(profile.app, name="profile")
+app.add_typer(people.app, name="people")
 app.command("sweep")(measure.sweep)
 app.command("inertia")(measure.inertia)
 app.command("report")(report.report)
 app.command("recompute")(report.recompute)
 
-Host = Annotated[str, typer.Option(help="address to listen on")]
+Host = Annotated[
+    str,
+    typer.Option(
+        "--host",
+        "--bind",
+        help="address to listen on; any but loopback needs accounts and uses HTTPS",
+    ),
+]
 Port = Annotated[int, typer.Option(help="port to listen on; 0 takes a free one")]
 Config = Annotated[Path | None, typer.Option(help="folder of drives and parameter sets")]
 Open = Annotated[bool, typer.Option("--open", help="open the page in a browser")]
 
+Accounts = Annotated[
+    bool | None,
+    typer.Option(
+        "--accounts/--single-user",
+        help="log in, or be the one user of this machine; by default accounts are asked for "
+        "where there are some",
+        show_default=False,
+    ),
+]
+CertificateFile = Annotated[
+    Path | None, typer.Option("--certificate", help="own certificate with its chain (PEM)")
+]
+KeyFile = Annotated[Path | None, typer.Option("--key", help="key of that certificate (PEM)")]
+AllowHost = Annotated[
+    list[str] | None,
+    typer.Option("--allow-host", help="name of a proxy or tunnel in front; asks for accounts"),
+]
+
 
 @app.command()
 def serve(
-    host: Host = "127.0.0.1", port: Port = 8420, config: Config = None, open_: Open = False
+    host: Host = "127.0.0.1",
+    port: Port = 8420,
+    config: Config = None,
+    open_: Open = False,
+    accounts: Accounts = None,
+    certificate: CertificateFile = None,
+    key: KeyFile = None,
+    allow_host: AllowHost = None,
 ) -> None:
     """Start the server and the web page."""
+    serving = Serving(
+        host, port, accounts, certificate, key, frozenset(allow_host or ()), open_page=open_
+    )
 
     async def work() -> None:
-        await run_server(Bench(state_folder(config)), host, port, open_page=open_)
+        await run_server(Bench(state_folder(config), database=database, blobs=blobs), serving)
 
     _until_interrupted(work)
 
@@ -59,8 +95,15 @@ def demo(
     bench: Annotated[Path | None, typer.Option(help="bench file (TOML)")] = None,
     config: Config = None,
     open_: Open = False,
+    accounts: Accounts = None,
+    certificate: CertificateFile = None,
+    key: KeyFile = None,
+    allow_host: AllowHost = None,
 ) -> None:
     """Start the server on a bench of virtual drives: no hardware, no root."""
+    serving = Serving(
+        host, port, accounts, certificate, key, frozenset(allow_host or ()), open_page=open_
+    )
 
     async def work() -> None:
         with tempfile.TemporaryDirectory(prefix="servodeck-") as folder:
@@ -71,8 +114,8 @@ def demo(
                     print(f"  {url}  is  {real}")
                 for problem in drives.problems:
                     print(f"  note: {problem}")
-                server_bench = Bench(state, drives.wires)
-                await run_server(server_bench, host, port, open_page=open_)
+                server_bench = Bench(state, drives.wires, database=database, blobs=blobs)
+                await run_server(server_bench, serving)
 
     _until_interrupted(work)
 

@@ -9,6 +9,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
+from backend.people.identity import Actor, acting, acting_person
 from drivers.errors import Busy, DriveError
 
 JobState = Literal["running", "done", "failed", "cancelled"]
@@ -36,6 +37,7 @@ class Job:
 
     ``motion``: it holds its axis, so that no other such job can begin. ``stoppable``: STOP
     cancels it; not so for work that holds the axis still and must not be left half done.
+    ``actor`` is who began it, through which live connection; None where the program did.
     """
 
     id: str
@@ -51,6 +53,7 @@ class Job:
     result: JobResult | None = None
     error: Exception | None = None
     person: str = ""
+    actor: Actor | None = None
     task: asyncio.Task[None] | None = None
 
     async def wait(self) -> None:
@@ -126,7 +129,8 @@ class JobRunner:
             drive=drive,
             motion=motion,
             progress=Progress(lambda: self._tell(job)),
-            person=person,
+            person=person or acting_person(),
+            actor=acting.get(),
             stoppable=stoppable,
         )
         self._jobs[job.id] = job

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from backend.people.identity import acting_person
+
 Level = Literal["info", "warning", "error"]
 
 
@@ -38,8 +40,8 @@ class Journal:
     def add(
         self, text: str, *, level: Level = "info", drive: str | None = None, person: str = ""
     ) -> None:
-        """Write an entry with the present time."""
-        entry = Entry(time.time(), level, drive, person, text)
+        """Write an entry with the present time; without ``person`` it is of whoever acts."""
+        entry = Entry(time.time(), level, drive, person or acting_person(), text)
         self._entries.append(entry)
         for listener in self._listeners:
             listener(entry)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from pydantic.json_schema import models_json_schema
 
-from backend.api import live_messages, models, models_description
+from backend.api import live_messages, live_people_messages, models, models_description
 from backend.api.app import make_app
 from backend.bench import Bench
 
@@ -32,10 +32,11 @@ def description() -> str:
         document = app.openapi()
     messages = [
         (model, "serialization")
-        for model in vars(live_messages).values()
+        for module in (live_messages, live_people_messages)
+        for model in vars(module).values()
         if isinstance(model, type)
         and issubclass(model, live_messages.Message)
-        and model.__module__ == live_messages.__name__
+        and model.__module__ == module.__name__
     ]
     # Carried in the results of jobs, so no route names them.
     messages += [

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Awaitable, Callable
+import asyncio
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from fastapi import APIRouter, FastAPI, Request, Response, WebSocket
+from fastapi import APIRouter, FastAPI, Response, WebSocket
 from fastapi.responses import FileResponse
 from fastapi.routing import APIRoute
 
@@ -22,6 +23,7 @@ from backend.api import (
     routes_io,
     routes_library,
     routes_lists,
+    routes_people,
     routes_recordings,
     routes_rerun,
     routes_scope,
@@ -29,50 +31,62 @@ from backend.api import (
     routes_tune,
 )
 from backend.api.audited import AuditedAnswers
-from backend.api.errors import NotFound, answer, problem_of
+from backend.api.errors import NotFound
 from backend.api.live import LiveHub
 from backend.api.models import Problem
+from backend.api.security import Gate
+from backend.api.security_origin import Addresses
+from backend.api.security_socket import OpenSockets
 from backend.axis_store import AxisStore
 from backend.bench import Bench
 from backend.forcing import ForcingSessions
+from backend.people.station import People
 from backend.recording.rerun_assets import ViewerAssets
 from backend.recording.rerun_feed import RerunFeed
 from backend.recording.service import Recordings
-from drivers.errors import NotAllowed
 
 PREFIX = "/api/v1"
 _HERE = Path(__file__).resolve()
 #: Where a wheel carries the built page, and where a checkout has it.
 _PAGE_FOLDERS = (_HERE.parents[1] / "web", _HERE.parents[2] / "webui" / "dist")
 
-_SECURITY_HEADERS = {
-    "Content-Security-Policy": (
-        "default-src 'self'; connect-src 'self'; img-src 'self' data: blob:; "
-        "style-src 'self' 'unsafe-inline'; worker-src 'self' blob:; frame-ancestors 'self'; "
-        "base-uri 'none'; form-action 'self'; object-src 'none'"
-    ),
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Opener-Policy": "same-origin",
-}
 
+def make_app(
+    bench: Bench,
+    *,
+    hosts: frozenset[str],
+    people: People | None = None,
+    behind: frozenset[str] = frozenset(),
+    own_addresses: bool = False,
+    strict_transport: bool = False,
+) -> FastAPI:
+    """The application over a bench. ``hosts`` are the Host names that it answers to.
 
-def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
-    """The application over a bench. ``hosts`` are the Host names that it answers to."""
+    Without ``people`` whoever reaches it is the one user: for the machine's own loopback. For
+    ``behind`` and ``own_addresses`` see `Addresses`; ``strict_transport`` tells browsers to come
+    by HTTPS only.
+    """
 
     recordings = Recordings(bench, bench.state_folder / "recordings")
     feed = RerunFeed(bench)
+    known = people or People(bench.state_folder)
+    sockets = OpenSockets()
+    live = LiveHub(bench, known, sockets)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         recordings.open()
+        await known.open()
         await bench.restore()
+        watch = asyncio.create_task(live.people.run(), name="people")
         yield
         # What moves is stopped before a slow disk may keep the server waiting.
         await bench.jobs.close()
         await feed.close()
         await recordings.close()
+        watch.cancel()
         await bench.close()
+        known.close()
 
     app = FastAPI(
         title="servodeck",
@@ -85,9 +99,16 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
         responses={
             status: {"model": Problem, "description": text}
             for status, text in (
+                (400, "Not a request of this interface"),
+                (401, "Nobody is logged in"),
+                (403, "Not for this person, or not from our page"),
                 (404, "No such thing"),
+                (405, "Not with this method"),
+                (408, "The body came too slowly"),
                 (409, "Not possible now"),
+                (413, "Too large"),
                 (422, "Not acceptable"),
+                (429, "Too often"),
                 (502, "The answer makes no sense"),
                 (503, "The link is gone"),
                 (504, "No answer in time"),
@@ -99,8 +120,8 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
     app.state.axis_store = AxisStore(bench.state_folder / "axes")
     app.state.forcing = ForcingSessions(bench.jobs, bench.leases)
     errors.install(app)
-    live = LiveHub(bench)
     app.state.live = live
+    app.state.people = known
     api = APIRouter(prefix=PREFIX)
     for part in (
         routes_bench,
@@ -116,6 +137,7 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
         routes_io,
         routes_library,
         routes_audit,
+        routes_people,
     ):
         api.include_router(part.router)
     app.include_router(api)
@@ -123,55 +145,23 @@ def make_app(bench: Bench, *, hosts: frozenset[str]) -> FastAPI:
 
     @app.websocket(f"{PREFIX}/live")
     async def live_socket(socket: WebSocket) -> None:
-        if not _allowed(socket.headers.get("host"), socket.headers.get("origin"), hosts):
-            await socket.close(code=1008)
-            return
         await live.serve(socket)
 
-    routes_rerun.install(
-        app,
-        feed,
-        ViewerAssets(),
-        lambda s: _allowed(s.headers.get("host"), s.headers.get("origin"), hosts),
-    )
-
-    @app.middleware("http")
-    async def guard(
-        request: Request, call_next: Callable[[Request], Awaitable[Response]]
-    ) -> Response:
-        if not _allowed(request.headers.get("host"), request.headers.get("origin"), hosts):
-            refusal = NotAllowed(
-                "this address of the server is not one that it answers to",
-                value=request.headers.get("host"),
-                limit=", ".join(sorted(hosts)),
-                remedy="open the address that the terminal shows",
-            )
-            problem = problem_of(refusal)
-            return answer(problem.model_copy(update={"status": 403, "title": "Forbidden"}))
-        response = await call_next(request)
-        for name, value in _SECURITY_HEADERS.items():
-            response.headers.setdefault(name, value)
-        return response
-
+    routes_rerun.install(app, feed, ViewerAssets())
     _add_page(app)
+    app.add_middleware(
+        Gate,
+        people=known,
+        leases=bench.leases,
+        addresses=Addresses(hosts, behind, own_addresses),
+        sockets=sockets,
+        strict_transport=strict_transport,
+    )
     return app
 
 
 def _operation_id(route: APIRoute) -> str:
     return route.name
-
-
-def _allowed(host: str | None, origin: str | None, hosts: frozenset[str]) -> bool:
-    """Host must be ours (DNS rebinding), and a browser's Origin the same host."""
-    if host is None or _name(host) not in hosts:
-        return False
-    return origin is None or origin.split("://", 1)[-1] == host
-
-
-def _name(host: str) -> str:
-    if host.startswith("["):
-        return host.split("]", 1)[0] + "]"
-    return host.rsplit(":", 1)[0] if ":" in host else host
 
 
 def _add_page(app: FastAPI) -> None:

@@ -8,9 +8,13 @@ from fastapi import Depends, Header, Request
 
 from backend.api.errors import NotFound
 from backend.bench import Bench, Member
+from backend.people.errors import NotLoggedIn
+from backend.people.identity import Identity, acting
+from backend.people.station import People
 from drivers.errors import NotAllowed
 
-#: Sent by the page with every change: the id of its live connection, which may hold a lease.
+#: Sent by the page with every change: the id of its live connection, which may hold a lease. The
+#: gate takes away one that is not of the same session, so a route may believe it.
 CONNECTION_HEADER = "X-Servodeck-Connection"
 
 
@@ -24,6 +28,30 @@ def bench_of(request: Request) -> Bench:
 
 Connection = Annotated[str | None, Header(alias=CONNECTION_HEADER)]
 TheBench = Annotated[Bench, Depends(bench_of)]
+
+
+def people_of(request: Request) -> People:
+    """The people of this server."""
+    people = request.app.state.people
+    if not isinstance(people, People):
+        raise TypeError("the application was made without people")
+    return people
+
+
+def identity_now() -> Identity:
+    """Who asks.
+
+    Raises:
+        NotLoggedIn: nobody.
+    """
+    actor = acting.get()
+    if actor is None:
+        raise NotLoggedIn("nobody is logged in", remedy="log in")
+    return actor.identity
+
+
+ThePeople = Annotated[People, Depends(people_of)]
+Me = Annotated[Identity, Depends(identity_now)]
 
 
 def member_of(drive_id: str, bench: TheBench) -> Member:
@@ -41,14 +69,6 @@ def member_of(drive_id: str, bench: TheBench) -> Member:
 TheMember = Annotated[Member, Depends(member_of)]
 
 
-def controlled(member: TheMember, bench: TheBench, connection: Connection = None) -> Member:
-    """The drive that a path names, for a route that changes it.
-
-    Raises:
-        Busy: somebody else has control.
-    """
-    bench.leases.require(member.drive.id, connection)
-    return member
-
-
-Controlled = Annotated[Member, Depends(controlled)]
+#: The drive that a path names, for a route that changes it. The gate has made sure that nobody
+#: else has control (backend.api.rights).
+Controlled = TheMember

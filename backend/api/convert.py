@@ -49,6 +49,7 @@ def bus(bench: Bench, url: str, link: Link) -> models.Bus:
     if session is not None and session.state is not None:
         info = models.CyclicInfo(
             running=session.running,
+            problem=session.trouble,
             cycle_us=session.state.cycle_s * 1e6,
             dc=session.state.dc,
             channels=list(session.state.channels),
@@ -68,10 +69,15 @@ def lease(bench: Bench, drive: str, connection: str | None) -> models.Lease:
     holder = bench.leases.holder(drive)
     if holder is None:
         return models.Lease(holder=None, since=None)
+    asked = bench.leases.asked(drive)
     return models.Lease(
         holder=holder.person,
         since=moment(holder.since),
         mine=holder.connection == connection,
+        connection=holder.connection,
+        until=None if holder.until is None else moment(holder.until),
+        asked_by=None if asked is None else asked.person,
+        asked_until=None if asked is None else moment(asked.until),
     )
 
 

@@ -12,6 +12,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from backend.api.models import Problem
+from backend.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
 from drivers.errors import (
     Busy,
     DriveError,
@@ -25,7 +26,12 @@ from drivers.errors import (
 
 log = logging.getLogger(__name__)
 
+#: The first that fits counts.
 STATUS: dict[type[DriveError], int] = {
+    NotLoggedIn: 401,
+    Forbidden: 403,
+    NoSuchPerson: 404,
+    TooOften: 429,
     OutOfRange: 422,
     Rejected: 422,
     NotAllowed: 409,
@@ -50,6 +56,10 @@ _TITLES = {
     "storage-failed": "Could not be stored",
     "restore-failed": "Not everything was restored",
     "not-found": "Not found",
+    "not-logged-in": "Not logged in",
+    "forbidden": "Forbidden",
+    "too-often": "Too often",
+    "wrong-method": "Wrong method",
 }
 
 
@@ -57,6 +67,16 @@ class NotFound(NotAllowed):
     """The address names nothing that exists."""
 
     kind = "not-found"
+
+
+class WrongMethod(DriveError):
+    """The address is there, but not for this method. ``methods`` are those that it has."""
+
+    kind = "wrong-method"
+
+    def __init__(self, message: str, methods: list[str]) -> None:
+        super().__init__(message, limit=", ".join(methods))
+        self.methods = methods
 
 
 def problem_of(error: Exception) -> Problem:
@@ -69,7 +89,7 @@ def problem_of(error: Exception) -> Problem:
             detail=f"{type(error).__name__}: {error}",
             remedy="this is a defect of servodeck; report it with the log",
         )
-    status = 404 if isinstance(error, NotFound) else _status(error)
+    status = _status(error)
     value = _scalar(error.value)
     return Problem(
         type=f"urn:servodeck:{error.kind}",
@@ -86,6 +106,10 @@ def problem_of(error: Exception) -> Problem:
 
 
 def _status(error: DriveError) -> int:
+    if isinstance(error, NotFound):
+        return 404
+    if isinstance(error, WrongMethod):
+        return 405
     return next((code for kind, code in STATUS.items() if isinstance(error, kind)), 500)
 
 

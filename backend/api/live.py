@@ -9,7 +9,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
+import math
+import time
 from collections.abc import Callable
+from datetime import UTC, datetime
 from functools import partial
 
 from fastapi import WebSocket, WebSocketDisconnect
@@ -19,8 +22,8 @@ import backend
 from backend.api import convert
 from backend.api.errors import problem_of
 from backend.api.live_messages import (
+    DriveRequest,
     DrivesChanged,
-    FromPage,
     Hello,
     JobChanged,
     JogEnded,
@@ -41,13 +44,19 @@ from backend.api.live_messages import (
     WatchValues,
     from_page,
 )
+from backend.api.live_people import PeopleLive
+from backend.api.live_people_messages import PeopleRequest
 from backend.api.live_scope import ScopeStreams
+from backend.api.security_messages import require_message
+from backend.api.security_socket import OpenSockets
 from backend.axis import Axis
 from backend.bench import Bench
 from backend.drive import Reading
 from backend.jobs import Job, JobResult, Progress
 from backend.journal import Entry
 from backend.monitor import Snapshot
+from backend.people.identity import Actor, Identity, acting
+from backend.people.station import People
 from backend.tools.cyclic_motion import jog_cyclic
 from backend.tools.jog import Hold, JogSettings, jog
 from drivers.errors import DriveError
@@ -59,11 +68,14 @@ SEND_TIMEOUT_S = 10.0
 
 
 class LiveHub:
-    """All live connections of a server."""
+    """All live connections of a server, and the people behind them."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: Bench, people: People, sockets: OpenSockets) -> None:
         self.bench = bench
         self.connections: dict[str, Connection] = {}
+        self.people = PeopleLive(bench, people, self.connections)
+        self._known, self._sockets = people, sockets
+        people.on_ended.append(self._ended)
         self._numbers = itertools.count(1)
         bench.on_snapshot.append(self._snapshot)
         bench.on_readings.append(self._readings)
@@ -73,14 +85,29 @@ class LiveHub:
 
     async def serve(self, socket: WebSocket) -> None:
         """Carry one connection from accept to its end."""
+        actor = acting.get()
+        if actor is None:
+            raise RuntimeError("a live connection without the gate before it")
         await socket.accept()
-        connection = Connection(f"c{next(self._numbers)}", socket, self.bench)
-        self.connections[connection.id] = connection
+        name = f"c{next(self._numbers)}"
+        connection = Connection(name, socket, self.bench, self.people, self._known, actor.identity)
+        self.connections[name] = connection
+        self._sockets.own(name, actor.identity.session)
+        acting.set(Actor(actor.identity, name))
         try:
             await connection.run()
         finally:
-            del self.connections[connection.id]
+            del self.connections[name]
+            self._sockets.disown(name)
+            self.people.left(connection)
             await connection.close()
+
+    def _ended(self, session: str) -> None:
+        """A session is over: its pages hold nothing any more, and hear nothing."""
+        for connection in self._each():
+            if connection.identity.session == session:
+                connection.release(None, "the session is over")
+        self._sockets.end(session)
 
     def _each(self) -> list[Connection]:
         return list(self.connections.values())
@@ -122,10 +149,22 @@ def _job(job: Job) -> BaseModel:
 class Connection:
     """One page."""
 
-    def __init__(self, name: str, socket: WebSocket, bench: Bench) -> None:
+    def __init__(
+        self,
+        name: str,
+        socket: WebSocket,
+        bench: Bench,
+        people: PeopleLive,
+        known: People,
+        identity: Identity,
+    ) -> None:
         self.id = name
-        self.person = "local user"
+        self.identity = identity
+        self.page = ""
+        self.since = datetime.now(UTC)
+        self.heard = time.monotonic()
         self.watched: set[str] = set()
+        self._people, self._known = people, known
         self._socket = socket
         self._bench = bench
         self._queue: asyncio.Queue[BaseModel] = asyncio.Queue(QUEUE)
@@ -141,6 +180,7 @@ class Connection:
         """Until the page is gone."""
         self.send(Hello(connection=self.id, version=backend.__version__))
         self.later("drives", "", self.drive_list)
+        self._people.changed()
         sender = asyncio.create_task(self._sender(), name=f"live-{self.id}")
         receiver = asyncio.create_task(self._receiver(), name=f"hear-{self.id}")
         scoper = asyncio.create_task(self.scopes.run(), name=f"scopes-{self.id}")
@@ -168,11 +208,15 @@ class Connection:
         for task in self._polls.values():
             task.cancel()
         await self.scopes.close()
-        self._bench.leases.drop(self.id)
 
     def _release_holds(self) -> None:
-        for hold in self._holds.values():
-            hold.release("the page's connection closed")
+        self.release(None, "the page's connection closed")
+
+    def release(self, drive: str | None, reason: str) -> None:
+        """End jogs of this page: of one axis, or all."""
+        for each, hold in self._holds.items():
+            if drive in (None, each):
+                hold.release(reason)
 
     # --- out --------------------------------------------------------------------------
 
@@ -235,7 +279,10 @@ class Connection:
                 if message["type"] == "websocket.disconnect":
                     return
                 text = message.get("text")
+                # Not silent while a request takes its time.
+                self.heard = math.inf
                 await self._handle(text if isinstance(text, str) else "")
+                self.heard = time.monotonic()
 
     async def _handle(self, text: str) -> None:
         try:
@@ -246,11 +293,17 @@ class Connection:
             self.send(Refused(request="?", problem=problem_of(problem)))
             return
         try:
-            await self._act(request)
+            self.identity = self._known.admit(self.identity, request.type)
+            acting.set(Actor(self.identity, self.id))
+            require_message(self._known, self.identity, request)
+            if isinstance(request, PeopleRequest):
+                await self._people.act(self, self.identity, request)
+            else:
+                await self._act(request)
         except DriveError as error:
             self.send(Refused(request=request.type, problem=problem_of(error)))
 
-    async def _act(self, request: FromPage) -> None:
+    async def _act(self, request: DriveRequest) -> None:
         match request:
             case StopAll():
                 await self._stop(request)
@@ -277,7 +330,7 @@ class Connection:
         drives = [request.drive] if request.drive else list(self._bench.members)
         known = [drive for drive in drives if drive in self._bench.members]
         problems = await self._bench.stop(known)
-        self._bench.journal.add("STOP", level="warning", drive=request.drive, person=self.person)
+        self._bench.journal.add("STOP", level="warning", drive=request.drive)
         for drive, text in problems.items():
             if text:
                 failure = DriveError(f"STOP did not reach it: {text}", drive=drive)
@@ -286,7 +339,7 @@ class Connection:
     def _lease(self, request: LeaseTake) -> None:
         self._bench.member(request.drive)
         if request.take:
-            self._bench.leases.take(request.drive, self.id, self.person)
+            self._bench.leases.take(request.drive, self.id, self.identity.person)
             return
         if (hold := self._holds.get(request.drive)) is not None:
             hold.release("control was given back")
@@ -322,7 +375,7 @@ class Connection:
     def _jog(self, request: JogStart) -> None:
         bench, member = self._bench, self._bench.member(request.drive)
         held_before = bench.leases.holder(request.drive) is not None
-        bench.leases.take(request.drive, self.id, self.person)
+        bench.leases.take(request.drive, self.id, self.identity.person)
         hold = Hold()
         settings = JogSettings(
             direction=request.direction,
@@ -338,7 +391,6 @@ class Connection:
                 lambda progress: _jog_work(member.axis, settings, hold, progress),
                 drive=request.drive,
                 motion=True,
-                person=self.person,
             )
         except DriveError:
             if not held_before:

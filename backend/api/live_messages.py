@@ -21,6 +21,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
+from backend.api.live_people_messages import PeopleNews, PeopleRequest
 from backend.api.models import (
     AxisState,
     DriveSummary,
@@ -127,7 +128,7 @@ class Ping(Message):
     n: int
 
 
-FromPage = Annotated[
+DriveRequest = (
     WatchState
     | WatchValues
     | JogStart
@@ -137,9 +138,9 @@ FromPage = Annotated[
     | LeaseTake
     | ScopeStart
     | ScopeStop
-    | Ping,
-    Field(discriminator="type"),
-]
+    | Ping
+)
+FromPage = Annotated[DriveRequest | PeopleRequest, Field(discriminator="type")]
 from_page: TypeAdapter[FromPage] = TypeAdapter(FromPage)
 
 # --- server to page -----------------------------------------------------------------
@@ -254,4 +255,5 @@ ToPage = (
     | Logged
     | Refused
     | Pong
+    | PeopleNews
 )

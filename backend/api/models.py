@@ -46,14 +46,6 @@ class Health(Message):
     demo: bool
 
 
-class Session(Message):
-    """Who is asking."""
-
-    person: str
-    role: Literal["viewer", "operator", "administrator"]
-    login_required: bool
-
-
 class SerialPort(Message):
     """A serial adapter of this machine."""
 
@@ -211,6 +203,12 @@ class Lease(Message):
     holder: str | None
     since: datetime | None
     mine: bool = False
+    connection: str | None = Field(default=None, description="live connection of the holder")
+    until: datetime | None = Field(default=None, description="end of a hand-over for a time")
+    asked_by: str | None = Field(default=None, description="who asks for control and waits")
+    asked_until: datetime | None = Field(
+        default=None, description="when control passes on if the holder does not answer"
+    )
 
 
 class DriveSummary(Message):

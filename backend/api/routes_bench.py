@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 
 import backend
 from backend.api import convert
-from backend.api.context import Connection, Controlled, TheBench, TheMember
+from backend.api.context import Connection, Controlled, Me, TheBench, TheMember, ThePeople
 from backend.api.errors import NotFound
 from backend.api.interfaces import list_interfaces
 from backend.api.models import (
@@ -24,12 +24,13 @@ from backend.api.models import (
     PortRequest,
     ProfileInfo,
     ScanRequest,
-    Session,
     StopRequest,
     StopResult,
 )
+from backend.api.security import require_right
 from backend.bench import Bench
 from backend.jobs import Job, JobResult, Progress
+from backend.people.rights import Right
 from backend.second_port import require_same_drive
 from drivers.link import Found
 from profiles import load_all
@@ -43,12 +44,6 @@ async def health(bench: TheBench) -> Health:
     """Whether the server is alive."""
     now = convert.moment(backend.now())
     return Health(version=backend.__version__, time=now, demo=bool(bench.wires))
-
-
-@router.get("/session")
-async def session() -> Session:
-    """Who is asking. On loopback the one user of the machine is administrator."""
-    return Session(person="local user", role="administrator", login_required=False)
 
 
 @router.get("/interfaces")
@@ -220,11 +215,15 @@ async def job(bench: TheBench, job_id: str) -> JobInfo:
 
 
 @router.delete("/jobs/{job_id}")
-async def cancel_job(bench: TheBench, job_id: str, connection: Connection = None) -> JobInfo:
-    """Cancel a job and wait for its cleanup."""
+async def cancel_job(
+    bench: TheBench, people: ThePeople, me: Me, job_id: str, connection: Connection = None
+) -> JobInfo:
+    """Cancel a job and wait for its cleanup. A motion everybody may end, as with STOP."""
     found = _job(bench, job_id)
-    if found.drive is not None and not (found.motion and found.stoppable):
-        bench.leases.require(found.drive, connection)
+    if not (found.motion and found.stoppable):
+        require_right(people, me, Right.FILES, found.drive)
+        if found.drive is not None:
+            bench.leases.require(found.drive, connection)
     await bench.jobs.cancel(found)
     return convert.job(found)
 

@@ -1,20 +1,51 @@
-"""Starting the server: the socket, the browser, and the shutdown."""
+"""Starting the server: who may come in, the socket, the certificate, and the shutdown."""
 
 from __future__ import annotations
 
 import asyncio
 import socket
+import ssl
 import webbrowser
+from dataclasses import dataclass
 from pathlib import Path
 
 import platformdirs
 import uvicorn
 
 from backend.api.app import make_app
+from backend.api.security_protocol import PatientProtocol
 from backend.bench import Bench
+from backend.people.station import People
+from backend.people.tls import Certificate, machine_names, own_certificate, station_certificate
+from backend.store.database import FILE
 from drivers.errors import NotAllowed
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
+#: Messages of the page are small; what is larger is an attack or a defect.
+WS_MAX_BYTES = 64 << 10
+#: Connections at once, over all. STOP comes by those that are open already.
+MOST_CONNECTIONS = 500
+
+
+@dataclass(frozen=True, slots=True)
+class Serving:
+    """How to serve. ``accounts`` None: where there are accounts, or the address is not loopback.
+
+    ``behind`` are host names of a proxy or tunnel in front, which ends TLS itself.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8420
+    accounts: bool | None = None
+    certificate: Path | None = None
+    key: Path | None = None
+    behind: frozenset[str] = frozenset()
+    open_page: bool = False
+
+    @property
+    def on_loopback(self) -> bool:
+        """Only this machine reaches it."""
+        return self.host in LOOPBACK or self.host == "::1"
 
 
 def state_folder(chosen: Path | None) -> Path:
@@ -22,47 +53,130 @@ def state_folder(chosen: Path | None) -> Path:
     return chosen or Path(platformdirs.user_data_dir("servodeck"))
 
 
-async def serve(bench: Bench, host: str, port: int, *, open_page: bool) -> None:
+async def serve(bench: Bench, serving: Serving) -> None:
     """Serve until interrupted. Port 0 takes a free one; the address is printed.
 
     Raises:
-        NotAllowed: the port is taken, or the host is not this machine's loopback.
+        NotAllowed: the port is taken, the certificate is none, or others could come in without
+            an account.
     """
-    if host not in LOOPBACK and host != "::1":
-        raise NotAllowed(
-            f"servodeck serves only this machine; {host} would open it to the network without "
-            "accounts",
-            value=host,
-            limit="127.0.0.1, localhost, ::1",
-            remedy="reach it from afar through an SSH tunnel to this machine",
-        )
-    listening = _listen(host, port)
-    shown = f"http://{'localhost' if host in LOOPBACK else f'[{host}]'}:"
-    shown += f"{listening.getsockname()[1]}/"
-    config = uvicorn.Config(
-        make_app(bench, hosts=LOOPBACK),
-        log_level="warning",
-        ws_per_message_deflate=False,
-        ws_max_size=1 << 20,
-        timeout_graceful_shutdown=3,
-    )
-    server = uvicorn.Server(config)
+    needed = await accounts_needed(bench.state_folder, serving)
+    people = People(bench.state_folder, accounts_needed=needed)
+    certificate = _certificate(bench.state_folder, serving)
+    listening = _listen(serving.host, serving.port)
+    server = uvicorn.Server(_config(bench, people, serving, certificate))
     running = asyncio.create_task(server.serve(sockets=[listening]))
     while not server.started and not running.done():
         await asyncio.sleep(0.02)
     if server.started:
-        print(f"servodeck is at {shown}  (Ctrl+C ends it)", flush=True)
-        if open_page:
+        shown = _address(serving, certificate, listening.getsockname()[1])
+        _tell(shown, people, certificate)
+        if serving.open_page:
             webbrowser.open(shown)
     await running
 
 
+async def accounts_needed(folder: Path, serving: Serving) -> bool:
+    """Whether people must log in.
+
+    Raises:
+        NotAllowed: they would not have to where others could reach the server.
+    """
+    reachable = not serving.on_loopback or bool(serving.behind)
+    if reachable and serving.accounts is False:
+        raise NotAllowed(
+            f"without accounts servodeck serves only this machine; {serving.host} would open it "
+            "to others",
+            value=serving.host,
+            limit="127.0.0.1, localhost, ::1",
+            remedy="leave out --single-user, or serve on 127.0.0.1",
+        )
+    if serving.accounts is not None or reachable:
+        return serving.accounts is not False
+    if not (folder / FILE).is_file():
+        return False
+    people = People(folder, accounts_needed=True)
+    try:
+        await people.open()
+        return people.accounts.is_set_up
+    finally:
+        people.close()
+
+
+def _certificate(folder: Path, serving: Serving) -> Certificate | None:
+    if serving.certificate is not None and serving.key is not None:
+        return own_certificate(serving.certificate, serving.key)
+    if serving.certificate is not None or serving.key is not None:
+        raise NotAllowed("--certificate and --key belong together", remedy="give both")
+    if serving.on_loopback:
+        return None
+    return station_certificate(folder / "tls", machine_names())
+
+
+def _config(
+    bench: Bench, people: People, serving: Serving, certificate: Certificate | None
+) -> uvicorn.Config:
+    names = LOOPBACK
+    if not serving.on_loopback:
+        names |= {f"[{n}]" if ":" in n else n for n in machine_names()}
+    own = certificate is not None and certificate.own
+    app = make_app(
+        bench,
+        hosts=names,
+        people=people,
+        behind=serving.behind,
+        own_addresses=not serving.on_loopback,
+        strict_transport=own,
+    )
+    config = uvicorn.Config(
+        app,
+        log_level="warning",
+        http=PatientProtocol,
+        ws_per_message_deflate=False,
+        ws_max_size=WS_MAX_BYTES,
+        limit_concurrency=MOST_CONNECTIONS,
+        timeout_graceful_shutdown=3,
+        server_header=False,
+        # Who a proxy speaks for is believed only where one was announced.
+        proxy_headers=bool(serving.behind),
+        ssl_certfile=None if certificate is None else str(certificate.certificate),
+        ssl_keyfile=None if certificate is None else str(certificate.key),
+    )
+    if certificate is not None:
+        config.load()
+        if config.ssl is not None:
+            config.ssl.minimum_version = ssl.TLSVersion.TLSv1_2
+    return config
+
+
+def _address(serving: Serving, certificate: Certificate | None, port: int) -> str:
+    scheme = "http" if certificate is None else "https"
+    if serving.on_loopback:
+        host = "localhost" if serving.host in LOOPBACK else f"[{serving.host}]"
+    elif serving.host in ("0.0.0.0", "::"):  # noqa: S104 - compared, not bound
+        host = socket.gethostname().lower()
+    else:
+        host = f"[{serving.host}]" if ":" in serving.host else serving.host
+    return f"{scheme}://{host}:{port}/"
+
+
+def _tell(shown: str, people: People, certificate: Certificate | None) -> None:
+    print(f"servodeck is at {shown}  (Ctrl+C ends it)", flush=True)
+    if certificate is not None and not certificate.own:
+        print("  the certificate is the station's own; compare its fingerprint once:")
+        print(f"  SHA-256 {certificate.fingerprint}", flush=True)
+    if people.setup_needed:
+        print("  there is no administrator yet; the page asks for this code:")
+        print(f"  {people.accounts.setup_code}", flush=True)
+
+
 def _listen(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listening = socket.socket(family, socket.SOCK_STREAM)
+    # With the protocol named: only then does asyncio send small answers without waiting for more.
+    listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        listening.bind((host, port))
+        listening.bind((host.strip("[]"), port))
     except OSError as error:
         listening.close()
         raise NotAllowed(

@@ -82,10 +82,30 @@ class Accounts:
             return None
         return account, session, self._now() < session.expires
 
-    def use(self, session: LoginSession) -> None:
-        """A person did something with it."""
-        if session.id in self._sessions:
-            self._sessions[session.id] = replace(session, used=self._now())
+    def owner(self, session_id: str) -> Account:
+        """The account of a session.
+
+        Raises:
+            NoSuchPerson: there is no such session.
+        """
+        session = self._sessions.get(session_id)
+        if session is None:
+            raise NoSuchPerson("there is no such session", value=session_id)
+        return self.account(session.account)
+
+    def expires(self, session_id: str) -> datetime | None:
+        """When a session or token ends; None where there is none."""
+        known = self._sessions.get(session_id) or self._tokens.get(session_id)
+        return None if known is None else known.expires
+
+    def is_remembered(self, session: LoginSession) -> bool:
+        """Whether it is alive, or ended so lately that its page may not know."""
+        return self._now() < session.expires + REMEMBERED
+
+    def touch(self, session_id: str) -> None:
+        """A person did something with this session."""
+        if (session := self._sessions.get(session_id)) is not None:
+            self._sessions[session_id] = replace(session, used=self._now())
 
     def renewed(self, identity: Identity) -> Identity | None:
         """The same person with the role of this moment, or None when the session is over."""

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 from backend.people.accounts import Accounts
+from backend.people.errors import NotLoggedIn
 from backend.people.identity import LOCAL, Identity
 from backend.people.passwords import Passwords
 from backend.people.records import Account, LoginSession
@@ -68,7 +71,7 @@ class People:
             account, session, alive = found
             if not alive:
                 return None
-            self.accounts.use(session)
+            self.accounts.touch(session.id)
             return _of_session(account, session)
         return self.support.guest(cookie)
 
@@ -83,12 +86,36 @@ class People:
             case "session" | "token":
                 return self.accounts.renewed(identity)
 
+    def expires(self, identity: Identity) -> datetime | None:
+        """When this person's session ends; None where it does not."""
+        if identity.is_guest:
+            found = self.support.of_session(identity.session)
+            return None if found is None else datetime.fromtimestamp(found.expires, UTC)
+        return self.accounts.expires(identity.session)
+
+    def admit(self, identity: Identity, message: str) -> Identity:
+        """The person behind a live connection, at the time of a message.
+
+        Raises:
+            NotLoggedIn: their session is over; STOP is heard all the same.
+        """
+        now = self.renewed(identity)
+        if now is None:
+            if message != "stop":
+                raise NotLoggedIn("the session is over", remedy="log in again")
+            return replace(identity, rights=frozenset())
+        if message != "ping":
+            self.accounts.touch(identity.session)
+        return now
+
     def may_stop(self, cookie: str | None) -> Identity | None:
         """Somebody who was logged in until lately: their page still shows STOP, and it works."""
         found = None if cookie is None else self.accounts.session(cookie)
         if found is None:
             return None
         account, session, _ = found
+        if not self.accounts.is_remembered(session):
+            return None
         return Identity(account.name, account.role, "session", session.id, frozenset())
 
     def require_accounts(self) -> None:

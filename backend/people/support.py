@@ -211,7 +211,7 @@ class Support:
 
     def identity(self, found: Invitation) -> Identity:
         """A guest with the rights of this moment; without the button nothing that moves."""
-        grant = self._running(found)
+        grant = self.running(found)
         rights = RIGHTS[Role.GUEST] | (grant.rights if grant is not None else frozenset())
         return Identity(f"{found.guest} (guest)", Role.GUEST, "guest", found.session, rights)
 
@@ -222,7 +222,7 @@ class Support:
             Forbidden: says what is missing.
         """
         found = self.of_session(identity.session)
-        grant = None if found is None else self._running(found)
+        grant = None if found is None else self.running(found)
         if found is None or grant is None or right not in grant.rights:
             raise Forbidden(
                 f"a guest may not do this without a grant ({right})",
@@ -283,7 +283,8 @@ class Support:
             self._changed()
         return found
 
-    def _running(self, found: Invitation) -> Grant | None:
+    def running(self, found: Invitation) -> Grant | None:
+        """The grant of this moment, or None."""
         grant = found.grant
         return grant if grant is not None and self._clock() < grant.until else None
 
@@ -296,7 +297,7 @@ class Support:
             NotAllowed: no grant runs that moves something.
         """
         found = self.find(invitation_id)
-        grant = self._running(found)
+        grant = self.running(found)
         if grant is None or not grant.rights & MOVING:
             raise NotAllowed(
                 f"{found.guest} has no grant to move anything", remedy="grant measure or motion"

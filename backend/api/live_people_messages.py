@@ -1,0 +1,211 @@
+"""Messages of the websocket about people: control, guests, pointers and chat."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from backend.api.models import Message
+from backend.people.rights import Right, Role
+
+Name = Annotated[str, Field(max_length=100)]
+#: A place on a page, 0 at the left and top, 1 at the right and bottom of its content.
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+
+# --- page to server -----------------------------------------------------------------
+
+
+class LeaseAsk(Message):
+    """Ask the holder for control of an axis; a free one is taken at once."""
+
+    type: Literal["lease_ask"] = "lease_ask"
+    drive: Name
+
+
+class LeaseAnswer(Message):
+    """The holder's answer to whoever asks."""
+
+    type: Literal["lease_answer"] = "lease_answer"
+    drive: Name
+    give: bool
+
+
+class LeaseHand(Message):
+    """Hand control to another connection, for good or for a time, after which it comes back."""
+
+    type: Literal["lease_hand"] = "lease_hand"
+    drive: Name
+    to: Name
+    time_s: float | None = Field(default=None, ge=1, le=28800, allow_inf_nan=False)
+
+
+class LeaseOverride(Message):
+    """Take control from whoever has it; what moves is stopped first. For administrators.
+
+    From a guest, everybody who may invite can take it.
+    """
+
+    type: Literal["lease_override"] = "lease_override"
+    drive: Name
+
+
+class Where(Message):
+    """The page that this person looks at, as in the address after the #."""
+
+    type: Literal["where"] = "where"
+    page: str = Field(max_length=200)
+
+
+class Pointer(Message):
+    """Where this person points on their page; null when they do not."""
+
+    type: Literal["pointer"] = "pointer"
+    x: Share | None
+    y: Share | None
+
+
+class PlotCursor(Message):
+    """Where on a plot's axis this person points, in its unit; null when they do not."""
+
+    type: Literal["plot_cursor"] = "plot_cursor"
+    plot: Name
+    x: float | None = Field(allow_inf_nan=False)
+
+
+class Chat(Message):
+    """A line for everybody on the station."""
+
+    type: Literal["chat"] = "chat"
+    text: str = Field(min_length=1, max_length=500)
+
+
+class EnablePress(Message):
+    """The person on site presses the enabling button for a guest."""
+
+    type: Literal["enable_press"] = "enable_press"
+    invitation: Name
+
+
+class EnableRenew(Message):
+    """The enabling button is still held. Send at 20 Hz or faster."""
+
+    type: Literal["enable_renew"] = "enable_renew"
+    invitation: Name
+
+
+class EnableRelease(Message):
+    """The enabling button was let go."""
+
+    type: Literal["enable_release"] = "enable_release"
+    invitation: Name
+    reason: str = Field(default="", max_length=200)
+
+
+PeopleRequest = (
+    LeaseAsk
+    | LeaseAnswer
+    | LeaseHand
+    | LeaseOverride
+    | Where
+    | Pointer
+    | PlotCursor
+    | Chat
+    | EnablePress
+    | EnableRenew
+    | EnableRelease
+)
+
+# --- server to page -----------------------------------------------------------------
+
+
+class PersonHere(Message):
+    """Somebody whose page is open. ``holds`` are the axes that they control."""
+
+    connection: str
+    person: str
+    role: Role
+    page: str
+    since: datetime
+    holds: list[str]
+    me: bool
+
+
+class GrantView(Message):
+    """What a guest may do, until when, on which axis (null: on all)."""
+
+    rights: list[Right]
+    until: datetime
+    drive: str | None
+    by: str
+
+
+class InvitationView(Message):
+    """An invitation. ``code`` is shown to those who may invite; ``enabled``: the button is held."""
+
+    id: str
+    guest: str
+    allowed: list[Right]
+    by: str
+    created: datetime
+    expires: datetime
+    state: Literal["open", "joined", "ended"]
+    why_ended: str
+    grant: GrantView | None
+    enabled: bool
+    code: str | None
+    mine: bool
+
+
+class PeopleHere(Message):
+    """Who is connected, and what guests may do. ``rights`` are those of this connection now."""
+
+    type: Literal["people"] = "people"
+    people: list[PersonHere]
+    invitations: list[InvitationView]
+    rights: list[Right]
+
+
+class LeaseNotice(Message):
+    """Something about control that this person must notice."""
+
+    type: Literal["lease_notice"] = "lease_notice"
+    drive: str
+    kind: Literal["asked", "refused", "given", "overridden", "returned", "expired", "lost"]
+    person: str
+
+
+class PointerMoved(Message):
+    """Somebody else's pointer."""
+
+    type: Literal["pointer_moved"] = "pointer_moved"
+    connection: str
+    person: str
+    page: str
+    x: float | None
+    y: float | None
+
+
+class CursorMoved(Message):
+    """Somebody else's cursor on a plot."""
+
+    type: Literal["cursor_moved"] = "cursor_moved"
+    connection: str
+    person: str
+    plot: str
+    x: float | None
+
+
+class ChatLine(Message):
+    """A line of the chat."""
+
+    type: Literal["chat_said"] = "chat_said"
+    number: int
+    time: datetime
+    person: str
+    guest: bool
+    text: str
+
+
+PeopleNews = PeopleHere | LeaseNotice | PointerMoved | CursorMoved | ChatLine

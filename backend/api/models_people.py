@@ -1,0 +1,160 @@
+"""Models of the routes about people."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+from pydantic import Field
+
+from backend.api.live_people_messages import ChatLine, InvitationView, PersonHere
+from backend.api.models import Message
+from backend.people.passwords import MAX_LENGTH
+from backend.people.rights import Right, Role
+
+PersonName = Annotated[str, Field(min_length=1, max_length=60)]
+#: Checked by `backend.people.passwords`; here only kept from being endless.
+Password = Annotated[str, Field(min_length=1, max_length=MAX_LENGTH)]
+Code = Annotated[str, Field(min_length=1, max_length=40)]
+
+
+class Session(Message):
+    """Who is asking, and what they may do. ``csrf`` goes into a header of every change."""
+
+    person: str | None
+    role: Role | None
+    rights: list[Right]
+    login_required: bool
+    setup_required: bool
+    guest: bool
+    csrf: str | None
+    expires: datetime | None
+
+
+class LogIn(Message):
+    """Name and password."""
+
+    name: PersonName
+    password: Password
+
+
+class SetUp(Message):
+    """The first administrator; ``code`` stands in the terminal of the machine."""
+
+    code: Code
+    name: PersonName
+    password: Password
+
+
+class JoinAsGuest(Message):
+    """The secret of an invitation's link, and the code that was told."""
+
+    link: Annotated[str, Field(min_length=1, max_length=100)]
+    code: Code
+
+
+class AccountInfo(Message):
+    """Somebody who may log in."""
+
+    id: int
+    name: str
+    role: Role
+    created: datetime
+    sessions: int
+    tokens: int
+    me: bool
+
+
+class NewAccount(Message):
+    """A new account."""
+
+    name: PersonName
+    role: Role
+    password: Password
+
+
+class AccountChange(Message):
+    """Another role, or another password; null leaves it."""
+
+    role: Role | None = None
+    password: Password | None = None
+
+
+class PasswordChange(Message):
+    """The own password."""
+
+    present: Password
+    password: Password
+
+
+class SessionInfo(Message):
+    """A log-in that is still valid."""
+
+    id: str
+    person: str
+    client: str
+    created: datetime
+    used: datetime
+    expires: datetime
+    me: bool
+
+
+class TokenInfo(Message):
+    """A token for scripts."""
+
+    id: str
+    person: str
+    name: str
+    scopes: list[Right]
+    created: datetime
+    expires: datetime
+
+
+class NewToken(Message):
+    """A token for scripts."""
+
+    name: PersonName
+    scopes: list[Right] = Field(min_length=1, max_length=len(Right))
+    days: float = Field(default=30, gt=0, le=366, allow_inf_nan=False)
+
+
+class MadeToken(Message):
+    """A new token. ``secret`` is shown this once."""
+
+    token: TokenInfo
+    secret: str
+
+
+class NewInvitation(Message):
+    """An invitation for one guest."""
+
+    guest: PersonName
+    allowed: list[Right] = Field(default=[], max_length=len(Right))
+    minutes: float = Field(default=60, ge=1, le=1440, allow_inf_nan=False)
+
+
+class MadeInvitation(Message):
+    """A new invitation. ``link`` is the part of the address after the #, shown this once."""
+
+    invitation: InvitationView
+    link: str
+
+
+class NewGrant(Message):
+    """Let a guest do more for some minutes, on one axis or (null) on all."""
+
+    rights: list[Right] = Field(min_length=1, max_length=len(Right))
+    minutes: float = Field(ge=0.2, le=480, allow_inf_nan=False)
+    drive: str | None = Field(default=None, max_length=100)
+
+
+class PeopleList(Message):
+    """Who is connected."""
+
+    people: list[PersonHere]
+
+
+class ChatLog(Message):
+    """The last lines of the chat, oldest first."""
+
+    lines: list[ChatLine]

@@ -1,0 +1,264 @@
+"""What every route and message needs. What is not in these tables is refused to everybody.
+
+The tables are kept in one place so that the whole policy can be read at once. `Gate` (HTTP and
+websockets) and `Connection` (messages) enforce them before any code of a route runs, the control
+lease included, so a new route can forget nothing: it is closed until it stands here.
+`tests/security` walks every route and message against these tables, with everybody.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from starlette.routing import compile_path
+
+from backend.people.rights import Right
+
+API = "/api/v1"
+
+#: ``public``: nobody needs to be known. ``known``: anybody who is. ``stop``: anybody who is or
+#: was until lately.
+Special = Literal["public", "known", "stop"]
+#: Whose control lease a change needs: of the drive in its path (the gate checks), of every drive
+#: of the bus that it names (the route checks), or none.
+LeaseOf = Literal["drive", "bus", "none"]
+
+_SMALL, _FILE = 1 << 20, 70 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Need:
+    """What a request needs, and how large its body may be in bytes."""
+
+    right: Right | Special
+    lease: LeaseOf = "none"
+    body_bytes: int = _SMALL
+
+
+_PUBLIC, _KNOWN, _STOP = Need("public"), Need("known"), Need("stop")
+_LOOK = Need(Right.LOOK)
+_FILES, _FILES_UPLOAD = Need(Right.FILES), Need(Right.FILES, body_bytes=_FILE)
+_PARAMETERS = Need(Right.PARAMETERS, "drive")
+_MEASURE, _MOTION = Need(Right.MEASURE, "drive"), Need(Right.MOTION, "drive")
+_STATION, _STATION_DRIVE = Need(Right.STATION), Need(Right.STATION, "drive")
+_STATION_BUS = Need(Right.STATION, "bus")
+_INVITE, _ADMINISTER = Need(Right.INVITE), Need(Right.ADMINISTER)
+
+#: By "METHOD path", paths below /api/v1 first.
+_API: dict[str, Need] = {
+    # who is there
+    "GET /health": _PUBLIC,
+    "GET /session": _PUBLIC,
+    "POST /session": _PUBLIC,
+    "DELETE /session": _KNOWN,
+    "POST /setup": _PUBLIC,
+    "POST /guests": _PUBLIC,
+    "GET /sessions": _KNOWN,
+    "DELETE /sessions/{session_id}": _KNOWN,
+    "PUT /session/password": _KNOWN,
+    "GET /tokens": _KNOWN,
+    "POST /tokens": _KNOWN,
+    "DELETE /tokens/{token_id}": _KNOWN,
+    "GET /accounts": _ADMINISTER,
+    "POST /accounts": _ADMINISTER,
+    "PATCH /accounts/{account_id}": _ADMINISTER,
+    "DELETE /accounts/{account_id}": _ADMINISTER,
+    "GET /people": _LOOK,
+    "GET /chat": _LOOK,
+    "GET /invitations": _INVITE,
+    "POST /invitations": _INVITE,
+    "DELETE /invitations/{invitation_id}": _INVITE,
+    "PUT /invitations/{invitation_id}/grant": _INVITE,
+    "DELETE /invitations/{invitation_id}/grant": _INVITE,
+    # the station
+    "GET /openapi.json": _LOOK,
+    "POST /stop": _STOP,
+    "GET /interfaces": _LOOK,
+    "GET /profiles": _LOOK,
+    "GET /profiles/matches": _LOOK,
+    "GET /profiles/{profile}/eds": _LOOK,
+    "GET /buses": _LOOK,
+    "POST /buses/cyclic": _STATION_BUS,
+    "DELETE /buses/cyclic": _STATION_BUS,
+    "DELETE /buses": _STATION,
+    "POST /scan": _STATION_BUS,
+    "POST /search-line": _STATION,
+    "POST /descriptions": Need(Right.STATION, body_bytes=_FILE),
+    "POST /descriptions/devices": Need(Right.STATION, body_bytes=_FILE),
+    "POST /descriptions/from-drive": _STATION,
+    "GET /ethercat/segment": _LOOK,
+    "GET /ethercat/permissions": _LOOK,
+    "POST /ethercat/counters/clear": _STATION_BUS,
+    "POST /ethercat/alias": _STATION_BUS,
+    "GET /jobs": _LOOK,
+    "GET /jobs/{job_id}": _LOOK,
+    # Ends a motion for everybody, like STOP; the route asks for more where nothing moves.
+    "DELETE /jobs/{job_id}": _LOOK,
+    "GET /log": _LOOK,
+    # drives
+    "GET /drives": _LOOK,
+    "POST /drives": _STATION_BUS,
+    "GET /drives/{drive_id}": _LOOK,
+    "PATCH /drives/{drive_id}": _STATION_DRIVE,
+    "DELETE /drives/{drive_id}": _STATION_DRIVE,
+    "POST /drives/{drive_id}/ports": _STATION_DRIVE,
+    "GET /drives/{drive_id}/missing-ports": _LOOK,
+    "GET /drives/{drive_id}/log": _LOOK,
+    "GET /drives/{drive_id}/state": _LOOK,
+    "GET /drives/{drive_id}/faults": _LOOK,
+    "POST /drives/{drive_id}/fault-reset": _MOTION,
+    "POST /drives/{drive_id}/transition": _MOTION,
+    "GET /drives/{drive_id}/parameters": _LOOK,
+    "PUT /drives/{drive_id}/parameters": _PARAMETERS,
+    "GET /drives/{drive_id}/parameters/{key}": _LOOK,
+    "PUT /drives/{drive_id}/parameters/{key}": _PARAMETERS,
+    "GET /drives/{drive_id}/procedures": _LOOK,
+    "POST /drives/{drive_id}/procedures/{name}": _MOTION,
+    "GET /drives/{drive_id}/homing-methods": _LOOK,
+    "POST /drives/{drive_id}/jobs/read_all": _LOOK,
+    "POST /drives/{drive_id}/jobs/load_set": _PARAMETERS,
+    "POST /drives/{drive_id}/jobs/move": _MOTION,
+    "POST /drives/{drive_id}/jobs/sequence": _MOTION,
+    "POST /drives/{drive_id}/jobs/generate": _MOTION,
+    "POST /drives/{drive_id}/jobs/home": _MOTION,
+    "POST /drives/{drive_id}/jobs/sweep": _MEASURE,
+    "POST /drives/{drive_id}/jobs/inertia": _MEASURE,
+    "POST /drives/{drive_id}/jobs/step": _MEASURE,
+    "POST /drives/{drive_id}/jobs/autotune": _MEASURE,
+    "POST /drives/{drive_id}/jobs/firmware": Need(Right.STATION, "drive", _FILE),
+    "GET /drives/{drive_id}/io": _LOOK,
+    "POST /drives/{drive_id}/io/forcing/{name}": _MOTION,
+    "PUT /drives/{drive_id}/io/forcing/{name}": _MOTION,
+    # Lets terminals be what they are again, for everybody, like STOP.
+    "DELETE /drives/{drive_id}/io/forcing/{name}": _LOOK,
+    "PUT /drives/{drive_id}/io/probes/{number}": _PARAMETERS,
+    "GET /drives/{drive_id}/functions": _LOOK,
+    "GET /drives/{drive_id}/fault-history": _LOOK,
+    "POST /drives/{drive_id}/fault-history/read": _PARAMETERS,
+    "GET /drives/{drive_id}/record": _LOOK,
+    "PUT /drives/{drive_id}/mechanics": _PARAMETERS,
+    "PUT /drives/{drive_id}/watch": _PARAMETERS,
+    "POST /drives/{drive_id}/gear/plan": _LOOK,
+    "POST /drives/{drive_id}/gear/write": _PARAMETERS,
+    "POST /calculate/braking": _LOOK,
+    # tuning: previews compute and change nothing
+    "GET /drives/{drive_id}/notches": _LOOK,
+    "POST /drives/{drive_id}/notches/preview": _LOOK,
+    "PUT /drives/{drive_id}/notches": _PARAMETERS,
+    "GET /drives/{drive_id}/gains": _LOOK,
+    "PUT /drives/{drive_id}/gains": _PARAMETERS,
+    "POST /drives/{drive_id}/tune/candidates": _LOOK,
+    "POST /drives/{drive_id}/tune/predict": _LOOK,
+    "POST /drives/{drive_id}/tune/undo": _PARAMETERS,
+    "GET /measurements": _LOOK,
+    "POST /measurements": _FILES_UPLOAD,
+    "GET /measurements/{name}": _LOOK,
+    "GET /measurements/{name}/file": _LOOK,
+    "DELETE /measurements/{name}": _FILES,
+    # files
+    "GET /sets": _LOOK,
+    "GET /sets/{file}": _LOOK,
+    "GET /sets/{file}/list": _LOOK,
+    "POST /sets/list": _FILES_UPLOAD,
+    "PUT /sets/{file}": _FILES_UPLOAD,
+    "DELETE /sets/{file}": _FILES,
+    "POST /drives/{drive_id}/sets": Need(Right.FILES, "drive"),
+    "GET /drives/{drive_id}/diff": _LOOK,
+    "GET /drives/{drive_id}/three-way": _LOOK,
+    "GET /library": _LOOK,
+    "GET /library/tags": _LOOK,
+    "GET /library/{entry_id}": _LOOK,
+    "GET /library/{entry_id}/versions": _LOOK,
+    "GET /library/{entry_id}/content": _LOOK,
+    "PATCH /library/{entry_id}": _FILES,
+    "DELETE /library/{entry_id}": _FILES,
+    "GET /recordings": _LOOK,
+    "POST /recordings": _FILES,
+    "PUT /recordings/retention": _STATION,
+    "GET /recordings/{name}": _LOOK,
+    "PATCH /recordings/{name}": _FILES,
+    "DELETE /recordings/{name}": _FILES,
+    "POST /recordings/{name}/stop": _FILES,
+    "POST /recordings/{name}/trigger": _FILES,
+    "GET /recordings/{name}/file": _LOOK,
+    "GET /recordings/{name}/exports/{kind}": _LOOK,
+    "POST /recordings/{name}/exports/{kind}": _FILES,
+    "GET /reports": _LOOK,
+    "POST /drives/{drive_id}/reports": _FILES,
+    "GET /reports/{name}": _LOOK,
+    "DELETE /reports/{name}": _FILES,
+    "GET /scope/setups": _LOOK,
+    "PUT /scope/setups/{name}": _FILES,
+    "DELETE /scope/setups/{name}": _FILES,
+    "GET /scope/snapshots": _LOOK,
+    "POST /scope/snapshots/{name}": _FILES_UPLOAD,
+    "GET /scope/snapshots/{name}": _LOOK,
+    "DELETE /scope/snapshots/{name}": _FILES,
+    "GET /bundles": _LOOK,
+    "POST /bundles": _FILES,
+    "PUT /bundles/armed": _STATION,
+    "GET /bundles/{name}": _LOOK,
+    "DELETE /bundles/{name}": _FILES,
+    # the audit: who did what is not for guests and onlookers
+    "GET /audit": _STATION,
+    "GET /audit/names": _STATION,
+    "GET /audit/verify": _STATION,
+    "GET /audit/export": _STATION,
+    "GET /audit/status": _LOOK,
+    # live
+    "WS /live": _LOOK,
+}
+
+#: Outside the interface: the page itself, which shows the log-in, and the viewers.
+_PAGE: dict[str, Need] = {
+    "GET /": _PUBLIC,
+    "GET /index.html": _PUBLIC,
+    "GET /favicon.svg": _PUBLIC,
+    "GET /assets/{path:path}": _PUBLIC,
+    "GET /rerun/{path:path}": _LOOK,
+    "WS /rerun/feed": _LOOK,
+    "GET /viser/{path:path}": _LOOK,
+    "WS /viser/{path:path}": _LOOK,
+}
+
+#: Needs by "METHOD path" as the application declares its paths.
+ROUTES: dict[str, Need] = {
+    f"{method} {API}{path}": need
+    for key, need in _API.items()
+    for method, _, path in [key.partition(" ")]
+} | _PAGE
+
+
+@dataclass(frozen=True, slots=True)
+class Matched:
+    """A need that a request's path has matched, with what the path names."""
+
+    need: Need
+    drive: str | None
+
+
+class Policy:
+    """Finds what a request needs. Several patterns may fit a path: all of them must be met."""
+
+    def __init__(self, routes: dict[str, Need] | None = None) -> None:
+        self._patterns: list[tuple[str, re.Pattern[str], Need]] = []
+        for key, need in (ROUTES if routes is None else routes).items():
+            method, _, path = key.partition(" ")
+            self._patterns.append((method, compile_path(path)[0], need))
+
+    def needs(self, method: str, path: str) -> list[Matched]:
+        """Everything that this request must meet; nothing where no route is declared."""
+        method = "GET" if method == "HEAD" else method
+        if any(part in (".", "..") for part in path.split("/")) or "\0" in path:
+            return []
+        return [
+            Matched(need, found.groupdict().get("drive_id"))
+            for known, pattern, need in self._patterns
+            if known == method and (found := pattern.match(path))
+        ]
+
+    def methods(self, path: str) -> list[str]:
+        """HTTP methods that are declared for a path."""
+        return sorted({m for m, pattern, _ in self._patterns if m != "WS" and pattern.match(path)})

@@ -1,0 +1,329 @@
+"""The gate: every request and websocket passes here before any code of a route runs.
+
+In this order: meant for us (Host, Origin), declared (`backend.api.rights`), known (cookie or
+token), has the right, comes from our page (CSRF token), has control of the axis, body in bounds.
+What passes runs with `acting` set, so that whatever it starts knows whose it is.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from http.cookies import CookieError, SimpleCookie
+
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from backend.access import Leases
+from backend.api.errors import NotFound, WrongMethod, answer, problem_of
+from backend.api.models import Problem
+from backend.api.rights import Matched, Policy
+from backend.api.security_body import BodyRefused, MeasuredBody
+from backend.api.security_origin import Addresses, header
+from backend.api.security_socket import GuardedSocket, OpenSockets
+from backend.people.credentials import csrf_of, same_text
+from backend.people.errors import Forbidden, NotLoggedIn, TooOften
+from backend.people.identity import Actor, Identity, acting
+from backend.people.rights import Right
+from backend.people.station import People
+from backend.people.throttle import Bucket
+from drivers.errors import DriveError
+
+log = logging.getLogger(__name__)
+
+COOKIE, SECURE_COOKIE = "servodeck", "__Host-servodeck"
+CSRF_HEADER = "x-servodeck-csrf"
+CONNECTION_HEADER = "x-servodeck-connection"
+_SAFE = ("GET", "HEAD", "OPTIONS")
+#: Requests of nobody in particular: so many at once, and a second.
+_STRANGERS = (200.0, 50.0)
+_REFUSED = {400: "Bad request", 408: "Too slow", 413: "Too large"}
+
+HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'self'; connect-src 'self'; img-src 'self' data: blob:; "
+        "style-src 'self' 'unsafe-inline'; worker-src 'self' blob:; frame-ancestors 'self'; "
+        "base-uri 'none'; form-action 'self'; object-src 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "SAMEORIGIN",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=(), payment=(), usb=(), serial=()",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Credentials:
+    """What a request brought to be known by."""
+
+    cookie: str | None
+    bearer: str | None
+
+
+def credentials(scope: Scope) -> Credentials:
+    """Cookie and bearer token of a request.
+
+    Raises:
+        Forbidden: a header is there twice.
+    """
+    headers = scope["headers"]
+    bearer = header(headers, b"authorization")
+    token = None
+    if bearer is not None:
+        scheme, _, token = bearer.partition(" ")
+        token = token.strip() if scheme.lower() == "bearer" else ""
+    jar = SimpleCookie()
+    try:
+        for key, value in headers:
+            if key == b"cookie":
+                jar.load(value.decode("latin-1"))
+    except CookieError:
+        return Credentials(None, token)
+    name = SECURE_COOKIE if SECURE_COOKIE in jar else COOKIE
+    return Credentials(jar[name].value if name in jar else None, token)
+
+
+class Gate:
+    """Wraps the application."""
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        people: People,
+        leases: Leases,
+        addresses: Addresses,
+        sockets: OpenSockets,
+        policy: Policy | None = None,
+        *,
+        strict_transport: bool = False,
+    ) -> None:
+        self._app, self._people, self._leases = app, people, leases
+        self._addresses, self._sockets = addresses, sockets
+        self._policy = policy or Policy()
+        self._strangers = Bucket(*_STRANGERS)
+        self._headers = dict(HEADERS)
+        if strict_transport:
+            self._headers["Strict-Transport-Security"] = "max-age=31536000"
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One request, websocket or the lifespan."""
+        if scope["type"] == "http":
+            await self._http(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await self._websocket(scope, receive, send)
+        else:
+            await self._app(scope, receive, send)
+
+    # --- HTTP -------------------------------------------------------------------------
+
+    async def _http(self, scope: Scope, receive: Receive, send: Send) -> None:
+        begun = False
+
+        async def dressed(message: Message) -> None:
+            nonlocal begun
+            if message["type"] == "http.response.start":
+                begun = True
+                self._dress(scope, message)
+            await send(message)
+
+        try:
+            actor, limit = self._admit(scope)
+            body = MeasuredBody(
+                receive,
+                limit,
+                header(scope["headers"], b"content-length"),
+                header(scope["headers"], b"transfer-encoding") is not None,
+            )
+            body.require_accepted()
+            await self._run(scope, body, dressed, actor)
+        except BodyRefused as refusal:
+            await self._refuse(_refusal(refusal.status), scope, receive, dressed)
+        except DriveError as error:
+            await self._refuse(problem_of(error), scope, receive, dressed, error)
+        except Exception as error:
+            log.exception("unhandled error at %s %s", scope["method"], scope["path"])
+            if begun:
+                raise
+            await self._refuse(problem_of(error), scope, receive, dressed)
+
+    async def _run(self, scope: Scope, body: MeasuredBody, send: Send, actor: Actor | None) -> None:
+        async def unless_refused(message: Message) -> None:
+            # The application may have turned the refusal into an answer of its own.
+            body.require_accepted()
+            await send(message)
+
+        token = acting.set(actor)
+        try:
+            await self._app(scope, body.receive, unless_refused)
+        finally:
+            acting.reset(token)
+
+    def _admit(self, scope: Scope) -> tuple[Actor | None, int]:
+        """Who may go on, and how large the body may be.
+
+        Raises:
+            DriveError: nobody may, and why.
+        """
+        method, path = scope["method"], scope["path"]
+        self._check_place(scope, changes=method not in _SAFE)
+        brought = credentials(scope)
+        identity = self._people.identify(brought.cookie, brought.bearer)
+        if identity is None and not self._strangers.take():
+            raise TooOften("too many requests of nobody in particular", 1.0)
+        needs = self._policy.needs(method, path)
+        if not needs:
+            raise self._undeclared(method, path, identity)
+        connection = self._own_connection(scope, identity)
+        if connection is None:
+            # Routes believe the header, so one that is not true does not reach them.
+            scope["headers"] = [
+                (key, value) for key, value in scope["headers"] if key != CONNECTION_HEADER.encode()
+            ]
+        for matched in needs:
+            if matched.need.right == "stop" and identity is None:
+                identity = self._people.may_stop(brought.cookie)
+            self._require(matched, identity, connection)
+        if method not in _SAFE and all(m.need.right != "stop" for m in needs):
+            self._require_csrf(scope, identity, brought)
+        limit = min(m.need.body_bytes for m in needs)
+        return (None if identity is None else Actor(identity, connection)), limit
+
+    def _check_place(self, scope: Scope, *, changes: bool) -> None:
+        server = scope.get("server")
+        self._addresses.check(
+            scope["headers"],
+            secure=scope.get("scheme") in ("https", "wss"),
+            local_address=server[0] if server else None,
+            changes=changes,
+        )
+
+    def _require(self, matched: Matched, identity: Identity | None, connection: str | None) -> None:
+        need = matched.need
+        if need.right == "public":
+            return
+        if identity is None:
+            what = "make the first account" if self._people.setup_needed else "log in"
+            raise NotLoggedIn("nobody is logged in", remedy=what)
+        if not isinstance(need.right, Right):
+            return
+        require_right(self._people, identity, need.right, matched.drive)
+        if need.lease == "drive" and matched.drive is not None:
+            self._leases.require(matched.drive, connection)
+
+    def _undeclared(self, method: str, path: str, identity: Identity | None) -> DriveError:
+        if identity is None:
+            return NotLoggedIn("nobody is logged in", remedy="log in")
+        if methods := self._policy.methods(path):
+            return WrongMethod(f"{method} is not for {path}", methods)
+        return NotFound(
+            f"there is nothing at {path}",
+            remedy="see /api/v1/openapi.json; a new route must stand in backend/api/rights.py",
+        )
+
+    def _require_csrf(self, scope: Scope, identity: Identity | None, brought: Credentials) -> None:
+        """A cookie comes by itself; this token only our own page can read and send.
+
+        Raises:
+            Forbidden: it is missing or of another session.
+        """
+        if identity is None or identity.kind not in ("session", "guest"):
+            return
+        given = header(scope["headers"], CSRF_HEADER.encode())
+        if brought.cookie is None or not same_text(given or "", csrf_of(brought.cookie)):
+            raise Forbidden(
+                "the request does not come from the page of this session",
+                limit=f"the header {CSRF_HEADER}",
+                remedy="load the page again",
+            )
+
+    def _own_connection(self, scope: Scope, identity: Identity | None) -> str | None:
+        """The live connection that a request names, if it is one of the same session."""
+        named = header(scope["headers"], CONNECTION_HEADER.encode())
+        if named is None or identity is None:
+            return None
+        return named if self._sockets.owner(named) == identity.session else None
+
+    async def _refuse(
+        self,
+        problem: Problem,
+        scope: Scope,
+        receive: Receive,
+        send: Send,
+        error: DriveError | None = None,
+    ) -> None:
+        response = answer(problem)
+        if isinstance(error, TooOften):
+            response.headers["Retry-After"] = str(max(1, round(error.wait_s)))
+        if isinstance(error, NotLoggedIn):
+            response.headers["WWW-Authenticate"] = "Bearer"
+        if isinstance(error, WrongMethod):
+            response.headers["Allow"] = ", ".join(error.methods)
+        if problem.status in (408, 413):
+            response.headers["Connection"] = "close"
+        await response(scope, receive, send)
+
+    def _dress(self, scope: Scope, message: Message) -> None:
+        headers = MutableHeaders(scope=message)
+        for name, value in self._headers.items():
+            headers.setdefault(name, value)
+        if scope["path"].startswith("/api/"):
+            headers.setdefault("Cache-Control", "no-store")
+
+    # --- websockets -------------------------------------------------------------------
+
+    async def _websocket(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            self._check_place(scope, changes=True)
+            brought = credentials(scope)
+            identity = self._people.identify(brought.cookie, brought.bearer)
+            if identity is None and not self._strangers.take():
+                raise TooOften("too many requests of nobody in particular", 1.0)
+            needs = self._policy.needs("WS", scope["path"])
+            if not needs:
+                raise NotFound(f"there is nothing at {scope['path']}")
+            for matched in needs:
+                self._require(matched, identity, None)
+        except DriveError as refusal:
+            # Before it is accepted, this becomes an HTTP answer with status 403.
+            await send({"type": "websocket.close", "code": 1008, "reason": refusal.message[:100]})
+            return
+        if identity is None:
+            raise RuntimeError("a websocket may not be public")
+        guarded = GuardedSocket(receive, send, identity.session)
+        token = acting.set(Actor(identity))
+        try:
+            with self._sockets.open(guarded):
+                await self._app(scope, guarded.receive, guarded.send)
+        finally:
+            acting.reset(token)
+            await guarded.finish()
+
+
+def require_right(people: People, identity: Identity, right: Right, drive: str | None) -> None:
+    """This person may do this now.
+
+    Raises:
+        Forbidden: they may not, and why.
+    """
+    if identity.is_guest and right is not Right.LOOK:
+        people.support.require(identity, right, drive)
+        return
+    if right not in identity.rights:
+        raise Forbidden(
+            f"{identity.person} may not do this",
+            value=str(identity.role),
+            limit=str(right),
+            remedy="ask an administrator of this station",
+        )
+
+
+def _refusal(status: int) -> Problem:
+    return Problem(
+        type="urn:servodeck:body",
+        title=_REFUSED[status],
+        status=status,
+        detail="the body of the request is refused: " + _REFUSED[status].lower(),
+        remedy="send less, or faster",
+    )

@@ -1,0 +1,70 @@
+"""Bodies that are too large or too slow are refused, whatever a route would do with them."""
+
+from __future__ import annotations
+
+import asyncio
+
+from starlette.types import Message, Receive
+
+#: A body of up to 1 MiB arrives within this time, a file within the longer one.
+BODY_S = 15.0
+FILE_S = 120.0
+_SMALL = 1 << 20
+
+
+class BodyRefused(Exception):
+    """Raised into the application while it reads; the gate answers in its place."""
+
+    def __init__(self, status: int) -> None:
+        super().__init__(f"body refused ({status})")
+        self.status = status
+
+
+class MeasuredBody:
+    """The receiving side of a request, with a limit and a deadline. ``refused`` is the status."""
+
+    def __init__(
+        self, receive: Receive, limit_bytes: int, declared: str | None, chunked: bool
+    ) -> None:
+        self._receive = receive
+        self._limit = limit_bytes
+        self._seen = 0
+        self._ended = declared in (None, "0") and not chunked
+        wait = BODY_S if limit_bytes <= _SMALL else FILE_S
+        self._deadline = asyncio.get_running_loop().time() + wait
+        self.refused = 0
+        if declared is not None and (not declared.isdigit() or int(declared) > limit_bytes):
+            self.refused = 413 if declared.isdigit() else 400
+
+    def require_accepted(self) -> None:
+        """Nothing has been refused so far.
+
+        Raises:
+            BodyRefused: something has.
+        """
+        if self.refused:
+            raise BodyRefused(self.refused)
+
+    async def receive(self) -> Message:
+        """The next message for the application.
+
+        Raises:
+            BodyRefused: too large (413) or too slow (408).
+        """
+        if self._ended:
+            return await self._receive()
+        try:
+            async with asyncio.timeout_at(self._deadline):
+                message = await self._receive()
+        except TimeoutError:
+            self.refused = 408
+            raise BodyRefused(408) from None
+        if message["type"] == "http.request":
+            self._seen += len(message.get("body", b""))
+            self._ended = not message.get("more_body", False)
+        else:
+            self._ended = True
+        if self._seen > self._limit:
+            self.refused = 413
+            raise BodyRefused(413)
+        return message

@@ -1,0 +1,69 @@
+"""What every message of the live websocket needs. What is not here is refused to everybody."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from backend.api import live_messages as live
+from backend.api import live_people_messages as people_live
+from backend.api.live_people import require_control
+from backend.api.models import Message
+from backend.api.security import require_right
+from backend.people.errors import Forbidden
+from backend.people.identity import Identity
+from backend.people.rights import Right
+from backend.people.station import People
+
+#: ``always``: whoever is connected, also a viewer and also when the session has just ended.
+#: ``control``: whoever may hold the control of this axis now.
+MessageNeed = Right | Literal["always", "control"]
+
+MESSAGES: dict[type[Message], MessageNeed] = {
+    live.StopAll: "always",
+    live.JogStop: "always",
+    live.Ping: "always",
+    live.WatchState: Right.LOOK,
+    live.WatchValues: Right.LOOK,
+    live.ScopeStart: Right.LOOK,
+    live.ScopeStop: Right.LOOK,
+    # Only keeps what `JogStart` of the same connection was allowed to begin.
+    live.JogRenew: Right.LOOK,
+    live.JogStart: Right.MOTION,
+    live.LeaseTake: "control",
+    people_live.LeaseAsk: "control",
+    people_live.LeaseOverride: "control",
+    # The leases themselves ask for the holder.
+    people_live.LeaseAnswer: Right.LOOK,
+    people_live.LeaseHand: Right.LOOK,
+    people_live.Where: Right.LOOK,
+    people_live.Pointer: Right.LOOK,
+    people_live.PlotCursor: Right.LOOK,
+    people_live.Chat: Right.LOOK,
+    people_live.EnablePress: Right.INVITE,
+    people_live.EnableRenew: Right.INVITE,
+    people_live.EnableRelease: "always",
+}
+
+
+def require_message(people: People, identity: Identity, message: Message) -> None:
+    """This person may send this now.
+
+    Raises:
+        Forbidden: they may not, and why.
+    """
+    need = MESSAGES.get(type(message))
+    if need is None:
+        raise Forbidden(
+            f"nobody may send {type(message).__name__}",
+            remedy="a new message must stand in backend/api/security_messages.py",
+        )
+    if need == "always":
+        return
+    named = getattr(message, "drive", None)
+    drive = named if isinstance(named, str) else None
+    if need == "control":
+        if isinstance(message, live.LeaseTake) and not message.take:
+            return
+        require_control(people, identity, drive or "")
+    else:
+        require_right(people, identity, need, drive)

@@ -1,0 +1,85 @@
+"""Whether a request was meant for us: Host (DNS rebinding), Origin and fetch metadata."""
+
+from __future__ import annotations
+
+import ipaddress
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from backend.people.errors import Forbidden
+
+Headers = list[tuple[bytes, bytes]]
+
+
+def header(headers: Iterable[tuple[bytes, bytes]], name: bytes) -> str | None:
+    """The value of a header, or None.
+
+    Raises:
+        Forbidden: it is there twice; who reads which could not be told.
+    """
+    found = [value for key, value in headers if key == name]
+    if len(found) > 1:
+        raise Forbidden(f"the header {name.decode()} is there twice")
+    return found[0].decode("latin-1") if found else None
+
+
+@dataclass(frozen=True, slots=True)
+class Addresses:
+    """The names that this server answers to, in lower case, IPv6 in brackets.
+
+    ``behind`` are names of a proxy in front of it, which may speak HTTPS where we do not.
+    ``own_addresses``: also the address that the request came in at, when that is no name.
+    """
+
+    names: frozenset[str]
+    behind: frozenset[str] = frozenset()
+    own_addresses: bool = False
+
+    def check(
+        self, headers: Headers, *, secure: bool, local_address: str | None, changes: bool
+    ) -> None:
+        """Host is ours, and a browser's Origin is the same place.
+
+        Raises:
+            Forbidden: it is not.
+        """
+        host = header(headers, b"host")
+        if host is None or not self._is_ours(_name(host).lower(), local_address):
+            raise Forbidden(
+                "this address of the server is not one that it answers to",
+                value=host,
+                limit=", ".join(sorted(self.names | self.behind)),
+                remedy="open the address that the terminal shows",
+            )
+        origin = header(headers, b"origin")
+        if origin is not None:
+            scheme, _, place = origin.partition("://")
+            schemes = {"https"} if secure else {"http"}
+            if _name(host).lower() in self.behind:
+                schemes = {"http", "https"}
+            if place != host or scheme not in schemes:
+                raise Forbidden(
+                    "the request comes from another page",
+                    value=origin,
+                    remedy="use the page of this server",
+                )
+        site = header(headers, b"sec-fetch-site")
+        if changes and site not in (None, "same-origin", "none"):
+            raise Forbidden("the request comes from another page", value=site)
+
+    def _is_ours(self, name: str, local_address: str | None) -> bool:
+        if name in self.names or name in self.behind:
+            return True
+        if not self.own_addresses or local_address is None:
+            return False
+        # An address is no name, so nobody can make it resolve to something else.
+        try:
+            return ipaddress.ip_address(name.strip("[]")) == ipaddress.ip_address(local_address)
+        except ValueError:
+            return False
+
+
+def _name(host: str) -> str:
+    if host.startswith("["):
+        return host.split("]", 1)[0] + "]"
+    return host.rsplit(":", 1)[0] if ":" in host else host

@@ -1,0 +1,85 @@
+"""Connections that send their request too slowly, or are too many from one address, are closed."""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+from collections import Counter
+
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+#: Time for the head of a request, from the connection or the first byte on.
+HEAD_S = 10.0
+#: Connections from one address that is not this machine. A page needs about eight.
+MOST_PER_ADDRESS = 100
+
+_open: Counter[str] = Counter()
+
+
+class PatientProtocol(H11Protocol):
+    """HTTP/1.1 with a deadline for request heads and a bound on connections per address."""
+
+    _head_timer: asyncio.TimerHandle | None = None
+    _address: str | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Count the connection; one too many is closed before it says anything."""
+        super().connection_made(transport)
+        address = self.client[0] if self.client else ""
+        if not _is_loopback(address):
+            if _open[address] >= MOST_PER_ADDRESS:
+                transport.close()
+                return
+            _open[address] += 1
+            self._address = address
+        self._arm()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Uncount it."""
+        self._disarm()
+        self._uncount()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """While the head of a request is incomplete, its time runs."""
+        super().data_received(data)
+        if self.conn.their_state is h11.IDLE:
+            self._arm()
+        else:
+            self._disarm()
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        """A websocket has limits of its own."""
+        self._disarm()
+        # Its end is not told here any more; messages and silence are bounded elsewhere.
+        self._uncount()
+        super().handle_websocket_upgrade(event)
+
+    def _uncount(self) -> None:
+        if self._address is not None:
+            _open[self._address] -= 1
+            if _open[self._address] <= 0:
+                del _open[self._address]
+            self._address = None
+
+    def _arm(self) -> None:
+        if self._head_timer is None:
+            self._head_timer = self.loop.call_later(HEAD_S, self._too_slow)
+
+    def _disarm(self) -> None:
+        if self._head_timer is not None:
+            self._head_timer.cancel()
+            self._head_timer = None
+
+    def _too_slow(self) -> None:
+        self._head_timer = None
+        if not self.transport.is_closing():
+            self.transport.close()
+
+
+def _is_loopback(address: str) -> bool:
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return False

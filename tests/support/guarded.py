@@ -1,0 +1,177 @@
+"""A server with accounts and one servo in memory, in a thread: what a stranger would attack."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+from collections.abc import Awaitable, Callable, Coroutine
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any, TypeVar
+
+import httpx
+import uvicorn
+from argon2 import PasswordHasher
+from websockets.sync.client import connect
+
+from backend.bench import Bench, Member
+from backend.commands.serve import Serving, _config, _listen
+from backend.people.passwords import Passwords
+from backend.people.rights import Right, Role
+from backend.people.station import People
+from tests.support.servo import Servo, bench_with
+from tests.support.station import Live
+
+T = TypeVar("T")
+PASSWORD = "eleven blue horses"
+#: What argon2 costs is tested once; here it would only be slow.
+CHEAP = Passwords(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
+NAMES = {Role.ADMINISTRATOR: "Anna", Role.OPERATOR: "Olaf", Role.VIEWER: "Vera"}
+
+
+class Caller:
+    """Somebody with a cookie or a token, or nobody."""
+
+    def __init__(self, server: GuardedServer, cookie: str | None = None, token: str | None = None):
+        headers = {"Authorization": f"Bearer {token}"} if token else {}
+        self.server = server
+        self.http = httpx.Client(
+            base_url=f"{server.url}/api/v1", timeout=20, headers=headers,
+            cookies={"servodeck": cookie} if cookie else None,
+        )  # fmt: skip
+        server.callers.append(self)
+        self.cookie, self.token = cookie, token
+        if cookie:
+            self.http.headers["X-Servodeck-CSRF"] = self.http.get("/session").json()["csrf"] or "-"
+
+    def ask(self, method: str, path: str, **options: Any) -> httpx.Response:
+        return self.http.request(method, path, **options)
+
+    def ok(self, method: str, path: str, body: object = None) -> Any:
+        answer = self.http.request(method, path, json=body)
+        assert answer.is_success, answer.text
+        return answer.json() if answer.content else None
+
+    def live(self) -> Page:
+        headers = {"Cookie": f"servodeck={self.cookie}"} if self.cookie else {}
+        if self.token:
+            headers["Authorization"] = f"Bearer {self.token}"
+        return Page(f"{self.server.url.replace('http', 'ws')}/api/v1/live", headers)
+
+
+class Page(Live):
+    """A websocket with a cookie."""
+
+    def __init__(self, url: str, headers: dict[str, str]) -> None:
+        self.socket = connect(url, max_size=None, additional_headers=headers)
+        self.binary: list[bytes] = []
+        self.connection = self.wait("hello")["connection"]
+
+    def refused(self, **message: object) -> Any:
+        """Send, then a ping; the problem that came before the pong, or None."""
+        self.socket.send(json.dumps(message))
+        self.send(type="ping", n=1)
+        problem = None
+        while True:
+            got = self.receive(10)
+            if got["type"] == "refused":
+                problem = got["problem"]
+            if got["type"] == "pong":
+                return problem
+
+
+class GuardedServer:
+    """``people`` may be moved in time by ``later``; ``bench`` has the axis x."""
+
+    def __init__(self, folder: Path, *, accounts: bool = True) -> None:
+        self.servo = Servo()
+        self.folder = folder
+        self.people = People(folder, accounts_needed=accounts, passwords=CHEAP)
+        self.ahead = timedelta(0)
+        self.callers: list[Caller] = []
+        self.people.accounts._now = lambda: datetime.now(UTC) + self.ahead
+        self.bench: Bench
+        self.member: Member
+        self.app: Any = None
+        self.port = 0
+        self._loop: asyncio.AbstractEventLoop
+        self._server: uvicorn.Server
+        self._thread: threading.Thread
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    def start(self) -> GuardedServer:
+        listening = _listen("127.0.0.1", 0)
+        self.port = listening.getsockname()[1]
+        started = threading.Event()
+
+        async def main() -> None:
+            self._loop = asyncio.get_running_loop()
+            self.bench, self.member = await bench_with(self.servo, self.folder)
+            serving = Serving(accounts=self.people.accounts_needed)
+            config = _config(self.bench, self.people, serving, None)
+            self.app = config.app
+            self._server = uvicorn.Server(config)
+            task = asyncio.create_task(self._server.serve(sockets=[listening]))
+            while not self._server.started:  # noqa: ASYNC110 - uvicorn has no event for it
+                await asyncio.sleep(0.01)
+            started.set()
+            await task
+
+        self._thread = threading.Thread(target=lambda: asyncio.run(main()), daemon=True)
+        self._thread.start()
+        assert started.wait(20)
+        return self
+
+    def stop(self) -> None:
+        for caller in self.callers:
+            caller.http.close()
+        self._server.should_exit = True
+        self._thread.join(15)
+        assert not self._thread.is_alive(), "the server does not shut down"
+
+    def run(self, work: Coroutine[Any, Any, T]) -> T:
+        """Do something on the server's loop."""
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result(20)
+
+    def call(self, work: Callable[[], T]) -> T:
+        """Call something on the server's loop."""
+
+        async def calling() -> T:
+            return work()
+
+        return self.run(calling())
+
+    # --- people -----------------------------------------------------------------------
+
+    def add_people(self) -> None:
+        accounts = self.people.accounts
+        for role, name in NAMES.items():
+            self.run(accounts.add(name, PASSWORD, role))
+
+    def log_in(self, role: Role) -> Caller:
+        made = httpx.post(
+            f"{self.url}/api/v1/session", json={"name": NAMES[role], "password": PASSWORD}
+        )
+        assert made.is_success, made.text
+        return Caller(self, cookie=made.cookies["servodeck"])
+
+    def token(self, role: Role, *scopes: Right) -> Caller:
+        owner = next(a for a in self.people.accounts.all() if a.role is role)
+        make: Awaitable[Any] = self.people.accounts.make_token(
+            owner.id, "script", frozenset(scopes), timedelta(days=1)
+        )
+        return Caller(self, token=self.run(make)[0])  # type: ignore[arg-type]
+
+    def guest(self, host: Caller, allowed: list[str], minutes: float = 60) -> tuple[Caller, str]:
+        """A joined guest, and the id of the invitation."""
+        made = host.ok("POST", "/invitations",
+                       {"guest": "Gert", "allowed": allowed, "minutes": minutes})  # fmt: skip
+        link = made["link"].removeprefix("/guest/")
+        joined = httpx.post(f"{self.url}/api/v1/guests",
+                            json={"link": link, "code": made["invitation"]["code"]})  # fmt: skip
+        assert joined.is_success, joined.text
+        return Caller(self, cookie=joined.cookies["servodeck"]), made["invitation"]["id"]
