@@ -21,8 +21,8 @@ import numpy as np
 from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray
 from backend.analysis.frf import Frf
 from backend.analysis.margins import Margins, bandwidth, closed_from_open, margins
+from backend.analysis.mechanical_model import MechanicalModel
 from backend.analysis.notch import Notch
-from backend.analysis.sampled_model import MechanicalModel
 from backend.analysis.sampling import delay_response, lag_response
 from backend.analysis.step import step_metrics
 

@@ -14,6 +14,7 @@ Instrum. Meas. 40 (1991) 982 (crest factor); Novak et al., JAES 63 (2015) 786
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -136,12 +137,23 @@ def falling_amplitude(frequency_hz: FloatArray, corner_hz: float, order: float =
 def _low_crest_period(
     n: int, lines: IntArray, amplitude: FloatArray, seed: int, iterations: int
 ) -> FloatArray:
+    """As `_optimised_period`, which searches only once for realisations that share their phases."""
+    whole = (lines.astype(np.int64).tobytes(), amplitude.astype(np.float64).tobytes())
+    return _optimised_period(n, *whole, seed, iterations).copy()
+
+
+@lru_cache(maxsize=32)
+def _optimised_period(
+    n: int, lines_bytes: bytes, amplitude_bytes: bytes, seed: int, iterations: int
+) -> FloatArray:
     """One period with the given line amplitudes, peak 1, phases chosen for a low crest factor.
 
     Minimises the 2p-norm of the signal for growing p (Guillaume et al., IEEE Trans. Instrum.
     Meas. 40 (1991) 982). The search starts at random phases, so different seeds stay
     independent realisations.
     """
+    lines = np.frombuffer(lines_bytes, np.int64)
+    amplitude = np.frombuffer(amplitude_bytes, np.float64)
     rng = np.random.default_rng(seed)
     scale = n * amplitude / (2.0 * np.sqrt(np.sum(amplitude**2) / 2.0))
 

@@ -45,17 +45,19 @@ class Record:
     """One played excitation: ``excitation.samples`` are the sent values in units of the injection.
 
     ``response`` [n] is velocity or position, ``torque`` [n] the reported torque (needed for
-    *torque_injection*), ``valid`` [n] False where a cycle was lost or late.
+    *torque_injection*), ``valid`` [n] False where a cycle was lost or late, ``position`` [n] the
+    integral of a velocity ``response`` as the drive reports it.
     """
 
     excitation: Excitation
     response: FloatArray
     torque: FloatArray | None = None
     valid: BoolArray | None = None
+    position: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = self.excitation.samples.size
-        for signal in (self.response, self.torque, self.valid):
+        for signal in (self.response, self.torque, self.valid, self.position):
             if signal is not None and signal.shape != (n,):
                 raise ValueError(f"signals must have {n} samples, as the excitation has")
 
@@ -166,7 +168,30 @@ def _period_spectra(signal: FloatArray, e: Excitation, periods: list[int]) -> Co
     return np.asarray(np.fft.rfft(blocks, axis=1)[:, e.lines])
 
 
-def _collect(records: tuple[Record, ...], path: SignalPath, quantity: Quantity) -> _Spectra:
+def _velocity_from_position(
+    record: Record, e: Excitation, periods: list[int], rate: float
+) -> ComplexArray:
+    """Spectra [periods, lines] of the velocity by way of the reported position.
+
+    An axis that gains speed makes a parabola, whose curvature the velocity tells; the rest of the
+    drift is the difference between two periods.
+    """
+    if record.position is None:
+        raise ValueError("the recording has no position")
+    n = e.period_samples
+    curvature = 0.0
+    if len(periods) > 1:
+        means = [float(record.response[e.first_sample + p * n :][:n].mean()) for p in periods]
+        curvature = (means[-1] - means[0]) / ((periods[-1] - periods[0]) * n) / rate
+    t = np.arange(record.position.size) - e.first_sample
+    straight = record.position - 0.5 * curvature * t**2
+    spectra = _period_spectra(np.asarray(straight), e, periods)
+    return np.asarray(spectra * (2j * np.pi * e.line_hz))
+
+
+def _collect(
+    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, *, position: bool = False
+) -> _Spectra:
     first = records[0].excitation
     if first.period_samples == 0:
         raise ValueError("period-synchronous estimation needs a periodic excitation")
@@ -183,7 +208,11 @@ def _collect(records: tuple[Record, ...], path: SignalPath, quantity: Quantity) 
             continue
         realisation.append(e.realisation)
         sent.append(_period_spectra(e.samples, e, good))
-        response.append(_period_spectra(record.response, e, good))
+        response.append(
+            _velocity_from_position(record, e, good, path.sample_rate_hz)
+            if position
+            else _period_spectra(record.response, e, good)
+        )
         direction.append(
             _period_spectra(_direction(record.response), e, good)
             * _centre_of_interval(e.line_hz, path.sample_rate_hz)
@@ -221,8 +250,9 @@ def _centre_of_interval(frequency_hz: FloatArray, sample_rate_hz: float) -> Comp
 
 
 def _continuous_input(
-    s: _Spectra, path: SignalPath, quantity: Quantity, coulomb_nm: float = 0.0
-) -> list[ComplexArray]:
+    s: _Spectra, path: SignalPath, quantity: Quantity, coulomb_nm: float = 0.0,
+    *, position: bool = False,
+) -> list[ComplexArray]:  # fmt: skip
     """What really drove the measured quantity, per realisation [periods, lines]."""
     f = s.frequency_hz
     if quantity == "closed_loop":
@@ -231,13 +261,16 @@ def _continuous_input(
         )
         return [r * whole for r in s.sent]
     late = reported_response(f, path)
+    if position:
+        late = delay_response(f, path.response_delay_s)
     direct = command_response(f, path)
     inputs: list[ComplexArray] = [r * direct * late for r in s.sent]
     if quantity == "torque_injection":
         inputs = [u + own * late for u, own in zip(inputs, s.torque, strict=True)]
     if coulomb_nm:
         # The direction comes from the reported velocity and is late already.
-        inputs = [u - coulomb_nm * d for u, d in zip(inputs, s.direction, strict=True)]
+        ahead = late / reported_response(f, path)
+        inputs = [u - coulomb_nm * ahead * d for u, d in zip(inputs, s.direction, strict=True)]
     return inputs
 
 
@@ -298,8 +331,12 @@ def estimate_periodic(
     jitter_s: float = 0.0,
     smooth_lines: int = 4,
     coulomb_nm: float | None = 0.0,
+    position: bool = False,
 ) -> Frf:
     """Period-synchronous estimate over all realisations and periods.
+
+    With ``position`` the velocity is taken from the records' position: no speed filter lies in
+    the way, images arrive weaker, and the noise is that of the encoder.
 
     ``coulomb_nm`` is friction whose torque is subtracted (units of the torque; the response must
     then be a velocity); None estimates it from the data.
@@ -308,13 +345,13 @@ def estimate_periodic(
     distortion (Pintelon & Schoukens section 4.3, "robust method"). Variances are pooled over
     ``smooth_lines`` neighbours on each side to gain degrees of freedom.
     """
-    s = _collect(records, path, quantity)
+    s = _collect(records, path, quantity, position=position)
     if coulomb_nm is None:
         coulomb_nm = 0.0 if quantity == "closed_loop" else _estimate_coulomb(s, path, quantity)
-    inputs = _continuous_input(s, path, quantity, coulomb_nm)
+    inputs = _continuous_input(s, path, quantity, coulomb_nm, position=position)
     g, _, s_ur = _instrument_estimate(s, inputs)
     # What friction did to the answer is known to about a fifth only; that is charged to the band.
-    plain = _instrument_estimate(s, _continuous_input(s, path, quantity))[0]
+    plain = _instrument_estimate(s, _continuous_input(s, path, quantity, position=position))[0]
     doubt = 0.2 * np.log(g / plain)
     power = np.asarray(sum(np.abs(r.mean(axis=0)) ** 2 for r in s.sent))
     noise_var, total_var, freedom = _variances(s, inputs, g, smooth_lines)

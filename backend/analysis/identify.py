@@ -21,19 +21,15 @@ from backend.analysis.frf import (
     loop_spectra,
     valid_band_hz,
 )
-from backend.analysis.sampled_model import (
-    SampledFit,
-    fit_loop,
-    fit_sampled_model,
-    loop_image_factor,
-)
+from backend.analysis.model_fit import fit_loop, fit_sampled_model
+from backend.analysis.sampled_model import LoopModel, SampledFit
 from backend.analysis.sampling import SignalPath, delay_response
 
 #: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
 SYSTEMATIC_DB = 0.03
 SYSTEMATIC_DEG = 0.15
 
-#: A model whose median relative misfit is larger corrects nothing.
+#: A model whose median relative misfit is larger, and larger than the noise, corrects nothing.
 TRUSTED_ERROR = 0.03
 
 #: At most this many rounds of refining loop and mechanics against each other.
@@ -72,45 +68,101 @@ def identify_mechanics(
     """
     if quantity == "closed_loop":
         raise ValueError("mechanics are identified from torque, not from a loop's reference")
-    raw = estimate_periodic(records, path, quantity, coulomb_nm=coulomb_nm, jitter_s=jitter_s)
+    views = _views(records, path, quantity, coulomb_nm, jitter_s)
     if quantity == "torque_mode":
-        fit = fit_sampled_model(raw, path, max_modes=max_modes)
+        fit = fit_sampled_model(
+            views.velocity, path, from_position=views.position, max_modes=max_modes
+        )
     else:
-        fit = _fit_with_loop(raw, records, path, max_modes)
-    if fit.error > TRUSTED_ERROR:
+        fit = _fit_with_loop(views, records, path, max_modes)
+    if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
         # No model explains what was sampled, so neither delay nor images are known.
+        raw = views.velocity or views.position
+        assert raw is not None
         low, high = raw.valid_band_hz
         plain = replace(raw, valid_band_hz=(low, min(high, 0.1 * raw.sample_rate_hz)))
         return Identification(plain, plain, fit, trusted=False)
-    late = delay_response(raw.frequency_hz, fit.delay_s)
-    delay_deg = 360.0 * raw.frequency_hz * fit.delay_std_s
-    direct = replace(
-        raw,
-        response=np.asarray(raw.response / late),
-        std_deg=np.hypot(raw.std_deg, delay_deg),
+    direct, corrected = [], []
+    for raw, late_s, late_std_s, integrated in (
+        (views.velocity, fit.delay_s, fit.delay_std_s, False),
+        (views.position, fit.position_delay_s, fit.position_delay_std_s, True),
+    ):
+        if raw is None:
+            continue
+        delay_deg = 360.0 * raw.frequency_hz * late_std_s
+        plain = replace(
+            raw,
+            response=np.asarray(raw.response / delay_response(raw.frequency_hz, late_s)),
+            std_deg=np.hypot(raw.std_deg, delay_deg),
+        )
+        factor = fit.image_factor(raw.frequency_hz, integrated=integrated)
+        # Images stay in the direct estimate: its band must contain them.
+        direct.append(_widened(plain, factor, 1.0))
+        corrected.append(_without_images(plain, factor, jitter_s))
+    return Identification(_pooled(direct), _pooled(corrected), fit)
+
+
+@dataclass(frozen=True)
+class _Views:
+    """The same mechanics by way of the reported velocity and of the reported position."""
+
+    velocity: Frf | None
+    position: Frf | None
+
+
+def _views(
+    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, coulomb_nm: float | None,
+    jitter_s: float,
+) -> _Views:  # fmt: skip
+    """Estimates from what was recorded; the velocity only where its filter is known."""
+    velocity = estimate_periodic(records, path, quantity, coulomb_nm=coulomb_nm, jitter_s=jitter_s)
+    if any(record.position is None for record in records):
+        return _Views(velocity, None)
+    position = estimate_periodic(
+        records, path, quantity, coulomb_nm=velocity.coulomb_nm, jitter_s=jitter_s, position=True
     )
-    factor: ComplexArray = fit.image_factor(raw.frequency_hz)
-    # Images stay in the direct estimate: its band must contain them.
-    return Identification(
-        _widened(direct, factor, 1.0), _without_images(direct, factor, jitter_s), fit
+    return _Views(velocity if path.response_bandwidth_hz else None, position)
+
+
+def _pooled(parts: list[Frf]) -> Frf:
+    """Each line by what is known best; the errors of two views of one motion may be the same."""
+    if len(parts) == 1:
+        return parts[0]
+    first, second = parts
+    a, b = (np.maximum(np.nan_to_num(p.std_db, nan=1.0), 1e-6) ** -2 for p in parts)
+    share = a / (a + b)
+    response = first.response * share + second.response * (1.0 - share)
+    return replace(
+        first,
+        response=np.asarray(response),
+        std_db=first.std_db * share + second.std_db * (1.0 - share),
+        std_deg=first.std_deg * share + second.std_deg * (1.0 - share),
+        coherence=np.maximum(first.coherence, second.coherence),
+        noise=first.noise * share + second.noise * (1.0 - share),
+        distortion=first.distortion * share + second.distortion * (1.0 - share),
     )
 
 
 def _fit_with_loop(
-    raw: Frf, records: tuple[Record, ...], path: SignalPath, max_modes: int
+    views: _Views, records: tuple[Record, ...], path: SignalPath, max_modes: int
 ) -> SampledFit:
     """Loop and mechanics in turn: each is needed to take the images out of the other."""
     own, velocity = loop_spectra(records, path)
-    fit = fit_sampled_model(
-        raw, path, loop=fit_loop(raw.frequency_hz, own, velocity, path), max_modes=max_modes
-    )
+    lines = records[0].excitation.line_hz
+
+    def fitted(loop: LoopModel) -> SampledFit:
+        return fit_sampled_model(
+            views.velocity, path, from_position=views.position, loop=loop, max_modes=max_modes
+        )
+
+    fit = fitted(fit_loop(lines, own, velocity, path))
     for _ in range(LOOP_PASSES):
-        clean = own / loop_image_factor(raw.frequency_hz, fit)
-        loop = fit_loop(raw.frequency_hz, clean, velocity, path)
+        clean = own / fit.loop_image_factor(lines)
+        loop = fit_loop(lines, clean, velocity, path)
         change = abs(loop.c0 / fit.loop.c0 - 1.0)
         if change < 0.003:
             break
-        fit = fit_sampled_model(raw, path, loop=loop, max_modes=max_modes)
+        fit = fitted(loop)
     return fit
 
 

@@ -8,10 +8,12 @@ back above half the sample rate is not, see :mod:`backend.analysis.sampled_model
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
+from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 from backend.analysis.arrays import ComplexArray, FloatArray
@@ -21,6 +23,9 @@ Hold = Literal["zero", "linear"]
 #: Direct estimates hold to this share of the sample rate, sampled-data models to the second.
 DIRECT_SHARE = 0.25
 MODEL_SHARE = 0.4
+
+#: A drive interpolates in the steps of its own loop (50 µs) and so is half a step ahead of a line.
+STEP_LEAD_S = 25e-6
 
 
 @dataclass(frozen=True)
@@ -110,3 +115,68 @@ def sampled_command(sent: FloatArray, path: SignalPath) -> FloatArray:
     numerator = impulse - a * np.concatenate([[0.0], impulse[:-1]])
     filtered = np.asarray(lfilter(numerator, [1.0, -a], sent)) * path.direct_gain
     return np.concatenate([np.zeros(int(whole)), filtered])[: filtered.size]
+
+
+def fit_path(
+    commands: tuple[FloatArray, ...],
+    torques: tuple[FloatArray, ...],
+    lines: tuple[npt.NDArray[np.int64], ...],
+    path: SignalPath,
+    *,
+    loop_closed: bool,
+    most_cycles: int = 3,
+) -> SignalPath:
+    """Delay from the sent values to the torque, and the current loop's corner where unknown.
+
+    ``commands`` and ``torques`` [n] are whole periods that follow the same period (steady state),
+    ``lines`` the excited bins. Judged by the upper lines; there a closed loop adds about a/s of
+    what is injected, which is fitted along. That leaves no more than whole cycles to be told
+    apart in a closed loop, less the `STEP_LEAD_S` of interpolation.
+    """
+    period_s = 1.0 / path.sample_rate_hz
+    lead_s = STEP_LEAD_S if path.hold == "linear" else 0.0
+
+    def rest(delay_s: float, bandwidth_hz: float | None) -> float:
+        trial = replace(path, command_delay_s=delay_s, current_bandwidth_hz=bandwidth_hz)
+        total = 0.0
+        for sent, torque, bins in zip(commands, torques, lines, strict=True):
+            upper = bins[(3 * bins.size) // 4 :]
+            twice = np.concatenate([sent, sent])
+            u = np.fft.rfft(sampled_command(twice, trial)[sent.size :])[upper]
+            t = np.fft.rfft(torque)[upper]
+            error = t - u
+            if loop_closed:
+                column = u / (1j * upper)
+                error = error - column * (
+                    np.vdot(column, error).real / np.vdot(column, column).real
+                )
+            total += float(np.sum(np.abs(error) ** 2))
+        return total
+
+    def best_delay(bandwidth_hz: float | None) -> tuple[float, float]:
+        cycles = np.arange(0.0, most_cycles + 0.01, 1.0 if loop_closed else 0.25)
+        grid = np.maximum(cycles * period_s - lead_s, 0.0)
+        costs = [rest(float(d), bandwidth_hz) for d in grid]
+        near = float(grid[int(np.argmin(costs))])
+        if loop_closed:
+            return near, min(costs)
+        bounds = (max(near - 0.3 * period_s, 0.0), near + 0.3 * period_s)
+        found = minimize_scalar(
+            lambda d: rest(float(d), bandwidth_hz), bounds=bounds, method="bounded",
+            options={"xatol": 1e-6},
+        )  # fmt: skip
+        return float(found.x), float(found.fun)
+
+    bandwidth = path.current_bandwidth_hz
+    if bandwidth is None:
+        low = 0.1 * path.sample_rate_hz
+        corners = np.geomspace(low, 8000.0, 12)
+        costs = [best_delay(float(b))[1] for b in corners]
+        place = int(np.argmin(costs))
+        around = (corners[max(place - 1, 0)], corners[min(place + 1, corners.size - 1)])
+        found = minimize_scalar(
+            lambda x: best_delay(float(np.exp(x)))[1], bounds=tuple(np.log(around)),
+            method="bounded", options={"xatol": 0.01},
+        )  # fmt: skip
+        bandwidth = float(np.exp(found.x))
+    return replace(path, command_delay_s=best_delay(bandwidth)[0], current_bandwidth_hz=bandwidth)

@@ -21,8 +21,8 @@ from backend.analysis.fit import Resonance
 from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
 from backend.analysis.identify import Identification, identify_mechanics
 from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
-from backend.analysis.sampled_model import MechanicalModel
-from backend.analysis.sampling import SignalPath, sampled_command
+from backend.analysis.mechanical_model import MechanicalModel
+from backend.analysis.sampling import SignalPath, fit_path, sampled_command
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
@@ -53,7 +53,9 @@ _TURN = 2 * np.pi
 _MODE_OF = {"none": Mode.CST, "speed": Mode.CSV, "position": Mode.CSP}
 #: Weak modes below this are artefacts of friction more often than mechanics.
 _LOWEST_MODE_HZ = 15.0
-_WEAK_DB = 3.0
+_WEAK_DB, _LEAST_DB, _LEAST_SHARE = 3.0, 1.0, 0.2
+#: Share of the distance of two lines that a mode's half width must have.
+_NARROWEST = 0.15
 
 
 @dataclass(frozen=True, slots=True)
@@ -373,9 +375,12 @@ def evaluate(
     )
     if settings.kind != "mechanics":
         return _evaluate_loop(records, path, settings, loop)
-    taken = tuple(Record(s.excitation, r.velocity_rad_s, r.torque_nm, r.valid) for s, r in records)
-    path = replace(path, command_delay_s=_found_delay(taken, path))
+    taken = tuple(
+        Record(s.excitation, r.velocity_rad_s, r.torque_nm, r.valid, r.position_rad)
+        for s, r in records
+    )
     quantity: Quantity = "torque_mode" if loop == "none" else "torque_injection"
+    path = _found_path(taken, path, quantity == "torque_injection")
     found = identify_mechanics(taken, path, quantity)
     limit = settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm
     saturated = _saturated(taken, path, quantity, limit)
@@ -388,7 +393,11 @@ def evaluate(
         model=found.fit.model if found.trusted else None,
         trusted=found.trusted,
         unit="(rad/s)/Nm" if facts.torque_known else "(rad/s)/rated torque",
-        resonances=resonance_table(found.fit.model) if found.trusted else (),
+        resonances=resonance_table(
+            found.fit.model, found.corrected.frequency_hz, found.corrected.valid_band_hz[1]
+        )
+        if found.trusted
+        else (),
         margins=_injection_margins(found) if quantity == "torque_injection" else {},
         delay_s=path.command_delay_s + found.fit.delay_s,
         motion_s=_motion_s(records),
@@ -397,27 +406,23 @@ def evaluate(
     )
 
 
-def _found_delay(records: tuple[Record, ...], path: SignalPath) -> float:
-    """Whole cycles between a set-point and its torque, from the reported torque.
-
-    Judged by the upper half of the lines, where a closed loop adds next to nothing.
-    """
-    best, smallest = path.command_delay_s, np.inf
-    for cycles in range(4):
-        trial = replace(path, command_delay_s=cycles / path.sample_rate_hz)
-        rest = 0.0
-        for r in records:
-            e = r.excitation
-            if r.torque is None:
-                continue
-            last = e.first_sample + (e.periods - 1) * e.period_samples
-            cut = slice(last, last + e.period_samples)
-            error = r.torque[cut] - sampled_command(e.samples, trial)[cut]
-            upper = e.lines[e.lines.size // 2 :]
-            rest += float(np.sum(np.abs(np.fft.rfft(error)[upper]) ** 2))
-        if rest < smallest:
-            best, smallest = trial.command_delay_s, rest
-    return best
+def _found_path(records: tuple[Record, ...], path: SignalPath, closed: bool) -> SignalPath:
+    """Delay between a set-point and its torque, from the last period of the reported torque."""
+    commands, torques, lines = [], [], []
+    for r in records:
+        e = r.excitation
+        if r.torque is None:
+            continue
+        last = e.first_sample + (e.periods - 1) * e.period_samples
+        cut = slice(last, last + e.period_samples)
+        if r.valid is not None and not np.all(r.valid[cut]):
+            continue
+        commands.append(e.samples[cut])
+        torques.append(r.torque[cut])
+        lines.append(e.lines)
+    if not commands:
+        return path
+    return fit_path(tuple(commands), tuple(torques), tuple(lines), path, loop_closed=closed)
 
 
 def _saturated(
@@ -459,25 +464,35 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
     return tuple(words)
 
 
-def resonance_table(model: MechanicalModel) -> tuple[Resonance, ...]:
-    """Resonances and antiresonances of a model, ascending; heights are local, in dB."""
+def resonance_table(
+    model: MechanicalModel, lines_hz: FloatArray, highest_hz: float
+) -> tuple[Resonance, ...]:
+    """Resonances and antiresonances that the lines show, ascending; heights are local, in dB.
+
+    A mode that hardly rises, or that is narrower than what lies between two lines, explains noise.
+    """
     rows: list[Resonance] = []
     for mode in model.modes:
-        at = np.array([mode.frequency_hz])
-        rest = replace(model, modes=tuple(m for m in model.modes if m is not mode))
-        height = 20 * np.log10(float(np.abs(model.response(at)[0] / rest.response(at)[0])))
-        weak = mode.frequency_hz < _LOWEST_MODE_HZ and height < _WEAK_DB
-        if not weak:
+        height = model.height_db(mode)
+        place = int(np.clip(np.searchsorted(lines_hz, mode.frequency_hz), 1, lines_hz.size - 1))
+        gap_hz = float(lines_hz[place] - lines_hz[place - 1])
+        low = mode.frequency_hz < _LOWEST_MODE_HZ
+        shown = height > _WEAK_DB if low else model.prominence(mode) > _LEAST_SHARE
+        wide = mode.damping * mode.frequency_hz > _NARROWEST * gap_hz
+        inside = lines_hz[0] < mode.frequency_hz <= highest_hz
+        if shown and wide and inside and mode.damping < 1.0:
             rows.append(Resonance("resonance", mode.frequency_hz, mode.damping, height))
     kept = [row.frequency_hz for row in rows]
     for frequency, damping in model.antiresonances():
-        if frequency < _LOWEST_MODE_HZ and not any(f < 3 * frequency for f in kept):
+        # An antiresonance belongs to a resonance above it, which may lie beyond the band.
+        above = any(f > frequency for f in kept) or frequency > 0.25 * highest_hz
+        if not above or not lines_hz[0] < frequency <= highest_hz:
             continue
         around = np.array([frequency * 0.5, frequency, frequency * 2.0])
         db = 20 * np.log10(np.abs(model.response(around)))
-        rows.append(
-            Resonance("antiresonance", frequency, damping, float(db[1] - (db[0] + db[2]) / 2))
-        )
+        depth = float(db[1] - (db[0] + db[2]) / 2)
+        if depth < -_LEAST_DB:
+            rows.append(Resonance("antiresonance", frequency, damping, depth))
     return tuple(sorted(rows, key=lambda row: row.frequency_hz))
 
 

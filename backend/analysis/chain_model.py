@@ -1,0 +1,190 @@
+"""Mechanics as a chain of inertias, driven and measured at the first.
+
+Whatever hangs on a motor answers there like such a chain (Gladwell, *Inverse Problems in
+Vibration*, 2004, ch. 4: a spectrum and the residues at one end determine it), so inertias,
+stiffnesses and dampings are the fewest numbers that say what is possible and nothing else.
+Parameters x: log J of the motor, log of its viscous friction, two delays, and per load log J,
+log k and log d.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.mechanical_model import (
+    MODE_PARAMETERS,
+    RIGID_PARAMETERS,
+    TURN,
+    MechanicalModel,
+    Mode,
+)
+
+LOAD_PARAMETERS = 3
+
+
+def loads_of(x: FloatArray) -> FloatArray:
+    """Inertia, stiffness and damping [loads, 3] of the parameters."""
+    return np.asarray(np.exp(x[RIGID_PARAMETERS:]).reshape(-1, LOAD_PARAMETERS))
+
+
+def chain_response_and_slopes(
+    x: FloatArray, frequency_hz: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Torque to velocity [...] and its slope [n parameters, ...] (zero for the delays).
+
+    From the far end towards the motor by impedances: an inertia is sJ, a coupling k/s + d in
+    series with all behind it.
+    """
+    s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
+    loads = loads_of(x)
+    behind = np.zeros_like(s)
+    parts: list[tuple[ComplexArray, ComplexArray, ComplexArray]] = []
+    for inertia, stiffness, damping in loads[::-1]:
+        coupling = stiffness / s + damping
+        hanging = s * inertia + behind
+        total = coupling + hanging
+        parts.append((coupling / total, hanging / total, s * inertia))
+        behind = coupling * hanging / total
+    motor, viscous = np.exp(x[0]), np.exp(x[1])
+    response = 1.0 / (s * motor + viscous + behind)
+    slopes = np.zeros((x.size, *s.shape), dtype=np.complex128)
+    outwards = -(response**2)
+    slopes[0] = outwards * s * motor
+    slopes[1] = outwards * viscous
+    for i, (through, into, inertial) in enumerate(reversed(parts)):
+        place = RIGID_PARAMETERS + LOAD_PARAMETERS * i
+        by_coupling = outwards * into**2
+        outwards = outwards * through**2
+        slopes[place] = outwards * inertial
+        slopes[place + 1] = by_coupling * loads[i, 1] / s
+        slopes[place + 2] = by_coupling * loads[i, 2]
+    return np.asarray(response), slopes
+
+
+def model_of_chain(x: FloatArray) -> MechanicalModel:
+    """The chain's poles and residues at the motor (always passive, so residues are positive)."""
+    loads, motor, viscous = loads_of(x), float(np.exp(x[0])), float(np.exp(x[1]))
+    n = len(loads)
+    size = 1 + 2 * n  # speed of the motor, then per load twist and speed
+    a = np.zeros((size, size))
+    a[0, 0] = -viscous / motor
+    inertias = [motor, *loads[:, 0]]
+    speeds = [0, *(2 + 2 * i for i in range(n))]
+    for i, (_, stiffness, damping) in enumerate(loads):
+        twist, before, behind = 1 + 2 * i, speeds[i], speeds[i + 1]
+        a[twist, before], a[twist, behind] = 1.0, -1.0
+        for row, sign, inertia in ((before, -1, inertias[i]), (behind, 1, inertias[i + 1])):
+            a[row, twist] += sign * stiffness / inertia
+            a[row, before] += sign * damping / inertia
+            a[row, behind] -= sign * damping / inertia
+    poles, right = (part.astype(np.complex128) for part in np.linalg.eig(a))
+    left = np.linalg.inv(right)
+    residues = right[0, :] * left[:, 0] / motor
+    return _from_poles(poles, residues)
+
+
+def _from_poles(poles: ComplexArray, residues: ComplexArray) -> MechanicalModel:
+    """Pairs to modes; real poles to the rigid part (the slowest) and to overdamped modes."""
+    real = np.abs(poles.imag) <= 1e-9 * np.maximum(np.abs(poles), 1e-12)
+    order = np.flatnonzero(real)[np.argsort(-poles[real].real)]
+    rigid, rest = order[0], order[1:]
+    modes = [
+        _mode(poles[i], np.conj(poles[i]), residues[i], np.conj(residues[i]))
+        for i in np.flatnonzero(~real)
+        if poles[i].imag > 0
+    ]
+    pairs = zip(rest[::2], rest[1::2], strict=True)
+    modes += [_mode(poles[i], poles[j], residues[i], residues[j]) for i, j in pairs]
+    return MechanicalModel(
+        float(residues[rigid].real),
+        float(-poles[rigid].real),
+        tuple(sorted(modes, key=lambda m: m.frequency_hz)),
+    )
+
+
+def _mode(p: complex, q: complex, a: complex, b: complex) -> Mode:
+    """a/(s - p) + b/(s - q) as one mode."""
+    w = float(np.sqrt((p * q).real))
+    top = (a + b).real
+    return Mode(
+        w / TURN, float(-(p + q).real / (2 * w)), float(top), float(-(a * q + b * p).real / top)
+    )
+
+
+def modal_start(x: FloatArray) -> FloatArray:
+    """Parameters of the free modal form (:func:`mechanical_model.model_of`) for a chain's."""
+    model = model_of_chain(x)
+    out = [np.log(model.gain), np.log(max(model.pole_rad_s, 1e-6)), x[2], x[3]]
+    for m in model.modes:
+        part = m.zero_rad_s / (TURN * m.frequency_hz)
+        out += [np.log(m.frequency_hz), np.log(min(m.damping, 0.99)),
+                np.log(max(m.residue, 1e-12)), part]  # fmt: skip
+    assert (len(out) - RIGID_PARAMETERS) % MODE_PARAMETERS == 0
+    return np.array(out)
+
+
+def with_load(x: FloatArray, place: int, new: tuple[float, float, float, float]) -> FloatArray:
+    """One more load: ``new`` is what the inertia at ``place`` (0 is the motor) becomes, and J, k
+    and d of the load that hangs on it; what hung there before hangs on the new load.
+    """
+    loads = [tuple(row) for row in loads_of(x)]
+    motor = float(np.exp(x[0]))
+    if place == 0:
+        motor = new[0]
+    else:
+        loads[place - 1] = (new[0], *loads[place - 1][1:])
+    loads.insert(place, new[1:])
+    return np.concatenate([[np.log(motor)], x[1:RIGID_PARAMETERS], np.log(loads).ravel()])
+
+
+def responses_with_load(
+    x: FloatArray, place: int, new: FloatArray, frequency_hz: FloatArray
+) -> ComplexArray:
+    """Responses [n, lines] of `with_load` for many ``new`` [n, 4] at once."""
+    s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
+    loads = loads_of(x)
+    inertias = np.concatenate([[np.exp(x[0])], loads[:, 0]])
+
+    def hung(inertia: FloatArray | float, stiffness: FloatArray | float,
+             damping: FloatArray | float, behind: ComplexArray) -> ComplexArray:  # fmt: skip
+        coupling, hanging = stiffness / s + damping, s * inertia + behind
+        return np.asarray(coupling * hanging / (coupling + hanging))
+
+    behind: ComplexArray = np.zeros_like(s)
+    for i in range(len(loads), place, -1):
+        behind = hung(inertias[i], loads[i - 1, 1], loads[i - 1, 2], behind)
+    kept, inertia, stiffness, damping = (column[:, None] for column in new.T)
+    front = s * kept + hung(inertia, stiffness, damping, behind)
+    for i in range(place, 0, -1):
+        coupling = loads[i - 1, 1] / s + loads[i - 1, 2]
+        front = s * inertias[i - 1] + coupling * front / (coupling + front)
+    return np.asarray(1.0 / (front + np.exp(x[1])))
+
+
+def chain_of_modes(
+    gain: float, frequency_hz: FloatArray, residue: FloatArray, viscous: float, damping: float
+) -> FloatArray:
+    """Parameters (delays zero) of the chain with these undamped modes; all couplings get the same
+    damping ratio.
+
+    Lanczos' recursion from the motor gives the tridiagonal matrix that has these poles and
+    residues (Gladwell, section 4.3); its entries are k and J of one coupling after the other.
+    """
+    order = np.argsort(frequency_hz)
+    poles = np.concatenate([[0.0], (TURN * frequency_hz[order]) ** 2])
+    weights = np.concatenate([[gain], residue[order]])
+    v = np.sqrt(weights / np.sum(weights))
+    inertia = 1.0 / float(np.sum(weights))
+    before, beta, stiffness = np.zeros_like(v), 0.0, 0.0
+    out = [np.log(inertia), np.log(viscous), 0.0, 0.0]
+    for _ in range(frequency_hz.size):
+        alpha = float(v @ (poles * v))
+        rest = poles * v - alpha * v - beta * before
+        beta = float(np.linalg.norm(rest))
+        before, v = v, rest / beta
+        stiffness = alpha * inertia - stiffness
+        inertia = stiffness**2 / (beta**2 * inertia)
+        d = 2.0 * damping * np.sqrt(stiffness * inertia)
+        out += [np.log(inertia), np.log(stiffness), np.log(d)]
+    return np.array(out)

@@ -1,0 +1,148 @@
+"""A continuous model of mechanics driven and measured at the motor.
+
+A rigid part and modes with positive residues, G(s) = g/(s + p) + Σ α_i·(s + β_i)/(s² + 2·ζ_i·ω_i·s
++ ω_i²). Such a sum cannot imitate a delay, which is why a delay can be found together with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+
+TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One resonance: α·(s + β)/(s² + 2ζωs + ω²)."""
+
+    frequency_hz: float
+    damping: float
+    residue: float
+    zero_rad_s: float
+
+
+@dataclass(frozen=True)
+class MechanicalModel:
+    """Torque to velocity, continuous; ``gain`` is 1/J of the rigid part, ``pole_rad_s`` b/J."""
+
+    gain: float
+    pole_rad_s: float
+    modes: tuple[Mode, ...] = ()
+
+    def response(self, frequency_hz: FloatArray) -> ComplexArray:
+        """Complex response without any delay."""
+        s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
+        out = self.gain / (s + self.pole_rad_s)
+        for mode in self.modes:
+            w = TURN * mode.frequency_hz
+            out = out + mode.residue * (s + mode.zero_rad_s) / (
+                s * s + 2 * mode.damping * w * s + w * w
+            )
+        return np.asarray(out, dtype=np.complex128)
+
+    def without(self, mode: Mode) -> MechanicalModel:
+        """The rest of the model."""
+        return replace(self, modes=tuple(m for m in self.modes if m is not mode))
+
+    def height_db(self, mode: Mode) -> float:
+        """How far a mode rises above the rest of the model at its own frequency."""
+        at = np.array([mode.frequency_hz])
+        ratio = np.abs(self.response(at)[0]) / np.abs(self.without(mode).response(at)[0])
+        return float(20 * np.log10(max(float(ratio), 1e-6)))
+
+    def prominence(self, mode: Mode) -> float:
+        """A mode's own part of the response at its frequency, relative to all the rest."""
+        at = np.array([mode.frequency_hz])
+        rest = self.without(mode).response(at)[0]
+        return float(np.abs(self.response(at)[0] - rest) / np.abs(rest))
+
+    def numerator(self) -> FloatArray:
+        """Numerator polynomial in s, highest power first."""
+        denominators = [
+            np.array([1.0, 2 * m.damping * TURN * m.frequency_hz, (TURN * m.frequency_hz) ** 2])
+            for m in self.modes
+        ]
+        rigid = np.array([1.0, self.pole_rad_s])
+        total = self.gain * _product(denominators)
+        for i, mode in enumerate(self.modes):
+            others = _product([rigid, *denominators[:i], *denominators[i + 1 :]])
+            total = np.polyadd(total, mode.residue * np.polymul([1.0, mode.zero_rad_s], others))
+        return np.asarray(total, dtype=np.float64)
+
+    def antiresonances(self) -> tuple[tuple[float, float], ...]:
+        """(frequency in Hz, damping) of the complex zeros, ascending."""
+        zeros = np.roots(self.numerator())
+        pairs = [(abs(z) / TURN, -z.real / abs(z)) for z in zeros if z.imag > 1e-6 * abs(z)]
+        return tuple(sorted((float(f), float(d)) for f, d in pairs))
+
+    def perturbed(self, frequency_factor: float, damping_factor: float) -> MechanicalModel:
+        """All modes moved in frequency (stiffness) and damping; the inertias stay."""
+        return replace(
+            self,
+            modes=tuple(
+                replace(
+                    m,
+                    frequency_hz=m.frequency_hz * frequency_factor,
+                    damping=min(m.damping * damping_factor, 0.99),
+                )
+                for m in self.modes
+            ),
+        )
+
+
+def _product(polynomials: list[FloatArray]) -> FloatArray:
+    out = np.array([1.0])
+    for p in polynomials:
+        out = np.polymul(out, p)
+    return out
+
+
+# --- parameters of a fit ----------------------------------------------------------------
+
+#: Gain, pole and two delays come before the modes' four parameters each.
+RIGID_PARAMETERS = 4
+MODE_PARAMETERS = 4
+
+
+def model_of(x: FloatArray) -> MechanicalModel:
+    """Parameters to a model: log gain, log pole, (two delays), and per mode log frequency, log
+    damping, log residue and β/ω; logarithms, so that what is positive stays so.
+    """
+    modes = tuple(
+        Mode(
+            float(np.exp(q[0])),
+            float(np.exp(q[1])),
+            float(np.exp(q[2])),
+            float(q[3] * TURN * np.exp(q[0])),
+        )
+        for q in x[RIGID_PARAMETERS:].reshape(-1, MODE_PARAMETERS)
+    )
+    return MechanicalModel(float(np.exp(x[0])), float(np.exp(x[1])), modes)
+
+
+def response_and_slopes(
+    x: FloatArray, frequency_hz: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Response [...] of `model_of` (x), and its slope [n parameters, ...] (zero for the delays)."""
+    s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
+    gain, pole = np.exp(x[0]), np.exp(x[1])
+    rigid = gain / (s + pole)
+    slopes = np.zeros((x.size, *s.shape), dtype=np.complex128)
+    slopes[0] = rigid
+    slopes[1] = -rigid * pole / (s + pole)
+    total = rigid.copy()
+    for i in range(RIGID_PARAMETERS, x.size, MODE_PARAMETERS):
+        w, zeta, residue, part = TURN * np.exp(x[i]), np.exp(x[i + 1]), np.exp(x[i + 2]), x[i + 3]
+        below = s * s + 2 * zeta * w * s + w * w
+        above = s + part * w
+        mode = residue * above / below
+        total += mode
+        slopes[i] = residue * part * w / below - mode * (2 * zeta * w * s + 2 * w * w) / below
+        slopes[i + 1] = -mode * 2 * zeta * w * s / below
+        slopes[i + 2] = mode
+        slopes[i + 3] = residue * w / below
+    return total, slopes

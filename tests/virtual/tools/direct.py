@@ -1,0 +1,291 @@
+"""A virtual drive without a wire: the product's own loop (`AxisLoop`) beside the firmware.
+
+For what needs many axes or many samples and nothing of the wire itself. Time passes only while
+the event loop is idle or samples are due, some hundred cycles at a go; one cycle lies between a
+set-point and the sample that shows it, as with EtherCAT.
+"""
+
+from __future__ import annotations
+
+import array
+import asyncio
+import struct
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from backend.axis import Axis
+from backend.cyclic import CyclicSession
+from backend.drive import Drive, Port
+from drivers.cia402 import State
+from drivers.errors import DriveError, Rejected
+from drivers.ethercat.cyclic import layout, places
+from drivers.ethercat.mapping import Pdo, plan_station
+from drivers.ethercat.playback import AxisLoop, Limits, Motion
+from drivers.ethercat.setup import interpolation_period
+from drivers.link import (
+    Address,
+    CyclicSignal,
+    Found,
+    LinkEvent,
+    LinkQuality,
+    Progress,
+    ScopeBlock,
+    Trajectory,
+    Unsubscribe,
+)
+from drivers.virtual.device import Device, SdoAbort
+from drivers.virtual.firmware.factory import make_device
+from drivers.virtual.mechanics import MechanicsSpec
+from profiles.loader import load_profile
+from profiles.schema import Profile
+
+STATION = 1
+#: Simulated time for one access to the dictionary.
+_ACCESS_NS = 200_000
+#: Set-points live this much longer than on a wire: simulated time outruns the tools' clock.
+_PATIENCE = 1000
+
+
+@dataclass
+class DirectBench:
+    axis: Axis
+    session: CyclicSession
+    link: DirectLink
+    spec: MechanicsSpec
+
+
+class DirectLink:
+    """`drivers.link.Link` and its `Cyclic` in one, on one virtual drive."""
+
+    kind = "ethercat"
+    url = "direct://virtual"
+
+    def __init__(self, device: Device, profile: Profile) -> None:
+        self.device = device
+        self.profile = profile
+        self.now_ns = 0
+        self.dc = False
+        self.cycle_ns = 1_000_000
+        self.cut = False
+        """The cable is pulled: nothing comes back."""
+        self.highest = {"speed": 0.0, "torque": 0.0, "low": 0.0, "high": 0.0}
+        """Extremes of the actual values since the exchange began, raw."""
+        self._loop: AxisLoop | None = None
+        self._pump: asyncio.Task[None] | None = None
+        self._consumers: list[Callable[[ScopeBlock], None]] = []
+        self._channels: tuple[str, ...] = ()
+
+    # Link ----------------------------------------------------------------------------------
+
+    @property
+    def cyclic(self) -> DirectLink:
+        return self
+
+    async def open(self) -> None:
+        self.device.advance(0)
+
+    async def close(self) -> None:
+        await self.stop()
+
+    async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
+        del progress, stations
+        return [Found(STATION)]
+
+    def _access(self) -> None:
+        if self._pump is None:
+            self.now_ns += _ACCESS_NS
+            self.device.advance(self.now_ns)
+
+    async def read(self, station: int, address: Address) -> bytes:
+        del station
+        self._access()
+        await asyncio.sleep(0)
+        try:
+            return self.device.read(address.index or 0, address.subindex)
+        except SdoAbort as abort:
+            raise Rejected(f"{address}", abort_code=abort.code) from abort
+
+    async def read_many(
+        self, station: int, addresses: Sequence[Address]
+    ) -> list[bytes | DriveError]:
+        found: list[bytes | DriveError] = []
+        for address in addresses:
+            try:
+                found.append(await self.read(station, address))
+            except DriveError as error:
+                found.append(error)
+        return found
+
+    async def write(self, station: int, address: Address, data: bytes) -> None:
+        del station
+        self._access()
+        try:
+            self.device.write(address.index or 0, address.subindex, data)
+        except SdoAbort as abort:
+            raise Rejected(f"{address}", abort_code=abort.code) from abort
+        await asyncio.sleep(0)
+
+    def quality(self, station: int | None = None) -> LinkQuality:
+        del station
+        return LinkQuality(connected=not self.cut)
+
+    def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
+        del listener
+        return lambda: None
+
+    # Cyclic --------------------------------------------------------------------------------
+
+    async def configure(
+        self, inputs: Sequence[CyclicSignal], outputs: Sequence[CyclicSignal], cycle_s: float
+    ) -> tuple[CyclicSignal, ...]:
+        plan = plan_station(STATION, inputs, outputs, self.profile)
+        self.cycle_ns = round(cycle_s * 1e9)
+        value, exponent = interpolation_period(self.cycle_ns)
+        for sub, data in ((1, struct.pack("<B", value)), (2, struct.pack("<b", exponent))):
+            try:
+                self.device.write(0x60C2, sub, data)
+            except SdoAbort:
+                continue
+        self._rx = self.device.map_process_data([e.word for e in plan.rx.entries], "rx")
+        self._tx = self.device.map_process_data([e.word for e in plan.tx.entries], "tx")
+        self._pack, self._unpack = layout(plan.rx.entries), layout(plan.tx.entries)
+        names = {(s.address.index, s.address.subindex): s.channel for s in plan.mapped}
+        self._columns = _columns(plan.rx, names), _columns(plan.tx, names)
+        self._channels = tuple(n for part in self._columns for _, n in part)
+        known = [e for e in plan.rx.entries if e.code != "x"]
+        self._loop = AxisLoop(
+            STATION, inputs=places(plan.tx.entries), outputs=places(plan.rx.entries),
+            output_count=len(known), cycle_s=cycle_s, report=lambda _n, _t: None,
+        )  # fmt: skip
+        self._watch = places(plan.tx.entries)
+        return plan.mapped
+
+    async def start(self) -> None:
+        self._latched = self._tx.pack()
+        self._pump = asyncio.get_running_loop().create_task(self._run())
+
+    async def stop(self) -> None:
+        if self._pump is not None:
+            self._pump.cancel()
+            self._pump = None
+
+    @property
+    def running(self) -> bool:
+        return self._pump is not None and not self._pump.done() and not self.cut
+
+    async def _run(self) -> None:
+        per_turn = max(1, round(20_000_000 / self.cycle_ns))
+        while True:
+            rows = [self._cycle() for _ in range(per_turn)]
+            if self.cut:
+                return
+            block = ScopeBlock(0, self.now_ns / 1e9, self.cycle_ns / 1e9, self._channels,
+                               np.array(rows, np.float64))  # fmt: skip
+            for consumer in tuple(self._consumers):
+                consumer(block)
+            await asyncio.sleep(0)
+
+    def _cycle(self) -> list[float]:
+        loop = self._loop
+        assert loop is not None
+        sent = self._pack.pack(*loop.outputs)
+        self.now_ns += self.cycle_ns
+        self.device.advance(self.now_ns)
+        values = self._unpack.unpack(self._latched)
+        outputs = self._pack.unpack(sent)
+        row = [outputs[i] for i, _ in self._columns[0]] + [values[i] for i, _ in self._columns[1]]
+        self._rx.unpack(sent)
+        self._latched = self._tx.pack()
+        self._extremes(values)
+        loop.step(values)
+        return row
+
+    def _extremes(self, values: tuple[int, ...]) -> None:
+        h, w = self.highest, self._watch
+        h["speed"] = max(h["speed"], abs(values[w[0x606C]]))
+        h["torque"] = max(h["torque"], abs(values[w[0x6077]]))
+        h["low"] = min(h["low"], values[w[0x6064]])
+        h["high"] = max(h["high"], values[w[0x6064]])
+
+    async def play(self, trajectories: Sequence[Trajectory]) -> int:
+        assert self._loop is not None
+        for t in trajectories:
+            step = int(np.max(np.abs(np.diff(t.values)), initial=0))
+            offset = t.offset_values
+            self._loop.play(
+                Motion(
+                    t.target.index or 0, array.array("q", t.values.tolist()),
+                    Limits(**asdict(t.envelope)), _PATIENCE * 1000, step,
+                    None if t.offset_target is None else t.offset_target.index,
+                    None if offset is None else array.array("q", offset.tolist()),
+                )
+            )  # fmt: skip
+        return 0
+
+    async def renew(self, station: int) -> None:
+        del station
+        assert self._loop is not None
+        self._loop.renew()
+
+    async def halt(self, station: int | None = None) -> None:
+        del station
+        assert self._loop is not None
+        self._loop.stop("halted")
+
+    def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
+        self._consumers.append(consumer)
+        return lambda: self._consumers.remove(consumer)
+
+    # OwnsPowerState ------------------------------------------------------------------------
+
+    async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
+        del station
+        assert self._loop is not None
+        self._loop.drive_to(goal, mode)
+
+    async def reset_fault(self, station: int) -> None:
+        del station
+        assert self._loop is not None
+        self._loop.reset_fault()
+
+    def axis_state(self, station: int) -> tuple[str, str, str]:
+        del station
+        assert self._loop is not None
+        return self._loop.state.value, self._loop.phase.value, self._loop.halted
+
+
+def _columns(pdo: Pdo, names: Mapping[tuple[int | None, int], str]) -> list[tuple[int, str]]:
+    known = [e for e in pdo.entries if e.code != "x"]
+    return [
+        (place, names[e.index, e.subindex])
+        for place, e in enumerate(known)
+        if (e.index, e.subindex) in names
+    ]
+
+
+@asynccontextmanager
+async def direct(
+    spec: MechanicsSpec, cycle_s: float = 1e-3, *, drive: str = "mms7",
+    settings: Mapping[str, int] | None = None,
+) -> AsyncIterator[DirectBench]:  # fmt: skip
+    profile = load_profile(drive)
+    link = DirectLink(make_device(drive, spec), profile)
+    await link.open()
+    axis = Axis(Drive("x", "X", profile, [Port(link, STATION, profile.link("ethercat"))]))
+    for key, raw in (settings or {}).items():
+        await axis.drive.write(key, raw)
+    if settings:
+        from backend.tools.temporary import make_effective
+
+        await make_effective(axis)
+    session = CyclicSession(link, [axis.drive])
+    await session.start(cycle_s)
+    axis.session = session
+    try:
+        yield DirectBench(axis, session, link, spec)
+    finally:
+        await session.stop()
+        await link.close()
