@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from backend.bench import Bench
-from backend.commands import measure, params, people, profile, report
+from backend.commands import keep, measure, params, people, profile, report
 from backend.commands.serve import Serving, state_folder
 from backend.commands.serve import serve as run_server
 from backend.commands.session import opened, run, show_progress
@@ -29,6 +29,10 @@ app = typer.Typer(
 )
 app.add_typer(params.app, name="params")
 app.add_typer(profile.app, name="profile")
+app.add_typer(keep.audit, name="audit")
+app.add_typer(keep.library, name="library")
+app.command("backup")(keep.backup)
+app.command("restore")(keep.restore)
 app.add_typer(people.app, name="people")
 app.command("sweep")(measure.sweep)
 app.command("inertia")(measure.inertia)
@@ -72,6 +76,8 @@ def serve(
     port: Port = 8420,
     config: Config = None,
     open_: Open = False,
+    database: keep.Database = None,
+    blobs: keep.BlobPlace = None,
     accounts: Accounts = None,
     certificate: CertificateFile = None,
     key: KeyFile = None,
@@ -95,6 +101,8 @@ def demo(
     bench: Annotated[Path | None, typer.Option(help="bench file (TOML)")] = None,
     config: Config = None,
     open_: Open = False,
+    database: keep.Database = None,
+    blobs: keep.BlobPlace = None,
     accounts: Accounts = None,
     certificate: CertificateFile = None,
     key: KeyFile = None,

@@ -14,6 +14,7 @@ from backend.library.described import folders
 from backend.library.index import Index
 from backend.store import DatabaseFailed, Store
 from backend.store.blobs import Blobs
+from backend.store.lock import FolderLock
 
 
 class Records:
@@ -32,6 +33,7 @@ class Records:
         self.library = Library(self.store, Blobs(blobs or str(folder / "blobs")), self.audit.add)
         self.sets = LibrarySets(self.library, folder / "sets")
         self.index = Index(self.store, self.station, folders(folder))
+        self._lock = FolderLock(folder)
         self._journal = journal
         self._loop: asyncio.AbstractEventLoop | None = None
 
@@ -40,6 +42,11 @@ class Records:
         drives are moved and stopped, and what needs the database says what is wrong with it.
         """
         self._loop = asyncio.get_running_loop()
+        if not self._lock.take():
+            self._journal.add(
+                f"another servodeck uses the folder {self.store.folder} too: end one of them",
+                level="error",
+            )
         self.audit.start()
         try:
             await self.store.call(self.sets.take_in)
@@ -51,6 +58,7 @@ class Records:
         self._loop = None
         await asyncio.to_thread(self.audit.close)
         await asyncio.to_thread(self.store.close)
+        self._lock.give()
 
     def _audit_changed(self, problem: str) -> None:
         """Called on the audit's thread."""

@@ -253,6 +253,8 @@ class AuditLog:
         """Put into the file what is only in memory; where that fails, memory has to do."""
         with self._wake:
             fresh = list(islice(self._queue.bodies, self._queue.spooled, None))
+        # From the file another process of this station may write them to the database.
+        self._unsure.update(fresh)
         taken = not fresh or self._file.append(fresh)
         with self._wake:
             self._file_takes = taken

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
 import typer
 
@@ -17,6 +18,7 @@ from drivers.link import Found, Link, NeedsProfile
 from drivers.urls import link_for
 from profiles import load_profile
 
+P = ParamSpec("P")
 T = TypeVar("T")
 
 
@@ -33,6 +35,25 @@ def run(work: Callable[[], Awaitable[T]]) -> T:
         if error.remedy:
             print(f"try:   {error.remedy}", file=sys.stderr)
         raise typer.Exit(1) from error
+
+
+def told(command: Callable[P, T]) -> Callable[P, T]:
+    """A command whose errors become one readable message and exit code 1."""
+
+    @functools.wraps(command)
+    def body(*arguments: P.args, **named: P.kwargs) -> T:
+        try:
+            return command(*arguments, **named)
+        except DriveError as error:
+            print(f"error: {error.message}", file=sys.stderr)
+            if error.remedy:
+                print(f"try:   {error.remedy}", file=sys.stderr)
+            raise typer.Exit(1) from error
+        except OSError as error:
+            print(f"error: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+            raise typer.Exit(1) from error
+
+    return body
 
 
 def show_progress(fraction: float, step: str) -> None:

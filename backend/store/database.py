@@ -150,9 +150,10 @@ class Store:
         if file is not None:
             try:
                 file.parent.mkdir(parents=True, exist_ok=True)
+                file.touch(mode=0o600)  # accounts are in it
             except OSError as error:
                 raise DatabaseFailed(
-                    f"the folder of the database {file} cannot be made: {error.strerror}",
+                    f"the database {file} cannot be made: {error.strerror}",
                     value=str(file),
                     remedy="choose another folder with --config",
                 ) from error

@@ -1,4 +1,4 @@
-"""Library and comparisons through the interface: versions, roll-back, three-way, swap protection."""
+"""Library and audit through the interface: versions, roll-back, three-way, swap protection."""
 
 from __future__ import annotations
 
@@ -264,6 +264,15 @@ async def test_the_audit_tells_who_wrote_what(http: httpx.AsyncClient, bench: Be
     assert len(table) == 2
 
 
+async def audit_status(http: httpx.AsyncClient, *, troubled: bool) -> Any:
+    async with asyncio.timeout(20):
+        while True:
+            status = (await http.get("/audit/status")).json()
+            if bool(status["problem"]) == troubled:
+                return status
+            await asyncio.sleep(0.02)
+
+
 async def test_a_database_that_cannot_be_used_is_told_and_motion_goes_on(
     tmp_path: Path, http: httpx.AsyncClient, bench: Bench
 ) -> None:
@@ -279,14 +288,10 @@ async def test_a_database_that_cannot_be_used_is_told_and_motion_goes_on(
     assert "not a database" in answer.json()["detail"]
     assert (await http.put(f"/drives/x/parameters/{GAIN}", json={"raw": 361})).is_success
     assert (await http.post("/stop", json={})).json() == {"stopped": ["x"], "failed": {}}
-    async with asyncio.timeout(10):
-        while not (status := (await http.get("/audit/status")).json())["problem"]:
-            await asyncio.sleep(0.02)
+    status = await audit_status(http, troubled=True)
     assert "not a database" in status["problem"]
     assert status["pending"] > 0
     file.unlink()
-    async with asyncio.timeout(20):
-        while (await http.get("/audit/status")).json()["problem"]:
-            await asyncio.sleep(0.05)
+    await audit_status(http, troubled=False)
     events = (await http.get("/audit")).json()["events"]
     assert {"write", "stop"} <= {e["kind"] for e in events}

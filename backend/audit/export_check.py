@@ -1,0 +1,41 @@
+"""Checking an export of the whole audit (JSON lines) without its database."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+
+from backend.audit.chain import ZERO, Anchor, Verdict, columns, verify
+from backend.store.audit_tables import AuditEntry
+from drivers.errors import NotAllowed
+
+
+def check_lines(lines: Iterable[str], anchor: Anchor | None = None) -> Verdict:
+    """Check lines as `Trail.export` writes them; whether the end is missing only an anchor tells.
+
+    Raises:
+        NotAllowed: a line is no entry of an audit.
+    """
+    entries = list(_entries(lines))
+    last = entries[-1] if entries else None
+    head = Anchor(last.number, last.hash) if last else Anchor(0, ZERO)
+    return verify(entries, head, anchor)
+
+
+def _entries(lines: Iterable[str]) -> Iterator[AuditEntry]:
+    for number, line in enumerate(lines, 1):
+        try:
+            content = json.loads(line)
+            yield AuditEntry(
+                number=int(content["number"]),
+                previous=str(content["previous"]),
+                hash=str(content["hash"]),
+                body=str(content["body"]),
+                **columns(str(content["body"])),
+            )
+        except (ValueError, KeyError, TypeError) as error:
+            raise NotAllowed(
+                f"line {number} is no entry of an audit",
+                value=line[:80],
+                remedy="export it with --format jsonl, without a filter",
+            ) from error

@@ -1,0 +1,285 @@
+"""``servodeck backup``, ``restore``, ``audit …`` and ``library …``: what a station keeps."""
+
+from __future__ import annotations
+
+import getpass
+import json
+import sys
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from backend import parameter_set
+from backend.audit.chain import Anchor
+from backend.audit.export_check import check_lines
+from backend.audit.trail import Filter
+from backend.commands.serve import state_folder
+from backend.commands.session import told
+from backend.journal import Journal
+from backend.library.entries import KINDS, Kind, Query
+from backend.people.identity import LOCAL, Actor, acting
+from backend.records import Records
+from backend.store.backup import make_backup
+from backend.store.restore import restore as restore_archive
+from drivers.errors import NotAllowed
+
+audit = typer.Typer(help="Check and export the audit trail.", no_args_is_help=True)
+library = typer.Typer(help="Search, export and import the library.", no_args_is_help=True)
+
+Config = Annotated[Path | None, typer.Option(help="state folder of the station")]
+Database = Annotated[
+    str | None,
+    typer.Option(
+        envvar="SERVODECK_DATABASE",
+        help="library and audit, such as postgresql://user:password@host/name; "
+        "by default a file in the state folder",
+    ),
+]
+BlobPlace = Annotated[
+    str | None,
+    typer.Option(
+        "--blobs",
+        envvar="SERVODECK_BLOBS",
+        help="large contents: a folder or s3://bucket/prefix; by default in the state folder",
+    ),
+]
+Out = Annotated[Path | None, typer.Option(help="file to write; by default the terminal")]
+
+
+def _records(config: Path | None, database: str | None, blobs: str | None = None) -> Records:
+    who = replace(LOCAL, person=f"{getpass.getuser()} (terminal)")
+    acting.set(Actor(who))
+    return Records(state_folder(config), Journal(), database, blobs)
+
+
+def _existing(config: Path | None, database: str | None) -> Records:
+    """The same, where there is something to look at.
+
+    Raises:
+        NotAllowed: there is no database in this folder.
+    """
+    records = _records(config, database)
+    file = records.store.sqlite_file
+    if file is not None and not file.exists():
+        raise NotAllowed(
+            f"there is no database {file}",
+            value=str(file),
+            remedy="name the station's state folder with --config, or its --database",
+        )
+    return records
+
+
+# --- backup ------------------------------------------------------------------------------
+
+
+@told
+def backup(
+    archive: Annotated[Path, typer.Argument(help="zip file to write")],
+    config: Config = None,
+    database: Database = None,
+    recordings: Annotated[bool, typer.Option(help="recordings too")] = True,
+    overwrite: Annotated[bool, typer.Option(help="replace an existing file")] = False,
+) -> None:
+    """Save everything that the station keeps. The server may run meanwhile."""
+    store = _existing(config, database).store
+    parts = make_backup(store, archive, recordings=recordings, overwrite=overwrite)
+    store.close()
+    size = sum(part.bytes for part in parts.values())
+    print(f"{archive}: {len(parts)} files, {size} bytes, each with its checksum")
+
+
+@told
+def restore(
+    archive: Annotated[Path, typer.Argument(help="zip file of `servodeck backup`")],
+    config: Config = None,
+    database: Database = None,
+    replace_: Annotated[
+        bool,
+        typer.Option(
+            "--replace", help="the present state folder is kept beside under another name"
+        ),
+    ] = False,
+) -> None:
+    """Put a backup in place, after checking it as a whole. End the server first."""
+    folder = state_folder(config)
+    done = restore_archive(archive, folder, database=database, replace=replace_)
+    print(f"{folder}: {done.parts} files, audit of {done.audit_entries} entries is whole")
+    if done.copied_rows:
+        print(f"{done.copied_rows} rows of library and audit are in the database")
+    if done.aside is not None:
+        print(f"what was there before is in {done.aside}")
+
+
+# --- audit -------------------------------------------------------------------------------
+
+
+@audit.command("verify")
+@told
+def verify(
+    config: Config = None,
+    database: Database = None,
+    anchor: Annotated[str, typer.Option(help="NUMBER:HASH noted earlier")] = "",
+    file: Annotated[
+        Path | None, typer.Option(help="check an export (JSON lines) instead of the database")
+    ] = None,
+) -> None:
+    """Check the whole chain; the exit code is 1 where it is broken."""
+    known = _anchor(anchor)
+    if file is not None:
+        with file.open(encoding="utf-8") as lines:
+            verdict = check_lines(lines, known)
+    else:
+        records = _existing(config, database)
+        verdict = records.trail.verify(known)
+        records.store.close()
+    if not verdict.ok:
+        print(f"BROKEN at entry {verdict.broken}: {verdict.why}", file=sys.stderr)
+        raise typer.Exit(1)
+    print(f"{verdict.entries} entries, the chain is whole")
+    print(f"anchor: {verdict.head}")
+
+
+def _anchor(text: str) -> Anchor | None:
+    if not text:
+        return None
+    number, _, digest = text.partition(":")
+    if not number.isdigit() or len(digest) != 64:
+        raise NotAllowed(
+            f"{text!r} is no anchor", value=text, limit="NUMBER:HASH",
+            remedy="copy the line that `servodeck audit verify` printed",
+        )  # fmt: skip
+    return Anchor(int(number), digest.lower())
+
+
+@audit.command("export")
+@told
+def export(
+    config: Config = None,
+    database: Database = None,
+    out: Out = None,
+    form: Annotated[Literal["csv", "jsonl"], typer.Option("--format")] = "csv",
+    kind: Annotated[list[str] | None, typer.Option(help="such as write or login")] = None,
+    person: Annotated[str, typer.Option()] = "",
+    axis: Annotated[str, typer.Option(help="its name")] = "",
+    since: Annotated[datetime | None, typer.Option(help="local time")] = None,
+    until: Annotated[datetime | None, typer.Option(help="local time")] = None,
+) -> None:
+    """Write entries as a table, or as JSON lines with their hashes."""
+    records = _existing(config, database)
+    wanted = Filter(
+        kinds=tuple(kind or ()), person=person, axis=axis,
+        since=since.astimezone() if since else None, until=until.astimezone() if until else None,
+    )  # fmt: skip
+    lines = records.trail.export(wanted, form)
+    if out is None:
+        sys.stdout.writelines(lines)
+    else:
+        with out.open("w", encoding="utf-8", newline="") as file:
+            file.writelines(lines)
+    records.store.close()
+
+
+# --- library -----------------------------------------------------------------------------
+
+
+@library.command("list")
+@told
+def list_(
+    words: Annotated[list[str] | None, typer.Argument(help="all must occur")] = None,
+    config: Config = None,
+    database: Database = None,
+    kind: Annotated[str, typer.Option(help=", ".join(KINDS))] = "",
+    tag: Annotated[str, typer.Option()] = "",
+    as_json: Annotated[bool, typer.Option("--json")] = False,
+) -> None:
+    """Search the library."""
+    records = _records(config, database)
+    records.sets.take_in()
+    records.index.refresh()
+    query = Query(words=" ".join(words or ()), kinds=_kinds(kind), tag=tag, limit=1000)
+    entries, total = records.library.search(query)
+    records.store.close()
+    if as_json:
+        rows = [
+            {
+                "id": e.id, "kind": e.kind, "station": e.station, "name": e.name,
+                "tags": list(e.tags), "notes": e.notes, "changed": e.changed.isoformat(),
+                "versions": e.versions, "axis": e.latest.axis.name,
+                "profile": e.latest.axis.profile, "serial": e.latest.axis.serial,
+            }
+            for e in entries
+        ]  # fmt: skip
+        print(json.dumps(rows, indent=1, ensure_ascii=False))
+        return
+    for e in entries:
+        tags = f"  [{', '.join(e.tags)}]" if e.tags else ""
+        print(f"{e.kind:<12} {e.name}  v{e.latest.number}  {e.latest.axis.name}{tags}")
+    if total > len(entries):
+        print(f"… and {total - len(entries)} more: search for less")
+
+
+def _kinds(name: str) -> tuple[Kind, ...]:
+    if name and name not in KINDS:
+        raise NotAllowed(f"{name!r} is no kind", value=name, limit=", ".join(KINDS))
+    return tuple(kind for kind in KINDS if kind == name)
+
+
+@library.command("export")
+@told
+def export_set(
+    name: str,
+    config: Config = None,
+    database: Database = None,
+    blobs: BlobPlace = None,
+    version: Annotated[int | None, typer.Option(help="the latest by default")] = None,
+    out: Out = None,
+) -> None:
+    """Write a parameter set's file."""
+    records = _records(config, database, blobs)
+    data = records.sets.read(name, version)
+    records.store.close()
+    if out is None:
+        sys.stdout.buffer.write(data)
+    else:
+        out.write_bytes(data)
+
+
+@library.command("import")
+@told
+def import_sets(
+    files: list[Path],
+    config: Config = None,
+    database: Database = None,
+    blobs: BlobPlace = None,
+    tag: Annotated[list[str] | None, typer.Option(help="to put on them")] = None,
+) -> None:
+    """Take parameter-set files into the library; a known name gets a new version."""
+    records = _records(config, database, blobs)
+    for file in files:
+        data = file.read_bytes()
+        parameter_set.parse(data, file.name)
+        stored = records.sets.store(file.name, data, overwrite=True, tags=tag or ())
+        print(f"{stored} version {records.sets.entry(stored).versions}")
+    records.audit.close()
+    records.store.close()
+
+
+@library.command("purge")
+@told
+def purge(
+    config: Config = None,
+    database: Database = None,
+    blobs: BlobPlace = None,
+    days: Annotated[float, typer.Option(min=0, help="put aside longer ago than this")] = 30.0,
+) -> None:
+    """Delete for good what was put aside, and contents that nothing names any more."""
+    records = _records(config, database, blobs)
+    gone = records.library.purge(datetime.now(UTC) - timedelta(days=days))
+    records.audit.close()
+    records.store.close()
+    for entry in gone:
+        print(f"{entry.kind} {entry.name}: {entry.versions} versions deleted")
+    print(f"{len(gone)} deleted")

@@ -1,0 +1,65 @@
+"""All rows of library and audit from one database to another, of either kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from sqlalchemy import Table, func, insert, select
+from sqlalchemy.orm import Session
+
+from backend.audit.chain import ZERO
+from backend.store.audit_tables import AuditEntry, AuditHead
+from backend.store.base import Base
+from backend.store.database import Store
+from backend.store.library_tables import Content, Item, Tag, Version
+from drivers.errors import NotAllowed
+
+#: In the order in which they can be filled.
+_TABLES: tuple[type[Base], ...] = (Item, Content, Version, Tag, AuditEntry)
+_CHUNK = 500
+
+
+def copy_rows(source: Store, target: Store) -> int:
+    """Copy into a database without library and audit; returns how many rows. Blocks.
+
+    Raises:
+        NotAllowed: the target has some already; nothing was changed. DatabaseFailed: likewise.
+    """
+    count = 0
+    with source.reading(snapshot=True) as old, target.writing() as new:
+        _require_empty(new, target.shown)
+        for table in _tables(_TABLES):
+            query = select(table).order_by(*table.primary_key.columns)
+            found = old.execute(query.execution_options(yield_per=_CHUNK))
+            for part in found.mappings().partitions(_CHUNK):
+                new.execute(insert(table), [dict(row) for row in part])
+                count += len(part)
+        head = old.get_one(AuditHead, 1)
+        copied = new.get_one(AuditHead, 1)
+        copied.number, copied.hash = head.number, head.hash
+        if new.get_bind().dialect.name == "postgresql":
+            _set_sequences(new)
+    return count
+
+
+def _tables(models: Iterable[type[Base]]) -> list[Table]:
+    return [model.__table__ for model in models if isinstance(model.__table__, Table)]
+
+
+def _require_empty(session: Session, shown: str) -> None:
+    items = session.scalar(select(func.count()).select_from(Item))
+    head = session.get(AuditHead, 1, with_for_update=True)
+    if items or head is None or head.hash != ZERO:
+        raise NotAllowed(
+            f"{shown} has a library or an audit already; nothing was changed",
+            value=shown,
+            remedy="choose an empty database",
+        )
+
+
+def _set_sequences(session: Session) -> None:
+    """Numbers given by hand do not move PostgreSQL's counters."""
+    for table in _tables((Item, Version)):
+        highest = session.scalar(select(func.max(table.c.id))) or 1
+        sequence = func.pg_get_serial_sequence(table.name, "id")
+        session.execute(select(func.setval(sequence, highest)))

@@ -1,0 +1,56 @@
+"""One servodeck at a time uses a state folder."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+from types import TracebackType
+
+
+class FolderLock:
+    """A lock that goes with its process, however that ends. ``held`` says whether it is ours.
+
+    A folder that does not exist, or cannot be written, is not locked and counts as ours.
+    """
+
+    NAME = "servodeck.lock"
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / self.NAME
+        self._file: int | None = None
+        self.held = False
+
+    def take(self) -> bool:
+        """Try to take it; False while another process has it."""
+        try:
+            self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        except OSError:
+            self.held = True
+            return True
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self.give()
+            return False
+        self.held = True
+        return True
+
+    def give(self) -> None:
+        """Let it go; does nothing for one that is not held."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+        self.held = False
+
+    def __enter__(self) -> FolderLock:
+        self.take()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.give()

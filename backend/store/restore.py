@@ -1,0 +1,141 @@
+"""Restore of a station from a backup: checked as a whole first, then put in place at once."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from backend.audit.trail import Trail
+from backend.files import StorageFailed
+from backend.store import backup
+from backend.store.backup import SHARED, BackupFailed
+from backend.store.copy import copy_rows
+from backend.store.database import FILE, Store
+from backend.store.lock import FolderLock
+
+
+@dataclass(frozen=True, slots=True)
+class Restored:
+    """What was put in place; ``aside`` is where the earlier state folder lies now."""
+
+    parts: int
+    audit_entries: int
+    aside: Path | None
+    copied_rows: int
+
+
+def restore(
+    archive: Path, folder: Path, *, database: str | None = None, replace: bool = False
+) -> Restored:
+    """Unpack a backup into a state folder, and library and audit into an empty ``database``.
+
+    Blocks. An existing folder is refused, or with ``replace`` kept beside under another name.
+
+    Raises:
+        BackupFailed: the archive is not whole, or the folder is in use; nothing was changed.
+        StorageFailed: disk or database; the state folder is as it was.
+    """
+    used = folder.exists() and any(path.name != FolderLock.NAME for path in folder.iterdir())
+    if used and not replace:
+        raise BackupFailed(
+            f"{folder} is not empty; nothing was changed",
+            value=str(folder),
+            remedy="choose another folder, or let it be replaced (it is kept beside)",
+        )
+    with FolderLock(folder) as lock:
+        if not lock.held:
+            raise BackupFailed(
+                f"a running servodeck uses {folder}; nothing was changed",
+                value=str(folder),
+                remedy="end it first",
+            )
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix=".servodeck-", dir=folder.parent) as place:
+                fresh = Path(place) / "state"
+                fresh.mkdir(mode=0o700)
+                parts = _unpack(archive, fresh)
+                entries = _check(fresh, str(archive))
+                copied = _fill(fresh, database) if database else 0
+                aside = _put_in_place(fresh, folder)
+        except OSError as error:
+            raise StorageFailed(
+                f"{archive} could not be restored to {folder}: {error.strerror or error}",
+                value=str(folder),
+                remedy="free some space or choose another folder",
+            ) from error
+    return Restored(parts, entries, aside, copied)
+
+
+def _unpack(archive: Path, folder: Path) -> int:
+    try:
+        with zipfile.ZipFile(archive) as file:
+            parts = backup.read_manifest(file, str(archive))
+            needed = sum(part.bytes for part in parts.values())
+            if shutil.disk_usage(folder).free < needed:
+                raise StorageFailed(
+                    f"{archive} needs {needed} bytes, which the disk does not have",
+                    value=needed,
+                    remedy="free some space or choose another folder",
+                )
+            backup.unpack(file, parts, folder, str(archive))
+    except zipfile.BadZipFile as error:
+        raise BackupFailed(
+            f"{archive} is no whole backup: {error}; nothing was changed",
+            value=str(archive),
+            remedy="use an undamaged copy of the backup",
+        ) from error
+    return len(parts)
+
+
+def _check(folder: Path, shown: str) -> int:
+    """The databases open, and the audit's chain is whole; entries of the audit."""
+    entries = 0
+    for name in (FILE, SHARED):
+        if not (folder / name).exists():
+            continue
+        store = Store(folder, f"sqlite:///{folder / name}")
+        try:
+            verdict = Trail(store).verify()
+        finally:
+            store.close()
+        if not verdict.ok:
+            raise BackupFailed(
+                f"{shown}: the audit is broken at entry {verdict.broken}: {verdict.why}; "
+                "nothing was changed",
+                value=verdict.broken,
+                remedy="use an undamaged copy of the backup",
+            )
+        entries = max(entries, verdict.entries)
+    return entries
+
+
+def _fill(folder: Path, database: str) -> int:
+    name = SHARED if (folder / SHARED).exists() else FILE
+    source, target = Store(folder, f"sqlite:///{folder / name}"), Store(folder, database)
+    try:
+        return copy_rows(source, target)
+    finally:
+        source.close()
+        target.close()
+
+
+def _put_in_place(fresh: Path, folder: Path) -> Path | None:
+    """The new folder takes the old one's place, which stays beside; back again if that fails."""
+    aside = None
+    if folder.exists() and any(path.name != FolderLock.NAME for path in folder.iterdir()):
+        aside = folder.with_name(f"{folder.name}.before-{datetime.now(UTC):%Y%m%d-%H%M%S}")
+        folder.rename(aside)
+    elif folder.exists():
+        shutil.rmtree(folder)
+    try:
+        fresh.rename(folder)
+    except OSError:
+        if aside is not None:
+            aside.rename(folder)
+        raise
+    return aside
