@@ -113,35 +113,46 @@ export function ParameterFields({
   )
 }
 
+/** One parameter in a line: what it is, then its editor, or its value where it is read only. */
 function Field({ drive, row }: { drive: string; row: ParameterRow }) {
   const t = useT()
   const reading = useReading(drive, row.key) ?? row.reading
+  const edited = useEdits(drive).edits.has(row.key)
+  const can = editable(row)
+  const told = row.help || row.notes || row.settable === 'stopped'
   return (
     <>
-      <div className="field-head">
-        <span className="grow">
-          {row.name} <small className="dim mono">{row.number ?? row.key}</small>
-        </span>
-        <strong className="num">
-          {readingText(row, reading, false)} <span className="unit">{row.unit}</span>
-        </strong>
-      </div>
-      {(reading.pending || reading.unsaved) && (
-        <div className="row">
+      <div className="field">
+        <div className="field-name">
+          <span>{row.name}</span> <small className="dim mono">{row.number ?? row.key}</small>
+          {edited && <span className="mark edited">{t('mark.edited')}</span>}
           {reading.pending && <span className="mark unsaved">{t('fields.waits')}</span>}
           {reading.unsaved && <span className="mark unsaved">{t('fields.unsaved')}</span>}
+          {edited && (
+            <small className="num">
+              {t('gear.now')} {readingText(row, reading, false)} {row.unit}
+            </small>
+          )}
+          {told && (
+            <details>
+              <summary aria-label={t('fields.about', { name: row.name })}>?</summary>
+              {row.help && <p className="prose">{row.help}</p>}
+              {row.settable === 'stopped' && <p>{t('fields.stopped')}</p>}
+              {row.notes && <p className="dim">{row.notes}</p>}
+              <p className="dim">{t('source', { source: row.source })}</p>
+            </details>
+          )}
         </div>
-      )}
-      {editable(row) && <Editor drive={drive} row={row} compact />}
-      {(row.help || row.notes || row.settable === 'stopped') && (
-        <details>
-          <summary>?</summary>
-          {row.help && <p className="prose">{row.help}</p>}
-          {row.settable === 'stopped' && <p>{t('fields.stopped')}</p>}
-          {row.notes && <p className="dim">{row.notes}</p>}
-          <p className="dim">{t('source', { source: row.source })}</p>
-        </details>
-      )}
+        <div className="field-value">
+          {can ? (
+            <Editor drive={drive} row={row} compact />
+          ) : (
+            <strong className="num">
+              {readingText(row, reading, false)} <span className="unit">{row.unit}</span>
+            </strong>
+          )}
+        </div>
+      </div>
       {reading.error && <p className="note warn">{reading.error}</p>}
     </>
   )

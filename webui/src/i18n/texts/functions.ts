@@ -10,6 +10,7 @@ export const functions = {
   'fields.waits': ['acts later', '稍后生效'],
   'fields.unsaved': ['not saved', '未保存'],
   'fields.stopped': ['Set while the motor is not enabled.', '仅在电机未使能时可设置。'],
+  'fields.about': ['About {name}', '关于 {name}'],
   'fields.none': [
     'None of these parameters can be reached over the connected port.',
     '所连接的端口无法访问这些参数。',

@@ -4,13 +4,13 @@ import { useT } from '../../i18n'
 
 type Block = GainBlock['block']
 
-const WIDTH = 124
+const WIDTH = 128
 const HEIGHT = 46
 
 /** Where each block of the loops is drawn: centre, in the units of the drawing. */
-const PLACES: { block: Block; x: number; y: number }[] = [
-  { block: 'speed_ff', x: 366, y: 36 },
-  { block: 'torque_ff', x: 524, y: 36 },
+const PLACES: { block: Block; x: number; y: number; width?: number }[] = [
+  { block: 'speed_ff', x: 250, y: 36, width: 160 },
+  { block: 'torque_ff', x: 450, y: 36, width: 160 },
   { block: 'command_filter', x: 78, y: 112 },
   { block: 'position', x: 262, y: 112 },
   { block: 'speed', x: 446, y: 112 },
@@ -53,8 +53,8 @@ export function LoopPicture({
     `M${MOTOR.x} 135V200H692`,
     `M568 200H${SUM_SPEED}V${LINE + 9}`,
     `M${MOTOR.x} 200V246H${SUM_POSITION}V${LINE + 9}`,
-    ...(has('speed_ff') ? [`M152 ${LINE}V36H304`, `M428 36H440V80H${SUM_SPEED}V${LINE - 9}`] : []),
-    ...(has('torque_ff') ? [`M446 36H462`, `M586 36H598V76H${SUM_TORQUE}V${LINE - 9}`] : []),
+    ...(has('speed_ff') ? [`M152 ${LINE}V36H170`, `M330 36H${SUM_SPEED}V${LINE - 9}`] : []),
+    ...(has('torque_ff') ? [`M330 36H370`, `M530 36H${SUM_TORQUE}V${LINE - 9}`] : []),
   ]
   return (
     <div className="loop-picture">
@@ -79,8 +79,16 @@ export function LoopPicture({
         {[SUM_POSITION, SUM_SPEED, SUM_TORQUE].map((x) => (
           <circle key={x} cx={x} cy={LINE} r={9} className="sum" />
         ))}
-        {PLACES.map(({ block, x, y }) => (
-          <Box key={block} block={block} x={x} y={y} present={has(block)} onBlock={onBlock} />
+        {PLACES.map(({ block, x, y, width }) => (
+          <Box
+            key={block}
+            block={block}
+            x={x}
+            y={y}
+            width={width ?? WIDTH}
+            present={has(block)}
+            onBlock={onBlock}
+          />
         ))}
         <g className="motor">
           <circle cx={MOTOR.x} cy={MOTOR.y} r={38} />
@@ -94,6 +102,7 @@ export function LoopPicture({
             block={block}
             x={78 + (i * (1120 - 156)) / Math.max(1, BESIDE.length - 1)}
             y={298}
+            width={WIDTH}
             present
             onBlock={onBlock}
           />
@@ -107,19 +116,21 @@ function Box({
   block,
   x,
   y,
+  width,
   present,
   onBlock,
 }: {
   block: Block
   x: number
   y: number
+  width: number
   present: boolean
   onBlock: (block: Block) => void
 }) {
   const t = useT()
   const drawing = (
     <>
-      <rect x={x - WIDTH / 2} y={y - HEIGHT / 2} width={WIDTH} height={HEIGHT} rx={4} />
+      <rect x={x - width / 2} y={y - HEIGHT / 2} width={width} height={HEIGHT} rx={4} />
       <text x={x} y={y + 5}>
         {t(`block.${block}`)}
       </text>

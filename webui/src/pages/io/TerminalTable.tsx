@@ -53,7 +53,8 @@ export function TerminalTable({
     })
   const choose = (terminal: TerminalInfo, code: number) => {
     if (terminal.function_key === null) return
-    if (twins(terminals, terminal, code).length > 0) setAsked({ terminal, code })
+    if (terminal.direction === 'in' && twins(terminals, terminal, code).length > 0)
+      setAsked({ terminal, code })
     else void put(terminal.function_key, code)
   }
   return (
@@ -87,7 +88,7 @@ export function TerminalTable({
                 <Polarity drive={drive} terminal={terminal} busy={write.busy} put={put} />
               </div>
               {terminal.same_function.length > 0 && (
-                <p className="note warn">
+                <p className={terminal.direction === 'in' ? 'note warn' : 'dim'}>
                   {t('io.twin', { names: terminal.same_function.join(', ') })}
                 </p>
               )}

@@ -63,14 +63,16 @@ export function OverviewPage({ drive }: { drive: string }) {
           <ProblemNote problem={reset.problem} onClose={reset.clear} />
         </Panel>
       )}
-      <div className="columns">
+      <div className="overview-columns">
         <div className="stack">
           <Panel title={t('overview.now')}>
             <Quantities drive={drive} state={state} />
             <Words state={state} />
           </Panel>
-          <WatchPanel drive={drive} />
-          <Procedures drive={drive} />
+          <div className="later stack">
+            <WatchPanel drive={drive} />
+            <Procedures drive={drive} />
+          </div>
         </div>
         <Panel title={t('overview.machine')}>
           <StateMachine

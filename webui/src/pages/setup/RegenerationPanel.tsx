@@ -31,7 +31,7 @@ export function RegenerationPanel({ drive, regen }: { drive: string; regen: Rege
   const gains = useGains(drive).gains
   const threshold = useReading(drive, regen?.on_voltage_key ?? '')?.value
   const [inertia, setInertia] = useState<number | null>(null)
-  const [speed, setSpeed] = useRemembered(drive, 'regen.speed', null)
+  const [speed, setSpeed] = useRemembered(drive, 'regen.speed', 1000)
   const [time, setTime] = useRemembered(drive, 'regen.time', 0.1)
   const [cycle, setCycle] = useRemembered(drive, 'regen.cycle', 1)
   const [stops, setStops] = useRemembered(drive, 'regen.stops', 2)
