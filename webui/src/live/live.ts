@@ -1,5 +1,6 @@
 import { API_ROOT, api, ask, setConnection } from '../api/client'
 import type { JogStart } from '../api/schema'
+import { addChat, addNotice, setCursor, setPeople, setPointer } from './people'
 import type { FromPage, ToPage } from './protocol'
 import * as store from './store'
 import type { FromWorker, QuestionKind, Questions, ToWorker } from './worker-messages'
@@ -10,8 +11,12 @@ const post = (message: ToWorker) => worker.postMessage(message)
 let asked = 0
 const waiting = new Map<number, (answer: never) => void>()
 
+let started = false
+
 /** Open the connection for good. */
 export function start(): void {
+  if (started) return
+  started = true
   const { protocol, host } = window.location
   post({ kind: 'open', url: `${protocol.replace('http', 'ws')}//${host}${API_ROOT}/api/v1/live` })
 }
@@ -22,6 +27,9 @@ export const stand = (name: string, message: FromPage | null) =>
 export const jogStart = (message: JogStart) => post({ kind: 'jogStart', message })
 export const jogBeat = (drive: string) => post({ kind: 'jogBeat', drive })
 export const jogStop = (reason: string) => post({ kind: 'jogStop', reason })
+export const enablePress = (invitation: string) => post({ kind: 'enablePress', invitation })
+export const enableBeat = () => post({ kind: 'enableBeat' })
+export const enableRelease = (reason: string) => post({ kind: 'enableRelease', reason })
 export const toScope = (message: Extract<ToWorker, { kind: 'scope' | 'scopeClear' | 'trigger' }>) =>
   post(message)
 
@@ -102,7 +110,28 @@ function receive(message: ToPage): void {
       break
     case 'pong':
       break
+    case 'people':
+      setPeople(message)
+      break
+    case 'lease_notice':
+      addNotice(message)
+      break
+    case 'pointer_moved':
+      setPointer(message)
+      break
+    case 'cursor_moved':
+      setCursor(message)
+      break
+    case 'chat_said':
+      addChat([message])
+      break
   }
+}
+
+/** Called when the connection does not come back: the server may not know us any more. */
+let onRefused: () => void = () => {}
+export function whenRefused(act: () => void): void {
+  onRefused = act
 }
 
 worker.onmessage = (event: MessageEvent<FromWorker>) => {
@@ -110,6 +139,7 @@ worker.onmessage = (event: MessageEvent<FromWorker>) => {
   switch (answer.kind) {
     case 'link':
       if (!answer.state.open) setConnection(null)
+      if (!answer.state.open && answer.state.attempt > 0) onRefused()
       store.contents.link = answer.state
       store.contents.everOpen ||= answer.state.open
       store.publish('link')

@@ -1,5 +1,21 @@
 /** The websocket's messages, both ways (backend/api/live_messages.py). */
 import type {
+  Chat,
+  ChatLine,
+  CursorMoved,
+  EnablePress,
+  EnableRelease,
+  EnableRenew,
+  LeaseAnswer,
+  LeaseAsk,
+  LeaseHand,
+  LeaseNotice,
+  LeaseOverride,
+  PeopleHere,
+  PlotCursor,
+  Pointer,
+  PointerMoved,
+  Where,
   DrivesChanged,
   Hello,
   JobChanged,
@@ -34,6 +50,17 @@ export type FromPage =
   | ScopeStart
   | ScopeStop
   | Ping
+  | LeaseAsk
+  | LeaseAnswer
+  | LeaseHand
+  | LeaseOverride
+  | Where
+  | Pointer
+  | PlotCursor
+  | Chat
+  | EnablePress
+  | EnableRenew
+  | EnableRelease
 
 export type ToPage =
   | Hello
@@ -47,3 +74,8 @@ export type ToPage =
   | Logged
   | Refused
   | Pong
+  | PeopleHere
+  | LeaseNotice
+  | PointerMoved
+  | CursorMoved
+  | ChatLine

@@ -27,7 +27,8 @@ interface Events {
 
 const FIRST_DELAY_MS = 250
 const GREATEST_DELAY_MS = 4000
-const PING_MS = 1000
+/** Whoever holds the control of an axis must be heard within 2 s. */
+const PING_MS = 500
 const SILENT_MS = 3500
 const OPEN = 1
 

@@ -111,6 +111,9 @@ export type ToWorker =
   | { kind: 'jogStart'; message: JogStart }
   | { kind: 'jogBeat'; drive: string }
   | { kind: 'jogStop'; reason: string }
+  | { kind: 'enablePress'; invitation: string }
+  | { kind: 'enableBeat' }
+  | { kind: 'enableRelease'; reason: string }
   | { kind: 'scope'; config: ScopeConfig }
   | { kind: 'scopeClear' }
   | { kind: 'trigger'; trigger: ScopeTrigger | null }

@@ -1,5 +1,6 @@
 /// <reference lib="webworker" />
 import { DeadMan, RENEW_MS } from './deadman'
+import { EnablingHold } from './enabling'
 import { ScopeStore } from './scope-store'
 import { BEAT_MS, LiveSocket, type SocketLike } from './socket'
 import type { FromWorker, ToWorker } from './worker-messages'
@@ -16,6 +17,7 @@ const socket = new LiveSocket(() => new WebSocket(url) as unknown as SocketLike,
   block: (data) => scope.block(data),
   closed: () => {
     deadMan.ended()
+    enabling.ended()
     scope.interrupted()
   },
 })
@@ -33,7 +35,15 @@ const deadMan = new DeadMan(
   () => performance.now(),
 )
 
-setInterval(() => deadMan.tick(), RENEW_MS)
+const enabling = new EnablingHold(
+  (message) => socket.send(message),
+  () => performance.now(),
+)
+
+setInterval(() => {
+  deadMan.tick()
+  enabling.tick()
+}, RENEW_MS)
 setInterval(() => socket.beat(), BEAT_MS)
 
 self.onmessage = (event: MessageEvent<ToWorker>) => {
@@ -57,6 +67,15 @@ self.onmessage = (event: MessageEvent<ToWorker>) => {
       break
     case 'jogStop':
       deadMan.stop(request.reason)
+      break
+    case 'enablePress':
+      enabling.press(request.invitation)
+      break
+    case 'enableBeat':
+      enabling.beat()
+      break
+    case 'enableRelease':
+      enabling.release(request.reason)
       break
     case 'scope':
       scope.configure(request.config)

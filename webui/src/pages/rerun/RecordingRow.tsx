@@ -8,6 +8,7 @@ import { Icon } from '../../widgets/Icon'
 import { JobNote, useJobEnd } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { Remarks } from './Remarks'
 import { size } from './viewer'
 
 type Kind = 'csv' | 'rrd' | 'mcap'
@@ -63,10 +64,34 @@ export function RecordingRow({
           {recording.lost > 0 && ` · ${t('recordings.lost', { count: recording.lost })}`}{' '}
           {recording.problem}
         </p>
+        {(recording.kept || recording.tags.length > 0) && (
+          <p>
+            {recording.kept && <span className="tag">{t('recordings.kept')}</span>}{' '}
+            {recording.tags.map((each) => (
+              <span className="tag" key={each}>
+                {each}
+              </span>
+            ))}
+          </p>
+        )}
         {recording.notes && <p className="notes">{recording.notes}</p>}
+        {!running && recording.state !== 'unusable' && (
+          <Remarks recording={recording} onChanged={onChanged} />
+        )}
         <ProblemNote problem={act.problem} onClose={act.clear} />
         <JobNote id={job?.id ?? null} onClose={() => setJob(null)} />
       </div>
+      {recording.state === 'waiting' && (
+        <Button
+          onClick={() =>
+            void act
+              .run(() => ask(api.POST('/api/v1/recordings/{name}/trigger', path)))
+              .then(onChanged)
+          }
+        >
+          {t('recordings.beginNow')}
+        </Button>
+      )}
       {running ? (
         <Button
           loading={act.busy}

@@ -1,14 +1,13 @@
 import { Button, TextInput } from '@mantine/core'
 import { useState } from 'react'
-import { api, ask } from '../../api/client'
 import { useT } from '../../i18n'
-import { useDrives } from '../../live/store'
-import { POSITION_ACTUAL, TORQUE_ACTUAL, VELOCITY_ACTUAL } from '../../widgets/objects'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
-import { storedChannels } from '../scope/channels'
+import { BundlesPanel } from './BundlesPanel'
+import { RecordForm } from './RecordForm'
 import { RecordingRow } from './RecordingRow'
+import { RetentionPanel } from './RetentionPanel'
+import './rerun.css'
 import { useRecordings } from './useRecordings'
 import { Viewer } from './Viewer'
 import { size } from './viewer'
@@ -17,52 +16,13 @@ import { size } from './viewer'
 export function RerunPage() {
   const t = useT()
   const [search, setSearch] = useState('')
-  const [name, setName] = useState('')
-  const [notes, setNotes] = useState('')
   const { list, problem, refresh } = useRecordings(search)
   // undefined: closed, null: live, else the name of a recording
   const [shown, setShown] = useState<string | null | undefined>(undefined)
-  const act = useAction()
-  const channels = useChannels()
-  const start = () =>
-    act.run(async () => {
-      await ask(
-        api.POST('/api/v1/recordings', {
-          body: { name, notes, channels, period_s: 0, pre_s: 0, tags: [] },
-        }),
-      )
-      setName('')
-      setNotes('')
-      await refresh()
-    })
   return (
     <div className="page">
       <h1>{t('page.rerun')}</h1>
-      <Panel title={t('recordings.start')}>
-        <ProblemNote problem={act.problem} onClose={act.clear} />
-        <p className="dim">{t('recordings.what', { count: channels.length })}</p>
-        <div className="row">
-          <TextInput
-            label={t('recordings.name')}
-            value={name}
-            onChange={(event) => setName(event.currentTarget.value)}
-          />
-          <TextInput
-            className="grow"
-            label={t('recordings.notes')}
-            value={notes}
-            onChange={(event) => setNotes(event.currentTarget.value)}
-          />
-          <Button
-            variant="filled"
-            loading={act.busy}
-            disabled={channels.length === 0}
-            onClick={() => void start()}
-          >
-            {t('recordings.start')}
-          </Button>
-        </div>
-      </Panel>
+      <RecordForm onStarted={() => void refresh()} />
       <Panel
         title={t('page.rerun')}
         tools={list && <span>{t('recordings.free', { size: size(list.free_bytes) })}</span>}
@@ -73,6 +33,13 @@ export function RerunPage() {
           onChange={(event) => setSearch(event.currentTarget.value)}
         />
         <ProblemNote problem={problem} />
+        {list && (
+          <RetentionPanel
+            key={JSON.stringify(list.retention)}
+            list={list}
+            onChanged={() => void refresh()}
+          />
+        )}
         {list?.recordings.length === 0 && <p className="dim">{t('recordings.none')}</p>}
         {list?.recordings.map((each) => (
           <RecordingRow
@@ -83,6 +50,7 @@ export function RerunPage() {
           />
         ))}
       </Panel>
+      <BundlesPanel />
       <Panel
         title={t('rerun.title')}
         tools={
@@ -101,16 +69,5 @@ export function RerunPage() {
         )}
       </Panel>
     </div>
-  )
-}
-
-/** What the Scope page shows, or position, speed and torque of every axis. */
-function useChannels() {
-  const drives = useDrives() ?? []
-  const known = new Set(drives.map((each) => each.id))
-  const chosen = (storedChannels() ?? []).filter((each) => known.has(each.drive))
-  if (chosen.length > 0) return chosen
-  return drives.flatMap(({ id }) =>
-    [POSITION_ACTUAL, VELOCITY_ACTUAL, TORQUE_ACTUAL].map((key) => ({ drive: id, key })),
   )
 }

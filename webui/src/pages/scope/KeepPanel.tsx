@@ -122,7 +122,7 @@ export function KeepPanel({
             <Button onClick={() => onReferences([])}>{t('keep.clear')}</Button>
           )}
         </div>
-        <ul className="plain-list">
+        <ul className="kept-list">
           {references.map((each, i) => (
             <li key={i} className="row middle">
               <span className="grow">{each.label}</span>
@@ -154,7 +154,7 @@ export function KeepPanel({
             {t('keep.takeSnapshot')}
           </Button>
         </div>
-        <ul className="plain-list">
+        <ul className="kept-list">
           {stored.snapshots.map((each) => (
             <li key={each.name} className="row wrap middle">
               <span className="grow">
@@ -208,7 +208,7 @@ export function KeepPanel({
             {t('keep.saveSetup')}
           </Button>
         </div>
-        <ul className="plain-list">
+        <ul className="kept-list">
           {stored.setups.map((each) => (
             <li key={each.name} className="row middle">
               <span className="grow">{each.name}</span>

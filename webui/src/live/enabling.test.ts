@@ -1,0 +1,55 @@
+import { describe, expect, it } from 'vitest'
+import { SILENCE_MS } from './deadman'
+import { EnablingHold } from './enabling'
+
+function rig() {
+  const sent: string[] = []
+  let time = 0
+  let open = true
+  const hold = new EnablingHold(
+    (message) => {
+      if (open) sent.push(message.type)
+      return open
+    },
+    () => time,
+  )
+  return {
+    hold,
+    sent,
+    pass: (ms: number) => (time += ms),
+    close: () => (open = false),
+  }
+}
+
+describe('the enabling button', () => {
+  it('renews while the page is heard and releases when it falls silent', () => {
+    const { hold, sent, pass } = rig()
+    hold.press('i')
+    pass(SILENCE_MS)
+    hold.tick()
+    hold.beat()
+    pass(SILENCE_MS)
+    hold.tick()
+    pass(1)
+    hold.tick()
+    expect(sent).toEqual(['enable_press', 'enable_renew', 'enable_renew', 'enable_release'])
+  })
+  it('is not revived by a page that wakes up', () => {
+    const { hold, sent, pass } = rig()
+    hold.press('i')
+    pass(SILENCE_MS + 1)
+    hold.beat()
+    hold.tick()
+    expect(sent).toEqual(['enable_press', 'enable_release'])
+  })
+  it('is let go once, and not at all without a connection', () => {
+    const { hold, sent, close } = rig()
+    hold.press('i')
+    hold.release('up')
+    hold.release('up')
+    close()
+    hold.press('i')
+    hold.tick()
+    expect(sent).toEqual(['enable_press', 'enable_release'])
+  })
+})
