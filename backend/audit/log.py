@@ -246,7 +246,8 @@ class AuditLog:
             self.problem = text
             self._file_takes = True
         if first:
-            log.error("the audit cannot be written: %s", text, exc_info=error)
+            known = isinstance(error, DatabaseFailed)
+            log.error("the audit cannot be written: %s", text, exc_info=None if known else error)
             self._changed(text)
 
     def _spool(self) -> None:

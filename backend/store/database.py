@@ -143,6 +143,7 @@ class Store:
             return create_engine(
                 self.url,
                 pool_pre_ping=True,
+                hide_parameters=True,
                 pool_timeout=_PATIENCE_S,
                 connect_args={"connect_timeout": _PATIENCE_S},
             )
@@ -157,7 +158,10 @@ class Store:
                     value=str(file),
                     remedy="choose another folder with --config",
                 ) from error
-        engine = create_engine(self.url, connect_args={"timeout": _PATIENCE_S})
+        # No error text, and so no log, may repeat what was stored: hashes of passwords too.
+        engine = create_engine(
+            self.url, hide_parameters=True, connect_args={"timeout": _PATIENCE_S}
+        )
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
         return engine
