@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from profiles.schema import DataType, Profile
 
@@ -115,3 +115,11 @@ class Device(Protocol):
 
     def inject(self, what: str, value: float = 1.0) -> None:
         """Cause trouble by name, such as a fault's code or ``encoder_loss``."""
+
+
+@runtime_checkable
+class StartsWithNetwork(Protocol):
+    """A device that takes over some parameters when its network comes up."""
+
+    def network_started(self) -> None:
+        """The EtherCAT state machine went from Init to Pre-Operational."""

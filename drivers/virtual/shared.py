@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 
-from drivers.virtual.device import Device, EntryInfo, ProcessImage
+from drivers.virtual.device import Device, EntryInfo, ProcessImage, StartsWithNetwork
 from profiles.schema import Profile
 
 
@@ -73,6 +73,12 @@ class SharedDevice:
         """See `Device`."""
         with self._lock:
             self._device.communication_lost(reason)
+
+    def network_started(self) -> None:
+        """See `StartsWithNetwork`."""
+        if isinstance(self._device, StartsWithNetwork):
+            with self._lock:
+                self._device.network_started()
 
     def take_emergencies(self) -> list[tuple[int, int, bytes]]:
         """See `Device`."""

@@ -326,6 +326,15 @@ class VirtualAxis:
         self.p[k.P_STOP_TORQUE] = torque_nm
         self.p[k.P_STOPPING] = 1.0
 
+    def place(self, angle_rad: float) -> None:
+        """Turn the shaft by hand to an angle, without power and at rest; the loads follow."""
+        x, s = self._x, self.s
+        x[:] = 0.0
+        x[0] = angle_rad
+        s[k.S_THETA] = s[k.S_THETA_FILTERED] = s[k.S_P_DEMAND] = angle_rad
+        s[k.S_OMEGA_LOW] = s[k.S_OMEGA_OBSERVED] = s[k.S_OMEGA] = 0.0
+        s[k.S_INDEX_COUNT] = math.floor(angle_rad / self.p[k.P_INDEX_RAD])
+
     def clear_faults(self) -> None:
         """Forget latched faults and their timers."""
         for name in (

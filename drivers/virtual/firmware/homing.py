@@ -216,10 +216,10 @@ class Homing:
         elif method in (33, 34):
             home = yield from self._index_either_way(-1 if method == 33 else 1)
         elif 1 <= method <= 14:
-            direction = yield from self._edge(method)
+            direction = yield from self._edge(method, by_edge=False)
             home = yield from self._index(direction)
         elif 17 <= method <= 30:
-            yield from self._edge(method - 16)
+            yield from self._edge(method - 16, by_edge=True)
             home = self._axis.angle_rad
         else:
             raise HomingFailed
@@ -284,7 +284,7 @@ class Homing:
         yield Until(k.EV_STALL)
         return self._axis.angle_rad
 
-    def _edge(self, method: int) -> Generator[Until, None, int]:
+    def _edge(self, method: int, *, by_edge: bool) -> Generator[Until, None, int]:
         """Find the switch edge of methods 1 to 14; returns the direction to the index pulse."""
         if method in (1, 2):
             d = 1 if method == 2 else -1
@@ -294,21 +294,34 @@ class Homing:
             return -d
         if method in (3, 4, 5, 6):
             d = 1 if method in (3, 4) else -1
-            return (yield from self._home_side(d, inside=method in (4, 6)))
+            inside = method in (4, 6)
+            return (yield from self._home_side(d, inside=inside, by_edge=by_edge))
         d = 1 if method <= 10 else -1
         return (yield from self._cam(d, (method - 7) % 4))
 
-    def _home_side(self, d: int, *, inside: bool) -> Generator[Until, None, int]:
-        """Methods 3 to 6: a home switch that is active beyond its edge in direction ``d``."""
-        active = bool(self._signals() & k.SIG_HOME)
+    def _home_side(self, d: int, *, inside: bool, by_edge: bool) -> Generator[Until, None, int]:
+        """Methods 3 to 6: a home switch that is active beyond its edge in direction ``d``.
+
+        ``by_edge`` (19 to 22): the edge itself is home and is passed at the low speed.
+        """
+        home = k.SIG_HOME
+        active = bool(self._signals() & home)
         if inside:
-            if active:
-                yield from self._travel(-d, k.SIG_HOME, False, slow=False)
-            yield from self._travel(d, k.SIG_HOME, True, slow=active)
+            if not active:
+                found = yield from self._search(d, home)
+                if not found:
+                    # Started behind a cam: back over it, and to its edge again (000:2285).
+                    if not self._core.family.traits.home_side_reverses:
+                        raise HomingFailed
+                    yield from self._travel(-d, home, True, slow=False)
+                    active = True
+            if active or by_edge:
+                yield from self._travel(-d, home, False, slow=False)
+                yield from self._travel(d, home, True, slow=True)
             return d
         if not active:
-            yield from self._travel(d, k.SIG_HOME, True, slow=False)
-        yield from self._travel(-d, k.SIG_HOME, False, slow=True)
+            yield from self._travel(d, home, True, slow=False)
+        yield from self._travel(-d, home, False, slow=True)
         return -d
 
     def _cam(self, d: int, which: int) -> Generator[Until, None, int]:

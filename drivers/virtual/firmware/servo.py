@@ -264,6 +264,16 @@ class VirtualServo:
         """The wire's watchdog fired or the network state fell."""
         self.control.communication_lost()
 
+    def network_started(self) -> None:
+        """A family whose gear acts with the network takes over what waits (001:1002, 001:1036)."""
+        if not self._family.traits.acts_with_network or self.axis.powered:
+            return
+        self.od.activate("power_cycle")
+        self.core.apply_settings()
+        fault = self.control.alarms.find(self._family.gear_fault(self.od) or "")
+        if fault is not None:
+            self.control.raise_alarm(fault)
+
     def take_emergencies(self) -> list[Emergency]:
         """Emergencies since the last call."""
         taken = list(self.control.emergencies)
@@ -276,7 +286,8 @@ class VirtualServo:
         A fault's name (``over_current`` … ``watchdog``), its code in the profile's table
         (``Er.013``, ``AL.247`` …) or in 603Fh (``0x7121``) latches it; a warning's code shows it;
         ``encoder_loss`` (1/0), ``supply_v``, ``ambient_c``, ``temperature_c``, ``load_nm`` (the
-        constant torque of gravity) and ``coulomb_nm`` change the machine; ``di1`` … set terminals
+        constant torque of gravity) and ``coulomb_nm`` change the machine; ``turn_to_rev`` turns the
+        shaft by hand; ``di1`` … set terminals
         without a switch; ``power_off`` switches off for ``value`` seconds.
 
         Raises:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.axis import TURN
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.panel import Panel
@@ -35,6 +36,8 @@ def make_trouble(
     """
     if what in _PHYSICS:
         core.axis.p[_PHYSICS[what]] = value
+    elif what == "turn_to_rev":
+        core.axis.place(value * TURN)
     elif what == "temperature_c":
         core.axis.s[k.S_TEMPERATURE] = value
     elif what in _FAULTS:

@@ -155,6 +155,12 @@ class OnWire:
             passed += step_s
         return passed
 
+    def restart_network(self) -> None:
+        """From Pre-Operational to Init and back."""
+        assert isinstance(self.wire, EthercatWire)
+        for state in (1, 2):
+            assert self.wire.wire.request(state) == (state, 0)
+
     # --- state machine ---------------------------------------------------------------------
     @property
     def status(self) -> int:

@@ -239,6 +239,7 @@ class Traits:
     history_size: int = 20
     disabled_bits: int = 0x40
     listed_options_only: bool = False
+    acts_with_network: bool = False
     communication_fault: int = k.F_WATCHDOG
     faults: dict[int, FaultInfo] = field(default_factory=dict)
     commands: dict[str, dict[int, str]] = field(default_factory=dict)
@@ -264,6 +265,7 @@ class Traits:
     homing_timeout: tuple[str, float] = ("2070:03", 1.0)  # parameter and its unit [s]
     index_search_reverses: bool = False
     index_at_once: bool = False
+    home_side_reverses: bool = False
     homing_alarms: tuple[str, str] = ("", "")
     software_limits: tuple[str, dict[int, Literal["off", "on", "homed"]]] | None = None
     reset_after_s: dict[str, float] = field(default_factory=dict)
@@ -303,6 +305,9 @@ class Family(Protocol):
 
     def refusal(self, od: ObjectDictionary, mode: int) -> str | None:
         """Code of the fault with which the drive answers enabling as it is set, or None."""
+
+    def gear_fault(self, od: ObjectDictionary) -> str | None:
+        """Code of the fault for a gear that the drive cannot make, or None."""
 
     def in_place_s(self, od: ObjectDictionary) -> float:
         """How long the axis must be within its window to be in place."""

@@ -436,6 +436,16 @@ class Cia402:
             return "Err89"
         return None
 
+    def gear_fault(self, od: ObjectDictionary) -> str | None:
+        """EP3E: from 1/1000 to 1000 (001:1035), else Err80."""
+        if self.name != "ep3e":
+            return None
+        parts = [od.number(key) for key in ("608F:01", "6091:01", "6092:02", "6091:02", "6092:01")]
+        if 0 in parts:
+            return "Err80"
+        ratio = parts[0] * parts[1] * parts[2] / (parts[3] * parts[4])
+        return None if 1e-3 <= ratio <= 1e3 else "Err80"
+
     def in_place_s(self, od: ObjectDictionary) -> float:
         """6068h, or the family's own (2502h of the DS_C, 003:577)."""
         return od.number("2502:00" if self.name == "ds_c" else "6068:00", 10) * _MS

@@ -215,6 +215,10 @@ class Mms7:
         """Nothing is refused."""
         return None
 
+    def gear_fault(self, od: ObjectDictionary) -> str | None:  # noqa: ARG002 - the seam's
+        """None is printed."""
+        return None
+
     def in_place_s(self, od: ObjectDictionary) -> float:
         """6068h."""
         return od.number("6068:00", 10) * 1e-3

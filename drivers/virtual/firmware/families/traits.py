@@ -65,6 +65,7 @@ M6L = Traits(
     homing_timeout=("200C:0A", 1e-3),
     index_search_reverses=True,
     index_at_once=True,
+    home_side_reverses=True,
     home_offset="by_parameter",
     home_offset_key="200C:0C",
     feed_forward=FeedForward(
@@ -246,6 +247,7 @@ EP3E = Traits(
     ),
     speed_filter=("2013:00", "ms"),
     feed_forward=FeedForward(speed_gain="2015:00", speed_filter="2016:00"),
+    acts_with_network=True,
     disabled_bits=0x60,
     zero_speed_key="20A0:00",
     listed_options_only=True,

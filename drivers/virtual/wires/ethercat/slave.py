@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivers.virtual.device import Device, SdoAbort
+from drivers.virtual.device import Device, SdoAbort, StartsWithNetwork
 from drivers.virtual.wires.ethercat import registers as reg
 from drivers.virtual.wires.ethercat import sii
 from drivers.virtual.wires.ethercat.al import AlStateMachine
@@ -239,6 +239,9 @@ class Slave:
             self.mailbox.start(boot=new == AlState.BOOT)
         if old >= AlState.SAFEOP > new:
             self.process.stop()
+        rising = old == AlState.INIT and new == AlState.PREOP
+        if rising and isinstance(self.device, StartsWithNetwork):
+            self.device.network_started()
         if old < AlState.SAFEOP <= new:
             self.process.start(self._now_ns)
         self.process.operate(new == AlState.OP)
