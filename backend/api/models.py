@@ -540,6 +540,7 @@ class Diff(Message):
     """A parameter set against a drive."""
 
     file: str
+    version: int | None = Field(default=None, description="of the file; null for the latest")
     drive: str
     same_profile: bool
     same_serial: bool | None

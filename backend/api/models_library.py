@@ -120,7 +120,9 @@ class ThreeWay(Message):
     """Two sets against a drive, read now."""
 
     base: str
+    base_version: int | None
     theirs: str
+    theirs_version: int | None
     drive: str
     same_profile: bool
     same_serial: bool | None

@@ -122,7 +122,7 @@ async def diff(
         raise OutOfRange("give either file or against", remedy="choose one thing to compare with")
     if file is not None:
         content = await _parsed(bench, file, version)
-        rows, label = list(content.rows), _label(file, version)
+        rows, label = list(content.rows), file
         same_profile, same_serial, warnings = _identity(content, drive)
     elif against == "defaults":
         warnings = []
@@ -137,6 +137,7 @@ async def diff(
     ours = await _read(drive, rows, full=file is not None)
     return Diff(
         file=label,
+        version=version if file is not None else None,
         drive=drive.id,
         same_profile=same_profile,
         same_serial=same_serial,
@@ -163,8 +164,10 @@ async def three_way(
         warnings.append("the base is of another drive family")
     ours = await _read(drive, content.rows, full=True)
     return ThreeWay(
-        base=_label(base, base_version),
-        theirs=_label(theirs, theirs_version),
+        base=base,
+        base_version=base_version,
+        theirs=theirs,
+        theirs_version=theirs_version,
         drive=drive.id,
         same_profile=same_profile,
         same_serial=same_serial,
@@ -177,10 +180,6 @@ async def three_way(
 
 
 _OTHER_FAMILY = "of another drive family: nothing of it can be written here"
-
-
-def _label(file: str, version: int | None) -> str:
-    return file if version is None else f"{file} (version {version})"
 
 
 def _identity(content: ParameterSet, drive: Drive) -> tuple[bool, bool | None, list[str]]:

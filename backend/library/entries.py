@@ -80,6 +80,8 @@ class Query:
     words: str = ""
     kinds: tuple[Kind, ...] = ()
     tag: str = ""
+    without: str = ""
+    """A tag that entries must not have."""
     axis: str = ""
     serial: int | None = None
     profile: str = ""

@@ -98,6 +98,8 @@ def matching(query: Query) -> Select[Item]:
         found = found.where(Item.kind.in_(query.kinds))
     if query.tag:
         found = found.where(exists().where(Tag.item_id == Item.id, Tag.tag == query.tag))
+    if query.without:
+        found = found.where(~exists().where(Tag.item_id == Item.id, Tag.tag == query.without))
     of_version = []
     if query.axis:
         of_version.append(VersionRow.axis == query.axis)

@@ -79,6 +79,7 @@ def test_search(library: Library) -> None:
     assert names(library, words="y_") == ["y_1.sdset"]
     assert names(library, words="4000000000", kinds=("set",)) == ["Achse X.sdset"]
     assert names(library, tag="golden") == ["x report.html", "y_1.sdset"]
+    assert names(library, without="golden") == ["Achse X.sdset"]
     assert names(library, tag="machine 7") == ["x report.html"]
     assert names(library, axis="X", kinds=("set",)) == ["Achse X.sdset"]
     assert names(library, serial=12) == ["y_1.sdset"]

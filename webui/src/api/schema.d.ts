@@ -3228,6 +3228,11 @@ export interface components {
             same_profile: boolean;
             /** Same Serial */
             same_serial: boolean | null;
+            /**
+             * Version
+             * @description of the file; null for the latest
+             */
+            version?: number | null;
             /** Warnings */
             warnings: string[];
         };
@@ -7101,6 +7106,8 @@ export interface components {
         ThreeWay: {
             /** Base */
             base: string;
+            /** Base Version */
+            base_version: number | null;
             /** Drive */
             drive: string;
             /** Rows */
@@ -7111,6 +7118,8 @@ export interface components {
             same_serial: boolean | null;
             /** Theirs */
             theirs: string;
+            /** Theirs Version */
+            theirs_version: number | null;
             /** Warnings */
             warnings: string[];
         };
@@ -20702,6 +20711,8 @@ export interface operations {
                 words?: string;
                 kind?: ("set" | "recording" | "measurement" | "report")[] | null;
                 tag?: string;
+                /** @description tag of what to leave out */
+                without?: string;
                 /** @description its name */
                 axis?: string;
                 profile?: string;
