@@ -220,7 +220,10 @@ def estimate_inertia(
     near_spoilt = np.convolve(spoilt.astype(np.float64), reach, "same") > 0.5
     keep = (np.abs(velocity) > slowest) & ~near_spoilt
     keep[: kernel.size] = keep[-kernel.size :] = False
-    matrix = np.column_stack([acceleration, velocity, direction, np.ones(n)])
+    # A load behind a spring of antiresonance ω_a seems heavier by (ω/ω_a)²: to first order that is
+    # the second derivative of the acceleration, which would else count as inertia.
+    springy = np.gradient(np.gradient(acceleration)) * sample_rate_hz**2
+    matrix = np.column_stack([acceleration, velocity, direction, np.ones(n), springy])
     return _regress(matrix[keep], torque[keep], keep, float(np.mean(saturated)), motor_inertia_kgm2)
 
 
@@ -240,6 +243,9 @@ def _regress(
         return InertiaResult(nothing, nothing, nothing, nothing, None, 0.0, b.size, False, reason)
     scale = np.maximum(np.max(np.abs(a), axis=0), 1e-12)
     x, weight = _huber(a / scale, b)
+    if x[1] < 0:
+        # Friction does not drive: where noise says so, there is too little viscous friction to see.
+        x, weight = _huber(a / scale * np.array([1.0, 0.0, 1.0, 1.0, 1.0]), b)
     residual = b - (a / scale) @ x
     share = _independent_share(residual * np.sqrt(weight), keep)
     freedom = max(float(np.sum(weight)) * share - a.shape[1], 1.0)
@@ -250,9 +256,9 @@ def _regress(
     std = np.sqrt(np.maximum(np.diag(normal) * variance, 0.0)) / scale
     value = x / scale
     t = float(student_t.ppf(0.975, freedom))
-    half = np.hypot(t * std, SYSTEMATIC_SHARE * np.abs(value))
+    half = np.hypot(t * std[:4], SYSTEMATIC_SHARE * np.abs(value[:4]))
     parts = [
-        Interval(float(v), float(v - h), float(v + h)) for v, h in zip(value, half, strict=True)
+        Interval(float(v), float(v - h), float(v + h)) for v, h in zip(value[:4], half, strict=True)
     ]
     total = float(np.sum(weight * (b - np.average(b, weights=weight)) ** 2))
     r2 = 1.0 - float(np.sum(weight * residual**2)) / total if total > 0 else 0.0

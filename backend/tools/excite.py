@@ -23,6 +23,10 @@ _PERIOD_S = 0.65
 #: Base motion as a multiple of the excitation's own speed, so that the speed seldom reverses.
 _BASE_OVER_RMS = 8.0
 _BASE_LEAST_RAD_S = 12.0
+#: Share of the envelope's speed for the base motion; its way in overshoots.
+_BASE_SHARE = 0.4
+#: Without a loop, lines rise from this frequency on, up to this factor.
+_RISE_HZ, _RISE_MOST = 120.0, 2.5
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,11 @@ def _speed_of(samples: npt.NDArray[np.floating], rate: float, inertia: float) ->
     return np.asarray(np.fft.irfft(spectrum, samples.size))
 
 
+def base_torque_nm(inertia_kgm2: float, speed_rpm: float) -> float:
+    """Torque that the base motion's acceleration takes at most in `torque_mode`."""
+    return inertia_kgm2 * TURN / _PERIOD_S * _BASE_SHARE * speed_rpm * TURN / 60.0
+
+
 def torque_mode(
     rate: float,
     band: Band,
@@ -102,10 +111,13 @@ def torque_mode(
     lines = _lines(band, period, rate)
     slow = TURN * rate / period
 
+    # Inertia takes the answer down as frequency rises, but friction needs its share below.
+    shape = np.minimum(np.hypot(1.0, lines * rate / period / _RISE_HZ), _RISE_MOST)
+
     def one(number: int, motion: BaseMotion | None) -> Excitation:
         return multisine(
             sample_rate_hz=rate, period_samples=period, lines=lines, realisation=number // 2,
-            invert=bool(number % 2), integrations=2, iterations=80, base=motion,
+            invert=bool(number % 2), integrations=2, iterations=80, base=motion, amplitude=shape,
             ramp_samples=period // 4,
         )  # fmt: skip
 
@@ -115,7 +127,9 @@ def torque_mode(
     wanted = max(_BASE_OVER_RMS * own_rms * peak_nm, _BASE_LEAST_RAD_S)
     # The way in overshoots the steady base motion by about its amplitude.
     travelled = 2.2 / slow
-    base_speed = min(wanted, 0.4 * room.speed_rad_s, room.travel_rad / travelled) if base else 0.0
+    base_speed = (
+        min(wanted, _BASE_SHARE * room.speed_rad_s, room.travel_rad / travelled) if base else 0.0
+    )
     if base and base_speed < 1.0:
         raise ValueError(
             f"a travel of {room.travel_rad / TURN:.3g} rev is too little for the base motion"
@@ -129,7 +143,7 @@ def torque_mode(
     if base_nm + peak_nm > room.torque_nm:
         base_nm = min(base_nm, 0.6 * room.torque_nm)
         peak_nm = min(peak_nm, room.torque_nm - base_nm)
-    if base and base_nm < 1.5 * rigid.coulomb_nm:
+    if base and base_nm < 4 / np.pi * 1.02 * rigid.coulomb_nm:
         raise ValueError(
             f"{room.torque_nm:.3g} Nm are too little to keep the axis moving against friction"
         )

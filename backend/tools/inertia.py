@@ -22,6 +22,7 @@ from backend.analysis.inertia import (
     design_moves,
     estimate_inertia,
 )
+from backend.analysis.spectrum import power_density
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
@@ -54,6 +55,8 @@ _CUTOFF_HZ = 25.0
 _FIRST_REV = 0.12
 _STALL_S = 0.12
 _END_MARGIN_REV = 0.15
+#: Above this R² nothing is left to explain; below, the load may swing in this range of Hz.
+_EXPLAINED, _SWING_HZ = 0.9995, (4.0, 80.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +76,24 @@ class InertiaSettings:
     repetitions: int = 4
     rated_torque_nm: float | None = None
     motor_inertia_kgm2: float | None = None
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """How gently the moves begin and end, and the filter that goes with it."""
+
+    ramp_s: float = _RAMP_S
+    smoothing_s: float = _SMOOTHING_S
+    cutoff_hz: float = _CUTOFF_HZ
+
+    @staticmethod
+    def against(swing_hz: float) -> _Shape:
+        """A mean over one whole swing does not excite it (a finite-impulse input shaper)."""
+        period_s = 1.0 / swing_hz
+        return _Shape(
+            max(_RAMP_S, 3.0 * period_s), max(_SMOOTHING_S, period_s),
+            min(_CUTOFF_HZ, 0.4 * swing_hz),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -120,12 +141,28 @@ async def inertia(
     travel, start = _where(settings, ends, units.position(home))
     if abs(start - units.position(home)) > 0.01:
         await go_back(axis, session, units.position_raw(start), _wide(settings, ends), facts)
-    recording = await _moves(axis, session, settings, facts, rough, travel, progress)
+    told = share(progress, 0.35, 0.65, "moving forth and back")
+    shape = _Shape()
+    recording = await _moves(axis, session, settings, facts, rough, travel, shape, told)
+    progress(0.65, "evaluating")
+    result = await asyncio.to_thread(evaluate, recording, settings, facts, shape.cutoff_hz)
+    swing_hz = await asyncio.to_thread(oscillation_hz, recording, result)
+    if swing_hz is not None:
+        # A load that swings behind its coupling is moved again so that it does not.
+        gentle = _Shape.against(swing_hz)
+        told = share(
+            progress, 0.66, 0.9, f"once more, gently: the load swings at {swing_hz:.0f} Hz"
+        )
+        better = RoughFit(
+            max(result.inertia_kgm2.value, rough.inertia_kgm2), rough.coulomb_nm, rough.gravity_nm
+        )
+        again = await _moves(axis, session, settings, facts, better, travel, gentle, told)
+        calm = await asyncio.to_thread(evaluate, again, settings, facts, gentle.cutoff_hz)
+        if calm.r2 > result.r2:
+            recording, result, shape = again, calm, gentle
     await go_back(axis, session, home, _wide(settings, ends), facts)
     if keep is not None:
-        keep("inertia", *_raw(recording, settings, facts))
-    progress(0.95, "evaluating")
-    result = await asyncio.to_thread(evaluate, recording, settings, facts)
+        keep("inertia", *_raw(recording, settings, facts, shape))
     return InertiaOutcome(
         result, f"host, {settings.scheme}", facts.torque_known, ends,
         recording.velocity_rad_s.size / recording.sample_rate_hz, _ratio_against(facts, settings),
@@ -311,20 +348,21 @@ async def _moves(
     facts: AxisFacts,
     rough: RoughFit,
     travel_rev: float,
-    progress: Progress,
+    shape: _Shape,
+    told: Callable[[float], None],
 ) -> Recording:
-    """The identification moves, once more with the better inertia if the first were too timid."""
+    """The identification moves."""
     envelope, rate = settings.envelope, 1.0 / cycle_s(session)
     friction = rough.coulomb_nm + abs(rough.gravity_nm)
     torque = envelope.torque_percent / 100.0 * facts.rated_torque_nm
     speed = 0.8 * envelope.speed_rpm * _TURN / 60.0
     # As gentle as ramps of this length are, but well above friction.
-    gentle = max(rough.inertia_kgm2 * speed / _RAMP_S, 4.0 * rough.coulomb_nm)
+    gentle = max(rough.inertia_kgm2 * speed / shape.ramp_s, 4.0 * rough.coulomb_nm)
     wanted = min(0.7 * torque, friction + gentle / 0.7)
     try:
         trajectory = design_moves(
             MoveLimits(0.8 * travel_rev * _TURN, speed, wanted), rough.inertia_kgm2, rate,
-            friction_nm=friction, repetitions=settings.repetitions, smoothing_s=_SMOOTHING_S,
+            friction_nm=friction, repetitions=settings.repetitions, smoothing_s=shape.smoothing_s,
             dwell_s=0.1,
         )  # fmt: skip
     except ValueError as error:
@@ -339,21 +377,44 @@ async def _moves(
             value=duration_s, limit=f"{envelope.time_s:g} s",
             remedy="allow more time, speed or torque, or less travel",
         )  # fmt: skip
-    told = share(progress, 0.35, 0.9, "moving forth and back")
     tail = np.zeros(round(0.2 * rate))
     rpm = np.concatenate([trajectory.velocity_rad_s, tail]) * 60.0 / _TURN
     room = replace(envelope, travel_rev=min(envelope.travel_rev, travel_rev * 1.15))
     return await _csv(axis, session, rpm, room, facts, told)
 
 
-def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) -> InertiaResult:
+def oscillation_hz(recording: Recording, result: InertiaResult) -> float | None:
+    """Where the torque swings beside what inertia and friction explain; None where it hardly does.
+
+    Under its speed loop the motor follows and the load swings behind the coupling, at the
+    mechanics' antiresonance.
+    """
+    if not np.isfinite(result.inertia_kgm2.value) or result.r2 > _EXPLAINED:
+        return None
+    rate, velocity = recording.sample_rate_hz, recording.velocity_rad_s
+    rest = recording.torque_nm - result.inertia_kgm2.value * np.gradient(velocity) * rate
+    rest = rest - result.viscous_nms.value * velocity - result.gravity_nm.value
+    rest = rest - result.coulomb_nm.value * np.sign(velocity)
+    density = power_density(rest, rate, round(2.0 * rate))
+    band = (density.frequency_hz >= _SWING_HZ[0]) & (density.frequency_hz <= _SWING_HZ[1])
+    levels = density.value[band]
+    peak = int(np.argmax(levels))
+    if levels[peak] < 8.0 * float(np.median(levels)):
+        return None
+    return float(density.frequency_hz[band][peak])
+
+
+def evaluate(
+    recording: Recording, settings: InertiaSettings, facts: AxisFacts,
+    cutoff_hz: float = _CUTOFF_HZ,
+) -> InertiaResult:  # fmt: skip
     """The regression; also works on a recording that was kept."""
     try:
         found = estimate_inertia(
             recording.torque_nm,
             recording.velocity_rad_s,
             recording.sample_rate_hz,
-            cutoff_hz=_CUTOFF_HZ,
+            cutoff_hz=cutoff_hz,
             torque_limit_nm=settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm,
             motor_inertia_kgm2=facts.motor_inertia_kgm2,
             valid=recording.valid,
@@ -369,10 +430,11 @@ def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) 
 
 
 def _raw(
-    recording: Recording, settings: InertiaSettings, facts: AxisFacts
+    recording: Recording, settings: InertiaSettings, facts: AxisFacts, shape: _Shape
 ) -> tuple[dict[str, npt.NDArray[np.generic]], dict[str, object]]:
     return recording.arrays(), {
         "tool": "inertia",
+        "cutoff_hz": shape.cutoff_hz,
         "sample_rate_hz": recording.sample_rate_hz,
         "facts": asdict(facts),
         "settings": asdict(settings),
@@ -403,9 +465,11 @@ def reevaluate(
     rate = float(str(meta["sample_rate_hz"]))
     facts = AxisFacts(**told)
     recording = Recording(rate, **columns, valid=valid)
+    cutoff_hz = float(str(meta.get("cutoff_hz", _CUTOFF_HZ)))
     return InertiaOutcome(
-        evaluate(recording, settings, facts), f"host, {settings.scheme}", facts.torque_known,
-        settings.ends_rev, recording.velocity_rad_s.size / rate, _ratio_against(facts, settings),
+        evaluate(recording, settings, facts, cutoff_hz), f"host, {settings.scheme}",
+        facts.torque_known, settings.ends_rev, recording.velocity_rad_s.size / rate,
+        _ratio_against(facts, settings),
     )  # fmt: skip
 
 

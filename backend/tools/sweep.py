@@ -147,7 +147,7 @@ async def sweep(
             else:
                 progress(0.02, "feeling the axis with a small torque")
                 probed = await probe_axis(axis, session, settings.envelope, facts, home)
-                loop = _choose(axis, settings.loop, probed)
+                loop = _choose(axis, session, settings, probed)
         setup = await _setup(axis, session, settings, facts, loop, probed)
         require_signals(axis, session, _MODE_OF[setup.loop], not closed and setup.loop != "none")
         progress(0.08, "designing the excitation")
@@ -194,12 +194,26 @@ async def _filters_off(axis: Axis, settings: SweepSettings) -> dict[str, int]:
     return {key: 0 for key in sorted(keys) if await axis.drive.raw(key) != 0}
 
 
-def _choose(axis: Axis, wanted: Loop, probed: Probed) -> Literal["none", "speed"]:
-    """No loop on an axis that stays where it is, else the speed loop."""
+def _choose(
+    axis: Axis, session: CyclicSession, settings: SweepSettings, probed: Probed
+) -> Literal["none", "speed"]:
+    """No loop on an axis that stays where it is and whose inertia rules, else the speed loop.
+
+    Where friction takes more of the base motion's torque than inertia, a torque that is off by
+    little makes a speed that is off by much.
+    """
     drifts = abs(probed.gravity_nm) > max(0.5 * probed.coulomb_nm, 0.01 * probed.rated_nm)
-    if not drifts:
-        return "none"
-    return _held_by_loop(axis, wanted, probed.gravity_nm)
+    if drifts:
+        return _held_by_loop(axis, settings.loop, probed.gravity_nm)
+    momentum_nm = excite.base_torque_nm(probed.inertia_kgm2, settings.envelope.speed_rpm)
+    light = 4 / np.pi * probed.coulomb_nm > momentum_nm
+    return "speed" if light and settings.loop == "auto" and _can_offset(axis, session) else "none"
+
+
+def _can_offset(axis: Axis, session: CyclicSession) -> bool:
+    """Whether torque can be injected beside a closed loop."""
+    key = axis.drive.key("torque_offset")
+    return key is not None and session.carries(axis.drive, key)
 
 
 def _held_by_loop(axis: Axis, wanted: Loop, pull_nm: float) -> Literal["speed"]:
