@@ -26,6 +26,7 @@ from backend.api import (
     routes_people,
     routes_recordings,
     routes_rerun,
+    routes_scene,
     routes_scope,
     routes_sets,
     routes_tune,
@@ -44,6 +45,7 @@ from backend.people.station import People
 from backend.recording.rerun_assets import ViewerAssets
 from backend.recording.rerun_feed import RerunFeed
 from backend.recording.service import Recordings
+from backend.scene.feed import SceneFeed
 
 PREFIX = "/api/v1"
 _HERE = Path(__file__).resolve()
@@ -72,6 +74,8 @@ def make_app(
     known = people or People(bench.state_folder)
     sockets = OpenSockets()
     live = LiveHub(bench, known, sockets)
+    axis_store = AxisStore(bench.state_folder / "axes")
+    scene = SceneFeed(bench, lambda drive: axis_store.get(drive).mechanics)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
@@ -83,6 +87,7 @@ def make_app(
         # What moves is stopped before a slow disk may keep the server waiting.
         await bench.jobs.close()
         await feed.close()
+        await scene.close()
         await recordings.close()
         watch.cancel()
         await bench.close()
@@ -117,7 +122,7 @@ def make_app(
     )
     app.state.bench = bench
     app.state.recordings = recordings
-    app.state.axis_store = AxisStore(bench.state_folder / "axes")
+    app.state.axis_store = axis_store
     app.state.forcing = ForcingSessions(bench.jobs, bench.leases)
     errors.install(app)
     app.state.live = live
@@ -148,6 +153,7 @@ def make_app(
         await live.serve(socket)
 
     routes_rerun.install(app, feed, ViewerAssets())
+    routes_scene.install(app, scene)
     _add_page(app)
     app.add_middleware(
         Gate,

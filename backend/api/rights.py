@@ -219,8 +219,8 @@ _PAGE: dict[str, Need] = {
     "GET /assets/{path:path}": _PUBLIC,
     "GET /rerun/{path:path}": _LOOK,
     "WS /rerun/feed": _LOOK,
-    "GET /viser/{path:path}": _LOOK,
-    "WS /viser/{path:path}": _LOOK,
+    "GET /viser/": _LOOK,
+    "WS /viser": _LOOK,
 }
 
 #: Needs by "METHOD path" as the application declares its paths.

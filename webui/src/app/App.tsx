@@ -12,6 +12,7 @@ import { MotionPage } from '../pages/motion/MotionPage'
 import { OverviewPage } from '../pages/overview/OverviewPage'
 import { ParametersPage } from '../pages/parameters/ParametersPage'
 import { RerunPage } from '../pages/rerun/RerunPage'
+import { ScenePage } from '../pages/scene/ScenePage'
 import { ResponsePage } from '../pages/response/ResponsePage'
 import { ScopePage } from '../pages/scope/ScopePage'
 import { SetupPage } from '../pages/setup/SetupPage'
@@ -41,7 +42,13 @@ const AXIS = {
   io: IoPage,
   alarms: AlarmsPage,
 }
-const BENCH = { connect: ConnectPage, scope: ScopePage, rerun: RerunPage, files: FilesPage }
+const BENCH = {
+  connect: ConnectPage,
+  scope: ScopePage,
+  rerun: RerunPage,
+  scene: ScenePage,
+  files: FilesPage,
+}
 
 function Page() {
   const t = useT()

@@ -5,6 +5,7 @@ import { functions } from './texts/functions'
 import { notListed } from './texts/notlisted'
 import { parameters } from './texts/parameters'
 import { recordings } from './texts/recordings'
+import { scene } from './texts/scene'
 import { scope } from './texts/scope'
 import { segment } from './texts/segment'
 import { tuning } from './texts/tuning'
@@ -18,6 +19,7 @@ export const catalogue = {
   ...parameters,
   ...recordings,
   ...notListed,
+  ...scene,
   ...scope,
   ...segment,
   ...tuning,

@@ -13,6 +13,7 @@ const PATHS = {
   io: 'M4 7h10a4 4 0 0 1 0 8H4M20 11h-2M4 4v6M4 12v6',
   alarms: 'M12 3 2 21h20zM12 10v5M12 18v.5',
   rerun: 'M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18M12 9a3 3 0 1 0 0 6 3 3 0 0 0 0-6',
+  scene: 'M12 2 3 7v10l9 5 9-5V7zM3 7l9 5 9-5M12 12v10',
   files: 'M5 3h9l5 5v13H5zM14 3v5h5M8 13h8M8 17h8',
   check: 'M4 12l5 6L20 5',
   cross: 'M5 5l14 14M19 5 5 19',

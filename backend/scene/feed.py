@@ -1,0 +1,245 @@
+"""Moves the scene with the live positions, while somebody looks at it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from backend.bench import Bench, Member
+from backend.drive import Drive
+from backend.mechanics_calc import Mechanics
+from backend.scene.geometry import Track, Travel, track_of, travel_of
+from backend.scope import Subscription
+from backend.units import AxisUnits
+from drivers.cia402 import State
+from drivers.errors import DriveError
+from drivers.link import ScopeBlock
+
+if TYPE_CHECKING:
+    from backend.scene.view import AxisLook, SceneView
+
+#: Pictures a second; viser takes about 2 % of a core for them and 1 % for each page.
+PERIOD_S = 1 / 30
+#: Polled drives: as often as the pictures change.
+POLL_S = 1 / 30
+#: How often words and limits are looked at again.
+_WORDS_S = 0.25
+_LIMITS_S = 2.0
+
+
+@dataclass(slots=True)
+class _Axis:
+    """What the feed knows of one axis."""
+
+    member: Member
+    units: AxisUnits
+    mechanics: Mechanics | None
+    travel: Travel
+    track: Track
+    streams: list[Subscription]
+    position_rev: float | None = None
+
+    def take(self, block: ScopeBlock) -> None:
+        """The newest position of a block; never blocks."""
+        if len(block.samples) and np.isfinite(value := block.samples[-1, 0]):
+            key = self.member.drive.require("position_actual")
+            raw = self.member.drive.parameter(key).to_raw(float(value))
+            self.position_rev = self.units.position(raw)
+
+
+class SceneFeed:
+    """One viser server for all who look; it is started by the first and kept until the end.
+
+    ``mechanics_of`` says what an axis drives.
+    """
+
+    def __init__(self, bench: Bench, mechanics_of: Callable[[str], Mechanics | None]) -> None:
+        self._bench = bench
+        self._mechanics_of = mechanics_of
+        self._view: SceneView | None = None
+        self._starting = asyncio.Lock()
+        self._viewers = 0
+        self._task: asyncio.Task[None] | None = None
+
+    async def join(self) -> int:
+        """Somebody begins to look. Returns the loopback port of the scene's server.
+
+        Raises:
+            OSError: it cannot be started.
+        """
+        async with self._starting:
+            if self._view is None:
+                self._view = await asyncio.to_thread(_make_view)
+        self._viewers += 1
+        if self._task is None or self._task.done():
+            self._task = asyncio.create_task(self._run(self._view), name="scene")
+        return self._view.port
+
+    async def leave(self) -> None:
+        """Somebody looks no longer; without anybody the bus is left alone."""
+        self._viewers -= 1
+        if self._viewers == 0:
+            await self._end()
+
+    async def close(self) -> None:
+        """End the server of the scene."""
+        await self._end()
+        if self._view is not None:
+            await asyncio.to_thread(self._view.close)
+            self._view = None
+
+    async def _end(self) -> None:
+        task, self._task = self._task, None
+        if task is not None:
+            task.cancel()
+            await asyncio.wait([task])
+
+    # --- while somebody looks -----------------------------------------------------------
+
+    async def _run(self, view: SceneView) -> None:
+        axes: dict[str, _Axis] = {}
+        try:
+            while True:
+                axes = await self._axes()
+                arrangement = self._arrangement()
+                await asyncio.to_thread(view.arrange, _looks(axes))
+                await self._follow(view, axes, arrangement)
+                await self._release(axes)
+        finally:
+            await self._release(axes)
+
+    async def _follow(self, view: SceneView, axes: dict[str, _Axis], arrangement: object) -> None:
+        """Until the bench is another one, or limits changed."""
+        loop = asyncio.get_running_loop()
+        words_at = limits_at = loop.time()
+        while True:
+            await asyncio.sleep(PERIOD_S)
+            now = loop.time()
+            if now >= words_at:
+                words_at = now + _WORDS_S
+                if self._arrangement() != arrangement:
+                    return
+                for drive, axis in axes.items():
+                    view.tell(drive, *_words(axis))
+                if _grow(axes):
+                    await asyncio.to_thread(view.arrange, _looks(axes))
+            if now >= limits_at:
+                limits_at = now + _LIMITS_S
+                if any([await self._limits_changed(axis) for axis in axes.values()]):
+                    return
+            view.move({d: a.position_rev for d, a in axes.items() if a.position_rev is not None})
+
+    def _arrangement(self) -> object:
+        """What a change of makes the scene be built anew."""
+        return {
+            drive: (m.drive.name, id(m.axis.session), self._mechanics_of(drive))
+            for drive, m in self._bench.members.items()
+        }
+
+    async def _axes(self) -> dict[str, _Axis]:
+        axes: dict[str, _Axis] = {}
+        for drive, member in self._bench.members.items():
+            mechanics = self._mechanics_of(drive)
+            travel = travel_of(mechanics)
+            try:
+                units = await member.axis.units()
+                limits = await _software_limits(member.drive, units)
+                key = member.drive.require("position_actual")
+                streams = [s for s, _ in self._bench.scope.subscribe(drive, [key], POLL_S)]
+            except DriveError:
+                # It does not answer now; shown without movement, and tried again with the limits.
+                units = AxisUnits(member.drive.profile.units, None)
+                limits, streams = None, []
+            here = member.monitor.snapshot.values.get("position") or 0.0
+            axis = _Axis(member, units, mechanics, travel, track_of(travel, here, limits), streams)
+            for stream in streams:
+                stream.sink = axis.take
+            axes[drive] = axis
+        return axes
+
+    async def _release(self, axes: dict[str, _Axis]) -> None:
+        for axis in axes.values():
+            streams, axis.streams = axis.streams, []
+            for stream in streams:
+                await self._bench.scope.unsubscribe(stream)
+
+    async def _limits_changed(self, axis: _Axis) -> bool:
+        """Whether the limits are others now, or a silent drive answers again."""
+        try:
+            units = await axis.member.axis.units()
+            limits = await _software_limits(axis.member.drive, units)
+        except DriveError:
+            return False
+        if not axis.streams or units != axis.units:
+            return True
+        return track_of(axis.travel, 0.0, limits) != axis.track and (
+            axis.track.limited or limits is not None
+        )
+
+
+def _make_view() -> SceneView:
+    from backend.scene.view import SceneView  # importing viser takes more than a second
+
+    return SceneView()
+
+
+def _looks(axes: dict[str, _Axis]) -> dict[str, AxisLook]:
+    from backend.scene.view import AxisLook
+
+    return {
+        drive: AxisLook(axis.member.drive.name, axis.mechanics, axis.travel, axis.track)
+        for drive, axis in axes.items()
+    }
+
+
+def _grow(axes: dict[str, _Axis]) -> bool:
+    """Make tracks longer where an axis without limits left them."""
+    grown = False
+    for axis in axes.values():
+        if axis.position_rev is not None:
+            track = axis.track.showing(axis.position_rev * axis.travel.per_rev)
+            grown = grown or track != axis.track
+            axis.track = track
+    return grown
+
+
+def _words(axis: _Axis) -> tuple[str, str]:
+    """State for the colour, and what stands above the axis."""
+    snapshot = axis.member.monitor.snapshot
+    state = "other"
+    if snapshot.state is State.OPERATION_ENABLED:
+        state = "enabled"
+    elif snapshot.state in (State.FAULT, State.FAULT_REACTION):
+        state = "fault"
+    if not snapshot.fresh:
+        return "other", "no data"
+    if axis.position_rev is None:
+        return state, snapshot.state.value
+    place = axis.position_rev * axis.travel.per_rev
+    return state, f"{snapshot.state.value}, {place:.2f} {axis.travel.unit}"
+
+
+async def _software_limits(drive: Drive, units: AxisUnits) -> tuple[float, float] | None:
+    """Revolutions of the drive's own limits; None where it has none or they are switched off.
+
+    A range of the whole 32 bits, or an empty one, limits nothing (CiA 402-2 clause 7, 607Dh).
+    """
+    keys = [drive.key(role) for role in ("software_limit_min", "software_limit_max")]
+    found: list[int] = []
+    for key in keys:
+        if key is None or drive.unreachable_why(drive.parameter(key)):
+            return None
+        with contextlib.suppress(DriveError):
+            raw = (await drive.read(key)).raw
+            if isinstance(raw, int):
+                found.append(raw)
+    if len(found) != 2 or found[0] >= found[1]:
+        return None
+    if found[0] <= -(2**31) + 1 and found[1] >= 2**31 - 1:
+        return None
+    return units.position(found[0]), units.position(found[1])

@@ -1,0 +1,19 @@
+import type { Texts } from '../types'
+
+/** The bench in 3D. */
+export const scene = {
+  'page.scene': ['3D', '三维'],
+  'scene.frame': ['The bench in 3D', '三维台架'],
+  'scene.help': [
+    'Parts move with the measured positions. Red posts are the software limits of the drive, the blue one is position zero. Drag to turn, wheel or two fingers to zoom. A track without limits grows as far as the axis was seen; its length has no scale.',
+    '部件随实测位置运动。红柱为驱动器软件限位，蓝柱为零位。拖动可旋转，滚轮或双指可缩放。无限位的导轨按轴到达过的范围伸长，长度不按比例。',
+  ],
+  'scene.none': ['No axis is connected yet.', '尚未连接任何轴。'],
+  'scene.shaft': ['a bare shaft', '空轴'],
+  'scene.screw': ['a screw', '丝杠'],
+  'scene.belt': ['a belt', '同步带'],
+  'scene.rack': ['a rack', '齿条'],
+  'scene.rotary': ['a rotary table', '转台'],
+  'scene.drives': ['drives {what}', '带动{what}'],
+  'scene.set': ['Set what it drives', '设置所带机构'],
+} satisfies Texts
