@@ -208,7 +208,7 @@ class MeasurementStore:
         """
         found = self.load(name)
         head = {**found.meta, "result": result}
-        path = self.folder / checked_name(name, SUFFIX)
+        path = self.path(name)
         write_atomically(path, _zipped(head, found.arrays))
 
     def names(self) -> list[str]:
@@ -222,7 +222,7 @@ class MeasurementStore:
         Raises:
             NotAllowed: there is none of this name.
         """
-        path = self.folder / checked_name(name, SUFFIX)
+        path = self.path(name)
         try:
             return path.read_bytes()
         except FileNotFoundError as error:
@@ -236,13 +236,21 @@ class MeasurementStore:
         """
         return unpack(self.read(name), name)
 
+    def path(self, name: str) -> Path:
+        """Where a file of this name lies, or would.
+
+        Raises:
+            NotAllowed: not a plain file name.
+        """
+        return self.folder / checked_name(name, SUFFIX)
+
     def head(self, name: str) -> Head:
         """What a file says of itself.
 
         Raises:
             NotAllowed: no such file. BadMeasurement: not usable.
         """
-        path = self.folder / checked_name(name, SUFFIX)
+        path = self.path(name)
         if not path.is_file():
             raise NotAllowed(f"there is no measurement {path.name}", value=path.name)
         return unpack_head(path)
@@ -253,7 +261,7 @@ class MeasurementStore:
         Raises:
             BadMeasurement: nothing is written. NotAllowed: the name exists.
         """
-        path = self.folder / checked_name(name, SUFFIX)
+        path = self.path(name)
         unpack(data, path.name)
         if path.exists():
             raise NotAllowed(f"{path.name} exists already", value=path.name,
@@ -268,4 +276,4 @@ class MeasurementStore:
             NotAllowed: there is none of this name.
         """
         self.read(name)
-        (self.folder / checked_name(name, SUFFIX)).unlink()
+        self.path(name).unlink()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from fastapi import APIRouter
@@ -35,9 +37,9 @@ from backend.api.models_tune import (
     RealisedInfo,
     Undo,
 )
-from backend.api.routes_measurements import change_log, load_measurement
+from backend.api.routes_measurements import change_log, measurement_head
 from backend.bench import Bench, Member
-from backend.measurements import BadMeasurement
+from backend.measurements import BadMeasurement, unpack
 from backend.report.changes import Change
 from backend.tools import autotune, gains, notch, sweep
 from backend.tools.axis_facts import read_facts
@@ -167,14 +169,22 @@ async def undo_tuning(bench: TheBench, member: Controlled, request: Undo) -> Und
     return Undo(before=now)
 
 
-async def _plant(bench: Bench, name: str) -> tuple[MeasuredPlant, sweep.SweepResult]:
-    measurement = load_measurement(bench, name)
+@lru_cache(maxsize=4)
+def _evaluated(file: Path, _changed_ns: int) -> sweep.SweepResult:
+    """A stored response; a person who drags a notch asks for the same one many times a second."""
+    measurement = unpack(file.read_bytes(), file.name)
     if measurement.meta.get("tool") != "sweep":
-        raise BadMeasurement(f"{name} is not a frequency response", value=name)
+        raise BadMeasurement(f"{file.name} is not a frequency response", value=file.name)
     try:
-        found = await asyncio.to_thread(sweep.reevaluate, measurement.arrays, measurement.meta)
+        return sweep.reevaluate(measurement.arrays, measurement.meta)
     except ValueError as error:
-        raise BadMeasurement(f"{name}: {error}", value=name) from error
+        raise BadMeasurement(f"{file.name}: {error}", value=file.name) from error
+
+
+async def _plant(bench: Bench, name: str) -> tuple[MeasuredPlant, sweep.SweepResult]:
+    await asyncio.to_thread(measurement_head, bench, name)
+    file = bench.measurements.path(name)
+    found = await asyncio.to_thread(_evaluated, file, file.stat().st_mtime_ns)
     if found.model is None:
         raise NotAllowed(
             f"{name}: nothing can be designed on it: "

@@ -40,6 +40,20 @@ def load_measurement(bench: Bench, name: str) -> Measurement:
         raise NotFound(error.message, value=name) from error
 
 
+def measurement_head(bench: Bench, name: str) -> Head:
+    """What a stored measurement says of itself.
+
+    Raises:
+        NotFound: there is none of this name. BadMeasurement: not usable.
+    """
+    try:
+        return bench.measurements.head(name)
+    except BadMeasurement:
+        raise
+    except NotAllowed as error:
+        raise NotFound(error.message, value=name) from error
+
+
 def _info(name: str, found: Head) -> MeasurementInfo:
     identity = found.meta.get("identity")
     serial = identity.get("serial") if isinstance(identity, dict) else None

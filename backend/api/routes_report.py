@@ -11,7 +11,7 @@ from fastapi import APIRouter, Response
 from backend.api.context import TheBench, TheMember
 from backend.api.errors import NotFound
 from backend.api.models_report import ReportInfo, ReportRequest
-from backend.api.routes_measurements import change_log, load_measurement
+from backend.api.routes_measurements import change_log, measurement_head
 from backend.bench import Bench, Member
 from backend.measurements import BadMeasurement, Head
 from backend.report.gather import About, belongs, choose, kind_of, live_facts, measured_from
@@ -53,11 +53,11 @@ def _chosen(
     """
     heads: dict[str, Head] = {}
     for name in bench.measurements.names() if asked is None else asked:
-        if asked is not None:
-            load_measurement(bench, name)
         try:
-            head = bench.measurements.head(name)
+            head = measurement_head(bench, name)
         except BadMeasurement:
+            if asked is not None:
+                raise
             continue
         if belongs(head, member.drive):
             heads[name] = head

@@ -9,7 +9,8 @@ export function flat(settings: Record<string, unknown>): [string, string][] {
     if (typeof value === 'object' && !Array.isArray(value)) {
       return flat(value as Record<string, unknown>)
     }
-    return [[name, Array.isArray(value) ? value.join(' … ') : JSON.stringify(value)]]
+    const text = typeof value === 'string' ? value : JSON.stringify(value)
+    return [[name, Array.isArray(value) ? value.join(' … ') : text]]
   })
 }
 

@@ -14,7 +14,7 @@ import type { Limits } from '../response/limits'
 import { asInertia, type Inertia } from '../response/results'
 import { useToolJob } from '../response/useToolJob'
 import { SchemeFields, useScheme } from './schemes'
-import { withInterval } from './steps'
+import { amount, interval } from './steps'
 
 /** Inertia and friction, by moves forth and back. */
 export function InertiaPanel({
@@ -152,7 +152,8 @@ export function InertiaResult({ result }: { result: Inertia }) {
               <tr key={name}>
                 <td>{t(text)}</td>
                 <td className="right">
-                  {withInterval(result[name], result.ci95[name], si ? unit : '')}
+                  {amount(result[name], si ? unit : '')}
+                  <small className="dim interval">{interval(result.ci95[name])}</small>
                 </td>
               </tr>
             ))}

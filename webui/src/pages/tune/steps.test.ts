@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest'
 import type { AxisState, DriveSummary } from '../../api/schema'
-import { engineering, preChecks, ready, stepOf, withInterval } from './steps'
+import { amount, engineering, interval, preChecks, ready, stepOf } from './steps'
 
 const drive = { lease: { holder: null, mine: false }, pending: 0 } as unknown as DriveSummary
 const state = { fresh: true, faults: [], moving_job: null } as unknown as AxisState
@@ -39,8 +39,11 @@ describe('texts', () => {
     expect(engineering(0)).toBe('0')
   })
   it('give the interval beside the value, and nothing for what is not known', () => {
-    expect(withInterval(0.03, [0.029, 0.031], 'N·m')).toBe('0.03 (0.029 … 0.031) N·m')
-    expect(withInterval(2, null, '')).toBe('2')
-    expect(withInterval(null, null, 'N·m')).toBe('—')
+    expect(amount(0.03, 'N·m')).toBe('0.03 N·m')
+    expect(amount(2, '')).toBe('2')
+    expect(amount(null, 'N·m')).toBe('—')
+    expect(interval([0.029, 0.031])).toBe('0.029 … 0.031')
+    expect(interval([null, 2e-4])).toBe('— … 2.00·10⁻⁴')
+    expect(interval(null)).toBe('')
   })
 })

@@ -45,16 +45,14 @@ export function stepOf(step: string): { now: number; of: number } | null {
   return match ? { now: Number(match[1]), of: Number(match[2]) } : null
 }
 
-/** A value with its confidence interval, `1.23e-4 (1.20e-4 … 1.26e-4)`, and its unit. */
-export function withInterval(
-  value: number | null,
-  interval: [number | null, number | null] | null | undefined,
-  unit: string,
-): string {
-  if (value === null) return '—'
-  const text = (each: number | null) => (each === null ? '—' : engineering(each))
-  const spread = interval ? ` (${text(interval[0])} … ${text(interval[1])})` : ''
-  return `${text(value)}${spread}${unit ? ` ${unit}` : ''}`
+/** A value with its unit, `1.23·10⁻⁴ kg·m²`; a dash where there is none. */
+export const amount = (value: number | null, unit: string): string =>
+  value === null ? '—' : `${engineering(value)}${unit ? ` ${unit}` : ''}`
+
+/** A confidence interval, `1.20·10⁻⁴ … 1.26·10⁻⁴`; empty where there is none. */
+export function interval(ends: [number | null, number | null] | null | undefined): string {
+  if (!ends) return ''
+  return ends.map((each) => (each === null ? '—' : engineering(each))).join(' … ')
 }
 
 const SUPERSCRIPT = '⁰¹²³⁴⁵⁶⁷⁸⁹'

@@ -1,0 +1,119 @@
+"""A virtual axis behind EtherCAT with a known resonance, and ways about the pages of tuning.
+
+The segment takes its time from the process data, so a busy test machine changes nothing but the
+time that the tests take.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from backend.demo import DemoBench
+from drivers.virtual.wires.netns import unavailable
+from tests.browser.driving import open_axis
+from tests.support.station import Station
+
+URL = "ethercat://virtual0"
+MOTOR, LOAD, STIFFNESS, COULOMB = 5e-5, 1.5e-4, 60.0, 0.03
+INERTIA = MOTOR + LOAD
+#: Two masses and a spring: the mode of the free chain, and of the load with the motor held.
+RESONANCE_HZ = math.sqrt(STIFFNESS * (1 / MOTOR + 1 / LOAD)) / (2 * math.pi)
+ANTIRESONANCE_HZ = math.sqrt(STIFFNESS / LOAD) / (2 * math.pi)
+BENCH = f"""
+[[axis]]
+name = "Spindle"
+drive = "mms7"
+on = "{URL}"
+station = 1
+[axis.mechanics.motor]
+inertia_kgm2 = {MOTOR}
+rated_torque_nm = 1.27
+rated_speed_rpm = 3000
+[axis.mechanics.friction]
+viscous_nms = 2e-4
+coulomb_nm = {COULOMB}
+[[axis.mechanics.load]]
+inertia_kgm2 = {LOAD}
+stiffness_nm_per_rad = {STIFFNESS}
+damping_nms_per_rad = 2e-3
+"""
+#: A measurement takes seconds of motion; this bounds what a busy computer makes of it.
+MEASURED_MS = 180_000
+
+
+@contextmanager
+def running(folder: Path) -> Iterator[Station]:
+    """The station with its one axis on the bench; the axis is not added yet."""
+    if reason := unavailable():
+        pytest.skip(f"no private network here: {reason}")
+    bench = folder / "bench.toml"
+    bench.write_text(BENCH)
+    station = Station(folder, bench)
+    station.drives = DemoBench(bench, folder / "wires", folder / "nvm", steady=True)
+    station.start()
+    try:
+        yield station
+    finally:
+        station.stop()
+
+
+def keep_exchanging(page: Page, axis: str) -> None:
+    """Start the cyclic exchange by hand, so that measurements need not start it every time."""
+    open_axis(page, axis, "tune")
+    page.get_by_text("Before anything moves").wait_for()
+    started = page.get_by_text("The cyclic exchange runs.")
+    begin = page.get_by_role("button", name="Start", exact=True)
+    expect(started.or_(begin).first).to_be_visible()
+    if not started.is_visible():
+        begin.first.click()
+    expect(started).to_be_visible()
+
+
+def measure(page: Page, what: str) -> None:
+    """Measure a response on the page Response, and wait until it is shown."""
+    page.get_by_label("What to measure").select_option(label=what)
+    page.get_by_role("button", name="Start measuring").click()
+    finished(page)
+    shown = page.locator("li.measured").first.get_by_role("button", name="Show", exact=True)
+    expect(shown).to_have_attribute("aria-pressed", "true")
+    expect(page.locator("li.measured").first).to_contain_text(what)
+    expect(page.get_by_role("img", name=re.compile("^Magnitude, phase"))).to_be_visible()
+
+
+def finished(page: Page) -> None:
+    """The job that was just started has run, and did not fail."""
+    progress = page.locator(".job")
+    expect(progress.first).to_be_visible(timeout=60_000)
+    expect(progress).to_have_count(0, timeout=MEASURED_MS)
+    failed = page.locator(".note.fault")
+    assert failed.count() == 0, failed.all_inner_texts()
+
+
+def number_in(text: str, unit: str) -> float:
+    """The first number before a unit, as the pages write it; powers of ten are raised."""
+    found = re.search(rf"([\d.]+)(?:·10(⁻?[⁰¹²³⁴⁵⁶⁷⁸⁹]+))? {re.escape(unit)}", text)
+    assert found is not None, text
+    power = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+    return float(found[1]) * 10.0 ** int((found[2] or "0").translate(power))
+
+
+def reading(page: Page, name: str) -> str:
+    """The text of a value by its name, in the first list of values that has it."""
+    return page.locator("dl.counters div", has=page.locator("dt", has_text=name)).first.inner_text()
+
+
+def confirm(page: Page, name: str) -> None:
+    """Press a button of the dialogue that is open."""
+    page.get_by_role("dialog").get_by_role("button", name=name, exact=True).click()
+
+
+def row(table: Locator, start: str) -> Locator:
+    """The first row of a table that begins so."""
+    return table.get_by_role("row").filter(has_text=re.compile(f"^{re.escape(start)}")).first
