@@ -1,13 +1,17 @@
 import '@mantine/core/styles.css'
 import './app/style.css'
+import './app/people.css'
 import { StrictMode } from 'react'
 import { createRoot } from 'react-dom/client'
+import { whenUnknown } from './api/client'
 import { App } from './app/App'
+import { checkSession } from './app/session'
 import { listenForEscape } from './app/stop'
 import * as live from './live/live'
 
 listenForEscape()
-live.start()
+whenUnknown(() => void checkSession())
+live.whenRefused(() => void checkSession())
 createRoot(document.getElementById('root') as HTMLElement).render(
   <StrictMode>
     <App />

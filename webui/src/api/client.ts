@@ -13,11 +13,28 @@ export function setConnection(id: string | null): void {
   connection = id
 }
 
+let csrf: string | null = null
+
+/** Proof that a change comes from this page: only it can read this and send it back. */
+export function setCsrf(token: string | null): void {
+  csrf = token
+}
+
+/** Called when the server does not know us any more. */
+let onUnknown: () => void = () => {}
+export function whenUnknown(act: () => void): void {
+  onUnknown = act
+}
+
 export const api = createClient<paths>({ baseUrl: API_ROOT })
 api.use({
   onRequest({ request }) {
     if (connection !== null) request.headers.set('X-Servodeck-Connection', connection)
+    if (csrf !== null) request.headers.set('X-Servodeck-CSRF', csrf)
     return request
+  },
+  onResponse({ response, request }) {
+    if (response.status === 401 && !/\/(session|setup|guests)$/.test(request.url)) onUnknown()
   },
 })
 

@@ -11,6 +11,7 @@ import { IoPage } from '../pages/io/IoPage'
 import { MotionPage } from '../pages/motion/MotionPage'
 import { OverviewPage } from '../pages/overview/OverviewPage'
 import { ParametersPage } from '../pages/parameters/ParametersPage'
+import { PeoplePage } from '../pages/people/PeoplePage'
 import { RerunPage } from '../pages/rerun/RerunPage'
 import { ScenePage } from '../pages/scene/ScenePage'
 import { ResponsePage } from '../pages/response/ResponsePage'
@@ -19,14 +20,17 @@ import { SetupPage } from '../pages/setup/SetupPage'
 import { TunePage } from '../pages/tune/TunePage'
 import { Frame } from './Frame'
 import { isAxisPage, useRoute } from './router'
+import { SessionGate } from './SessionGate'
 import { theme } from './theme'
 
 export function App() {
   return (
     <MantineProvider theme={theme} defaultColorScheme="auto">
-      <Frame>
-        <Page />
-      </Frame>
+      <SessionGate>
+        <Frame>
+          <Page />
+        </Frame>
+      </SessionGate>
     </MantineProvider>
   )
 }
@@ -48,6 +52,7 @@ const BENCH = {
   rerun: RerunPage,
   scene: ScenePage,
   files: FilesPage,
+  people: PeoplePage,
 }
 
 function Page() {

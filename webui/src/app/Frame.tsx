@@ -1,6 +1,6 @@
-import { ActionIcon, Drawer, Menu, NativeSelect, useMantineColorScheme } from '@mantine/core'
+import { ActionIcon, Drawer, NativeSelect } from '@mantine/core'
 import { type ReactNode, useEffect, useState } from 'react'
-import { known, setLanguage, useLanguage, useT } from '../i18n'
+import { known, useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '../live/store'
 import { Icon } from '../widgets/Icon'
@@ -13,7 +13,11 @@ import {
   type Page,
   useRoute,
 } from './router'
+import { LeaseControl, LeaseNotices } from './LeaseControl'
+import { PointerLayer } from './PointerLayer'
+import { Preferences } from './Preferences'
 import { StopButton } from './StopButton'
+import { SupportBar } from './SupportBar'
 import { linkLook, stateLook } from './states'
 import { useCanTune } from './useCanTune'
 import { useHasIo } from './useHasIo'
@@ -50,7 +54,7 @@ export function Frame({ children }: { children: ReactNode }) {
         <div className="top-status">
           <StateBadge />
           <LinkBadge />
-          <ControlBadge />
+          <LeaseControl drive={useChosen()} />
         </div>
         <div className="wide-only">
           <Preferences />
@@ -75,8 +79,11 @@ export function Frame({ children }: { children: ReactNode }) {
       </Drawer>
       <main id="main" tabIndex={-1}>
         <Refused />
+        <LeaseNotices />
+        <SupportBar />
         {children}
       </main>
+      <PointerLayer />
       <nav className="bottom" aria-label={t('frame.pages')}>
         {(['overview', 'parameters', 'motion', 'scope', 'alarms'] as const).map((name) => (
           <PageLink key={name} name={name} short />
@@ -230,71 +237,6 @@ function LinkBadge() {
         )}
       </span>
     </a>
-  )
-}
-
-function ControlBadge() {
-  const t = useT()
-  const drive = useDrive(useChosen())
-  if (!drive) return null
-  const { holder, mine } = drive.lease
-  const words = mine
-    ? t('control.mine')
-    : holder
-      ? t('control.other', { name: holder })
-      : t('control.free')
-  return (
-    <button
-      type="button"
-      className={`badge control ${mine ? 'ready' : holder ? 'warn' : 'plain-badge'}`}
-      disabled={holder !== null && !mine}
-      title={mine ? t('control.give') : t('control.take')}
-      onClick={() => live.send({ type: 'lease', drive: drive.id, take: !mine })}
-    >
-      <Icon name={mine || holder ? 'lock' : 'unlock'} size={16} />
-      <span className="long">{words}</span>
-      <span className="short">
-        {mine ? t('control.short.mine') : (holder ?? t('control.short.free'))}
-      </span>
-    </button>
-  )
-}
-
-function Preferences() {
-  const t = useT()
-  const language = useLanguage()
-  const { colorScheme, setColorScheme } = useMantineColorScheme()
-  return (
-    <Menu position="bottom-end" zIndex={260}>
-      <Menu.Target>
-        <ActionIcon className="preferences" aria-label={t('frame.preferences')}>
-          <Icon name="theme" size={22} />
-        </ActionIcon>
-      </Menu.Target>
-      <Menu.Dropdown>
-        <Menu.Label>{t('frame.scheme')}</Menu.Label>
-        {(['light', 'dark', 'auto'] as const).map((scheme) => (
-          <Menu.Item
-            key={scheme}
-            rightSection={colorScheme === scheme ? <Icon name="check" /> : null}
-            onClick={() => setColorScheme(scheme)}
-          >
-            {t(`scheme.${scheme}`)}
-          </Menu.Item>
-        ))}
-        <Menu.Label>{t('frame.language')}</Menu.Label>
-        {(['en', 'zh'] as const).map((each) => (
-          <Menu.Item
-            key={each}
-            lang={each}
-            rightSection={language === each ? <Icon name="check" /> : null}
-            onClick={() => setLanguage(each)}
-          >
-            {t(`language.${each}`)}
-          </Menu.Item>
-        ))}
-      </Menu.Dropdown>
-    </Menu>
   )
 }
 

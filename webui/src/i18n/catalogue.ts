@@ -4,6 +4,7 @@ import { frame } from './texts/frame'
 import { functions } from './texts/functions'
 import { notListed } from './texts/notlisted'
 import { parameters } from './texts/parameters'
+import { people } from './texts/people'
 import { recordings } from './texts/recordings'
 import { scene } from './texts/scene'
 import { scope } from './texts/scope'
@@ -17,6 +18,7 @@ export const catalogue = {
   ...axis,
   ...functions,
   ...parameters,
+  ...people,
   ...recordings,
   ...notListed,
   ...scene,

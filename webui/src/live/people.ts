@@ -1,10 +1,4 @@
-import type {
-  ChatLine,
-  CursorMoved,
-  LeaseNotice,
-  PeopleHere,
-  PointerMoved,
-} from '../api/schema'
+import type { ChatLine, CursorMoved, LeaseNotice, PeopleHere, PointerMoved } from '../api/schema'
 import { publish, useStore } from './store'
 
 /** People on the station, as the server said last. */

@@ -1,0 +1,52 @@
+import { ActionIcon, Menu, useMantineColorScheme } from '@mantine/core'
+import { setLanguage, useLanguage, useT } from '../i18n'
+import { Icon } from '../widgets/Icon'
+import { leave, useSession } from './session'
+
+/** Appearance, language, and who is logged in. */
+export function Preferences() {
+  const t = useT()
+  const language = useLanguage()
+  const session = useSession()
+  const { colorScheme, setColorScheme } = useMantineColorScheme()
+  return (
+    <Menu position="bottom-end" zIndex={260}>
+      <Menu.Target>
+        <ActionIcon className="preferences" aria-label={t('frame.preferences')}>
+          <Icon name="theme" size={22} />
+        </ActionIcon>
+      </Menu.Target>
+      <Menu.Dropdown>
+        <Menu.Label>{t('frame.scheme')}</Menu.Label>
+        {(['light', 'dark', 'auto'] as const).map((scheme) => (
+          <Menu.Item
+            key={scheme}
+            rightSection={colorScheme === scheme ? <Icon name="check" /> : null}
+            onClick={() => setColorScheme(scheme)}
+          >
+            {t(`scheme.${scheme}`)}
+          </Menu.Item>
+        ))}
+        <Menu.Label>{t('frame.language')}</Menu.Label>
+        {(['en', 'zh'] as const).map((each) => (
+          <Menu.Item
+            key={each}
+            lang={each}
+            rightSection={language === each ? <Icon name="check" /> : null}
+            onClick={() => setLanguage(each)}
+          >
+            {t(`language.${each}`)}
+          </Menu.Item>
+        ))}
+        {session?.login_required && session.person !== null && (
+          <>
+            <Menu.Label>{t('door.in', { name: session.person ?? '' })}</Menu.Label>
+            <Menu.Item leftSection={<Icon name="left" />} onClick={() => void leave()}>
+              {t('door.logOut')}
+            </Menu.Item>
+          </>
+        )}
+      </Menu.Dropdown>
+    </Menu>
+  )
+}
