@@ -154,6 +154,16 @@ class Core:
         )
         self.apply_motion()
 
+    def _own_torque_limits(self) -> tuple[float, float]:
+        """The family's own limits, ‰ of the rated torque."""
+        keys = self.family.traits.torque_limits
+        if keys is None or any(key not in self.profile.by_key for key in keys):
+            return (math.inf, math.inf)
+        first, second = (
+            abs(float(self.profile.by_key[key].to_value(self.number(key)))) * 10 for key in keys
+        )
+        return (first, second)
+
     def _zero_speed(self) -> float:
         """606Fh or the family's own threshold (P04.11 of R6L, P160 of EP3E); 10 rpm without one."""
         key = self.family.traits.zero_speed_key
@@ -174,6 +184,8 @@ class Core:
         per_rad = abs(self.units.position_per_rad)
         window = self.profile.by_role.get("following_error_window")
         following = self.number("6065:00" if window is None else window.key, 2**32 - 1)
+        if window is None and "6065:00" not in self.od.numbered:
+            following = per_rad * 2 * math.pi  # no parameter: a revolution
         in_place = "2501:00" if "2501:00" in self.od.numbered else "6067:00"
         self.axis.apply_windows(
             self.number(in_place) / per_rad,
@@ -183,8 +195,8 @@ class Core:
         )
         self.axis.p[k.P_LIMIT_DEC] = self.deceleration(self.family.traits.stops.quick_ramp_key)
         largest = min(self.number("6072:00", 3000), self.number("6073:00", 3000))
-        sides = (
-            self.torque_of(min(largest, self.number(key, 3000))) for key in ("60E0:00", "60E1:00")
+        positive, negative = (
+            min(self.torque_of(min(largest, self.number(key, 3000), own)), self.torque_cap_nm)
+            for key, own in zip(("60E0:00", "60E1:00"), self._own_torque_limits(), strict=True)
         )
-        positive, negative = (min(side, self.torque_cap_nm) for side in sides)
         self.axis.set_limits(positive, negative, self.max_speed())

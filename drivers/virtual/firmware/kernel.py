@@ -569,7 +569,8 @@ def _supply(p, s, x):  # type: ignore[no-untyped-def]
     current = s[S_TORQUE] / p[P_KT]
     s[S_CURRENT] = current
     copper = 3.0 * p[P_RESISTANCE] * current * current
-    power = s[S_TORQUE] * x[1] + copper
+    # Without the power stage nothing comes to the bus: shorted windings burn the energy themselves.
+    power = s[S_TORQUE] * x[1] + copper if int(p[P_LOOP]) != LOOP_OFF else 0.0
     s[S_UQ] = p[P_RESISTANCE] * current + p[P_KT] * x[1] / 3.0
     volts = s[S_VOLTAGE]
     if volts >= p[P_BRAKE_ON_V]:
@@ -597,7 +598,7 @@ def _supply(p, s, x):  # type: ignore[no-untyped-def]
 def _protect(p, s):  # type: ignore[no-untyped-def]
     faults = 0
     powered = int(p[P_LOOP]) != LOOP_OFF
-    if abs(s[S_CURRENT]) * 1.4142135623730951 > p[P_OCP_A]:
+    if powered and abs(s[S_CURRENT]) * 1.4142135623730951 > p[P_OCP_A]:
         faults |= F_OVER_CURRENT
     if s[S_VOLTAGE] < p[P_UVLO_V]:
         faults |= F_UNDER_VOLTAGE

@@ -254,6 +254,8 @@ class Traits:
     autosave: tuple[Autosave, ...] = ()
     torque_speed_limit_key: str | None = None
     zero_speed_key: str | None = None
+    torque_limits: tuple[str, str] | None = None
+    """The drive's own limits (positive, negative) beside those of CiA 402, in % by their scale."""
     second_gains: GainKeys | None = None
     switching: SwitchKeys | None = None
     compensation: CompensationKeys | None = None

@@ -130,6 +130,13 @@ class Cia402:
                 "2500:00": min(round(turn), 65535), "2501:00": window, "2502:00": 10,
                 "2400:02": 1, "2400:03": 2, "2400:04": 3,
             }  # fmt: skip
+        if self.traits.torque_limits is not None:
+            positive, negative = self.traits.torque_limits
+            for key, percent in ((positive, 300.0), (negative, 300.0)):
+                limit = self._profile.by_key.get(key)
+                if limit is not None:
+                    below = limit.max_raw is not None and limit.max_raw <= 0
+                    fallback[key] = limit.to_raw(-percent if below else percent)
         if self.name == "r6l":
             fallback["2000:16"] = round(1.2 * motor.rated_speed_rad_s / RPM)
         turns_per_s = {"606D:00": 1.0, "606F:00": 1.0, "6099:01": 2.0, "6099:02": 0.25}
@@ -421,8 +428,9 @@ class Cia402:
         if refine is not None:
             base = refine(od, motor, base)
         window = self._profile.by_role.get("following_error_window")
-        size = od.number("6065:00" if window is None else window.key, 2**32 - 1)
-        limited = k.F_FOLLOWING in self.traits.faults and size not in (0, 2**32 - 1)
+        size = od.number("6065:00" if window is None else window.key)
+        unlimited = size in (0, 2**32 - 1) and window is not None
+        limited = k.F_FOLLOWING in self.traits.faults and not unlimited
         wait_s = od.number("6066:00", 0 if window is not None else 100) * _MS
         return replace(base, following_error_s=wait_s if limited else math.inf)
 
