@@ -33,8 +33,10 @@ Done = Callable[[Any, DriveError | None], None]
 class Wire(Protocol):
     """One frame each, station counted from 1."""
 
-    def read(self, station: int, register: int, size: int) -> bytes | None:
-        """Bytes, or None when nobody answered."""
+    def read(
+        self, station: int, register: int, size: int, *, may_be_empty: bool = False
+    ) -> bytes | None:
+        """Bytes; None when nobody answered, or when the frame was lost if it ``may_be_empty``."""
 
     def write(self, station: int, register: int, data: bytes) -> bool:
         """Whether somebody took it."""
@@ -193,7 +195,9 @@ class Lanes:
             return False
         self.frames += 1
         if isinstance(step, Read):
-            job.reply = self._wire.read(lane.station, step.register, step.size)
+            job.reply = self._wire.read(
+                lane.station, step.register, step.size, may_be_empty=step.may_be_empty
+            )
         else:
             taken = self._wire.write(lane.station, step.register, step.data)
             job.reply = b"" if taken else None

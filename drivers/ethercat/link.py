@@ -6,6 +6,7 @@ event. Nothing here blocks: the wire belongs to the other process.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import itertools
 from collections.abc import Callable, Mapping, Sequence
@@ -24,7 +25,7 @@ from drivers.link import Address, Cyclic, Found, LinkEvent, LinkQuality, Progres
 from profiles.schema import LinkKind, Profile
 
 _Item = tuple[int, int, int | None]
-_CHUNK = 32
+_CHUNK, _CHUNKS_AHEAD = 32, 2
 _SCHEME = "ethercat://"
 _OPEN_S, _ANSWER_S, _SCAN_S, _FOE_S = 8.0, 15.0, 60.0, 1800.0
 
@@ -108,12 +109,25 @@ class EthercatLink:
         """Read several; objects of which all subindices are wanted are read at once."""
         items = [(*_object(address), size_of(address.type)) for address in addresses]
         told: dict[_Item, bytes | Message] = {}
-        for chunk in _chunks(items):
-            answers: list[bytes | Message] = await self._call(
-                {"op": "read_many", "station": station, "items": chunk},
-                _ANSWER_S + 1.5 * len(chunk),
-            )
+        chunks = _chunks(items)
+        # One part is under way while the next one waits, so that the drive is never idle; a third
+        # reader comes in between, and a write or a stop before them.
+        ahead = asyncio.Semaphore(_CHUNKS_AHEAD)
+
+        async def ask(chunk: list[_Item]) -> None:
+            async with ahead:
+                answers: list[bytes | Message] = await self._call(
+                    {"op": "read_many", "station": station, "items": chunk},
+                    _ANSWER_S + 1.5 * _CHUNKS_AHEAD * len(chunk),
+                )
             told.update(zip(chunk, answers, strict=True))
+
+        try:
+            async with asyncio.TaskGroup() as group:
+                for chunk in chunks:
+                    group.create_task(ask(chunk))
+        except* DriveError as errors:
+            raise errors.exceptions[0] from None
         self._counts["transactions"] += len(items)
         results: list[bytes | DriveError] = []
         for address, item in zip(addresses, items, strict=True):

@@ -81,7 +81,7 @@ class Operations:
     def use_spare_time(self) -> None:
         """Mailbox frames between two cycles; now and then one although there is no time."""
         loop = self.loop
-        if loop is None:
+        if loop is None or self.segment.pausing():
             return
         done = 0
         while done < _MAX_STEPS_PER_CYCLE and loop.spare_ns() > 0 and self.lanes.step():
@@ -144,13 +144,13 @@ class Operations:
 
     def _read(self, message: Message, done: Done) -> None:
         station = self._calm_station(message)
-        station.require_parameters()
+        self._require_parameters(station)
         steps = coe.upload(station.box, message["index"], message["subindex"])
         self.lanes.submit(station.number, "mailbox", steps, done)
 
     def _read_many(self, message: Message, done: Done) -> None:
         station = self._calm_station(message)
-        station.require_parameters()
+        self._require_parameters(station)
         items = [tuple(item) for item in message["items"]]
         steps = transactions.read_items(station, items, lambda _count: None)
 
@@ -164,7 +164,7 @@ class Operations:
 
     def _write(self, message: Message, done: Done) -> None:
         station = self._calm_station(message)
-        station.require_parameters()
+        self._require_parameters(station)
         index, subindex, data = message["index"], message["subindex"], message["data"]
         if self.roster.exchange.route_write(station.number, index, subindex, data):
             done(None, None)
@@ -179,7 +179,7 @@ class Operations:
 
     def _enumerate(self, message: Message, done: Done) -> None:
         station = self._calm_station(message)
-        station.require_parameters()
+        self._require_parameters(station)
 
         def progress(number: int, total: int) -> None:
             self._progress(message, number / max(total, 1), f"object {number} of {total}")
@@ -296,6 +296,11 @@ class Operations:
         )
         self._loading.add(station.number)
         self.lanes.submit(station.number, "mailbox", steps, ended)
+
+    def _require_parameters(self, station: Station) -> None:
+        """As `Station.require_parameters`, unless it is just being brought up."""
+        if not self.lanes.busy(station.number, "mailbox"):
+            station.require_parameters()
 
     def _calm_station(self, message: Message) -> Station:
         """The station a message is about.

@@ -8,13 +8,15 @@ calls stay in a global queue and are raised by later ones.
 
 And SOEM tells answers apart by an index of four bits alone: when 16 late frames lie in the
 socket, each request is at once answered by one that is 16 frames old, for ever. So late frames
-are thrown away before anything is sent.
+are thrown away before anything is sent, and with many of them still to come nothing is sent.
 """
 
 from __future__ import annotations
 
 import os
+import select
 import socket
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -27,6 +29,7 @@ IO_MAP_BYTES = 4096
 MAX_STATIONS = 199
 _NAME_LIMIT = 15
 _FRAME_TIMEOUT_US = 2000
+_MANY_MISSING, _STALL_S = 8, 0.1
 
 
 class Segment:
@@ -43,6 +46,9 @@ class Segment:
         self.frame_timeout_us = _FRAME_TIMEOUT_US
         self.late_frames = 0
         """Frames that came back after they had been given up."""
+        self._missing = 0
+        self._missing_since = 0.0
+        self._stalled_since = 0.0
         self._ear: socket.socket | None = None
         self._scrap = bytearray(2048)
 
@@ -133,29 +139,81 @@ class Segment:
         try:
             while self._ear.recv_into(self._scrap, 0, socket.MSG_DONTWAIT):
                 self.late_frames += 1
+                self._missing = max(self._missing - 1, 0)
         except BlockingIOError:
             return
         except OSError:
             # The interface went down: whoever sends next is told.
             return
 
-    def read(self, station: int, register: int, size: int) -> bytes | None:
-        """Read a register of a slave, or None when it does not answer."""
+    def gave_up(self) -> None:
+        """A frame did not come back in time: it is lost, or will be taken for a later one's."""
+        self._missing += 1
+        self._missing_since = time.monotonic()
+        if self._missing == _MANY_MISSING:
+            self._stalled_since = self._missing_since
+
+    def stalled(self) -> bool:
+        """Whether so many frames may still come back that the next answer could be a wrong one.
+
+        What has not come within `_STALL_S` never will.
+        """
+        if self._missing < _MANY_MISSING:
+            return False
+        if time.monotonic() - self._missing_since > _STALL_S:
+            self._missing = 0
+            return False
+        return True
+
+    def pausing(self) -> bool:
+        """Whether the segment stands still for a moment: worth waiting before anything is asked."""
+        return self.stalled() and time.monotonic() - self._stalled_since < _STALL_S
+
+    def _ready_to_send(self) -> bool:
+        """Late frames are gone. False when some are still to come and nobody may wait for them."""
         self.discard_late_frames()
+        waits = self.socket_fd is None or os.get_blocking(self.socket_fd)
+        while self.stalled():
+            if not waits or self._ear is None:
+                return False
+            select.select((self._ear,), (), (), _STALL_S)
+            self.discard_late_frames()
+        return True
+
+    def read(
+        self, station: int, register: int, size: int, *, may_be_empty: bool = False
+    ) -> bytes | None:
+        """Read a register of a slave, or None when it does not answer.
+
+        With ``may_be_empty`` None means a lost frame, and ``b""`` that nobody answered it.
+        """
+        if not self._ready_to_send():
+            return None
+        began = time.monotonic()
         try:
             data: bytes = self.slaves[station - 1]._fprd(register, size, self.frame_timeout_us)  # noqa: SLF001 - the only register access pysoem offers
         except pysoem.WkcError:
-            return None
+            return b"" if self._came_back(began) and may_be_empty else None
         return data
 
     def write(self, station: int, register: int, data: bytes) -> bool:
         """Write a register of a slave; False when it does not answer."""
-        self.discard_late_frames()
+        if not self._ready_to_send():
+            return False
+        began = time.monotonic()
         try:
             self.slaves[station - 1]._fpwr(register, data, self.frame_timeout_us)  # noqa: SLF001 - as above
         except pysoem.WkcError:
+            self._came_back(began)
             return False
         return True
+
+    def _came_back(self, began: float) -> bool:
+        """Whether a frame that nobody answered came back; SOEM waits its whole time for others."""
+        back = time.monotonic() - began < self.frame_timeout_us * 1e-6
+        if not back:
+            self.gave_up()
+        return back
 
     def map(self, expected_bytes: int) -> None:
         """Build the IO map from what the drives have mapped. States stay as they are.

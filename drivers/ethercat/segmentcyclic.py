@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from drivers.cia402 import State
-from drivers.errors import LinkLost, NotAllowed, OutOfRange
+from drivers.errors import LinkLost, LinkTimeout, NotAllowed, OutOfRange
 from drivers.ethercat.hostprocess import HostProcess
 from drivers.ethercat.mapping import TARGETS, Entry, Pdo, StationPlan, plan_station
+from drivers.ethercat.playback import Phase
 from drivers.ethercat.protocol import Message
 from drivers.ethercat.recovery import Recovery
 from drivers.ethercat.ring import VALID, RingReader
@@ -22,7 +23,7 @@ from profiles.schema import INTEGER_RANGE, Profile
 
 _ANSWER_S, _CONFIGURE_S, _START_S, _STOP_S = 5.0, 60.0, 25.0, 15.0
 _DRAIN_S = 0.025
-_RENEW_S = 0.05
+_RENEW_S, _PATIENCE = 0.05, 10
 WATCHDOG_MS = 50.0
 """Process-data watchdog in the slaves: with braking well below the 200 ms that are allowed."""
 
@@ -215,17 +216,18 @@ class EthercatCyclic:
         number = await self.play(trajectories)
         stations = {trajectory.station for trajectory in trajectories}
         longest = max(len(trajectory.values) for trajectory in trajectories)
-        deadline = asyncio.get_running_loop().time() + longest * self._cycle_s
+        takes_s = longest * self._cycle_s
         try:
-            while asyncio.get_running_loop().time() < deadline:
-                await asyncio.sleep(_RENEW_S)
-                for station in stations:
-                    await self.renew(station)
-                    self._raise_if_halted(station)
+            async with asyncio.timeout(_PATIENCE * takes_s + _ANSWER_S):
+                await self._until_played(stations, takes_s)
+        except TimeoutError:
+            await self._halt_all(stations)
+            raise LinkTimeout(
+                f"a motion of {takes_s:g} s did not end in {_PATIENCE} times this time",
+                remedy="look at the link quality: the computer skips many cycles",
+            ) from None
         except BaseException:
-            for station in stations:
-                with contextlib.suppress(LinkLost):
-                    await asyncio.shield(self.halt(station))
+            await self._halt_all(stations)
             raise
         return number
 
@@ -293,6 +295,23 @@ class EthercatCyclic:
         self._wanted = False
         self._played.clear()
         await self._recovery.end()
+
+    async def _until_played(self, stations: Iterable[int], takes_s: float) -> None:
+        end = asyncio.get_running_loop().time() + takes_s
+        while asyncio.get_running_loop().time() < end or self._playing(stations):
+            await asyncio.sleep(_RENEW_S)
+            for station in stations:
+                await self.renew(station)
+                self._raise_if_halted(station)
+
+    async def _halt_all(self, stations: Iterable[int]) -> None:
+        for station in stations:
+            with contextlib.suppress(LinkLost):
+                await asyncio.shield(self.halt(station))
+
+    def _playing(self, stations: Iterable[int]) -> bool:
+        """Whether values are still to come: a busy computer plays them later."""
+        return any(self.axis_state(n)[1] == Phase.PLAYING.value for n in stations)
 
     def _raise_if_halted(self, station: int) -> None:
         if reason := self.axis_state(station)[2]:

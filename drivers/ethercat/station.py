@@ -51,6 +51,8 @@ class Station:
     to_prove: dict[int, bytes] = field(default_factory=dict)
     proven: dict[int, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     """Layouts of whole objects that were found equal to single reads, with their lengths."""
+    describes: bool = True
+    """It has the SDO information service, as far as is known."""
     notes: list[str] = field(default_factory=list)
     ports: esc.PortCounters | None = None
     wiring: esc.PortCounters | None = None
@@ -78,16 +80,15 @@ class Station:
         """Its state is one in which a drive answers for parameters.
 
         Raises:
-            LinkLost: it is known to be in INIT or BOOT, with the reason that it gives.
+            LinkLost: it stays in INIT with an error, in its own words.
         """
-        if self.al_state & 0x0F not in (AlState.INIT, AlState.BOOT):
+        if self.al_state != AlState.INIT | ERROR_BIT:
             return
-        told = al_status_text(self.al_code) if self.al_state & ERROR_BIT else None
-        why = f": {told.text} (AL status {self.al_code:#06x})" if told else ""
+        told = al_status_text(self.al_code)
         raise LinkLost(
-            f"station {self.number} is in {state_name(self.al_state)}{why}: no parameter can be"
-            " read or written",
-            remedy=(told.remedy if told else "") or "it may still be starting: try again",
+            f"station {self.number} is in {state_name(self.al_state)}: {told.text} (AL status"
+            f" {self.al_code:#06x}); it answers for no parameter before that is mended",
+            remedy=told.remedy or "switch the drive off and on",
         )
 
 
@@ -332,12 +333,34 @@ def _read_whole(station: Station, index: int, sizes: dict[int, int]) -> Steps[di
         return {}
     proven = station.proven.get(index) == tuple(sorted(sizes.items()))
     parts = coe.split_complete(data, sizes, proven=proven)
+    if parts:
+        return parts
+    parts = coe.split_complete(data, sizes, proven=True)
     if not parts:
-        if coe.split_complete(data, sizes, proven=True):
-            station.to_prove[index] = data
-        else:
-            station.single_only.add(index)
-    return parts
+        station.single_only.add(index)
+    elif (yield from _is_all_there_is(station, index, sizes)):
+        station.proven[index] = tuple(sorted(sizes.items()))
+        return parts
+    else:
+        station.to_prove[index] = data
+    return {}
+
+
+def _is_all_there_is(station: Station, index: int, sizes: dict[int, int]) -> Steps[bool]:
+    """Whether the drive's own dictionary knows no other subindices than these.
+
+    An answer as long as all of them together then holds each of them: one question instead of
+    reading every entry once more.
+    """
+    last = max(sizes)
+    if not station.describes or sorted(sizes) != list(range(1, last + 1)):
+        return False
+    try:
+        info = yield from coe.describe_object(station.box, index)
+    except DriveError:
+        station.describes = False
+        return False
+    return info.max_subindex == last
 
 
 def _prove(station: Station, index: int, sizes: dict[int, int], singles: dict[int, bytes]) -> None:

@@ -93,7 +93,9 @@ class FakeWire:
     def __init__(self) -> None:
         self.log: list[tuple[int, int]] = []
 
-    def read(self, station: int, register: int, size: int) -> bytes | None:
+    def read(
+        self, station: int, register: int, size: int, *, may_be_empty: bool = False
+    ) -> bytes | None:
         self.log.append((station, register))
         return bytes(size)
 

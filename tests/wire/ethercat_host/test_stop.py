@@ -37,8 +37,10 @@ class OneSlave:
         self.ended: list[tuple[str, Any, DriveError | None]] = []
         self.sent: list[tuple[float, bytes]] = []
 
-    def read(self, station: int, register: int, size: int) -> bytes | None:
-        return self.slave._do(Read(register, size))
+    def read(
+        self, station: int, register: int, size: int, *, may_be_empty: bool = False
+    ) -> bytes | None:
+        return self.slave._do(Read(register, size, may_be_empty))
 
     def write(self, station: int, register: int, data: bytes) -> bool:
         if register == OUT:
