@@ -81,7 +81,7 @@ export function IoPage({ drive }: { drive: string }) {
                   drive={drive}
                   terminals={shown}
                   states={functions?.terminals.states ?? []}
-                  onChanged={() => void io.read()}
+                  onChanged={io.read}
                 />
               </Panel>
             )

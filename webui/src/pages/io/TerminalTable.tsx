@@ -34,7 +34,7 @@ export function TerminalTable({
   drive: string
   terminals: TerminalInfo[]
   states: readonly TerminalBits[]
-  onChanged: () => void
+  onChanged: () => Promise<void>
 }) {
   const t = useT()
   const stateOf = useStates(drive, states)
@@ -49,7 +49,8 @@ export function TerminalTable({
         }),
       )
       setReadings(drive, [value])
-      onChanged()
+      // Until the terminals are read anew, no second one can be given the same function unseen.
+      await onChanged()
     })
   const choose = (terminal: TerminalInfo, code: number) => {
     if (terminal.function_key === null) return
