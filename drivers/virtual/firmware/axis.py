@@ -6,6 +6,7 @@ import math
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.settings import (
@@ -371,6 +372,11 @@ class VirtualAxis:
     def torque_nm(self) -> float:
         """Motor torque."""
         return float(self.s[k.S_TORQUE])
+
+    def trace(self) -> npt.NDArray[np.float64]:
+        """The last 4096 torque commands, oldest first, one per 50 µs [Nm]."""
+        ring = self.s[k.S_TRACE : k.S_TRACE + k.TRACE_STEPS]
+        return np.roll(ring, -(int(self.s[k.S_STEP]) % k.TRACE_STEPS))
 
     @property
     def faults(self) -> int:

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from drivers.virtual.device import ABORT_DEVICE_STATE, ABORT_VALUE_RANGE, SdoAbort
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.load_identification import KEYS, LoadIdentification
+from drivers.virtual.firmware.slow_store import SlowStore
 from drivers.virtual.firmware.storage import Storage
 from profiles.schema import Raw
 
@@ -21,14 +23,25 @@ class Commands:
         self._control = control
         self._storage = storage
         self._actions: dict[str, Callable[[], None]] = {
-            "save": storage.save,
+            "save": self._save,
             "restore": self._restore,
             "zero": self._zero_position,
             "clear_history": control.alarms.log.clear,
             "reset": reset,
             "write_settings": self._write_settings,
             "fault_reset": self._reset_fault,
+            "clear_encoder_fault": self._clear_encoder_fault,
+            "identify": self._identify,
         }
+        self.load: LoadIdentification | None = None
+        keys = KEYS.get(core.profile.drive)
+        if keys is not None and keys.ratio in core.profile.by_key:
+            self.load = LoadIdentification(core, keys, self._identification_failed)
+        self.store = (
+            SlowStore(core, self._storing_failed)
+            if core.family.traits.slow_store and "1010:01" in core.od.numbered
+            else None
+        )
 
     def setters(self) -> dict[str, Callable[[Raw], None]]:
         """What reacts to writes, by parameter key."""
@@ -52,11 +65,44 @@ class Commands:
                 last = before
                 raise SdoAbort(ABORT_VALUE_RANGE)
             self._actions[name]()
+            if self.store is not None and self.store.busy:
+                last = 0
+                return  # its value tells of the result
             if self_clearing:
                 last = 0
                 self._core.od.put(key, 0)
 
         return command
+
+    def _save(self) -> None:
+        if self.store is not None:
+            self.store.begin(self._storage.save, self._storage.changed_share())
+        else:
+            self._storage.save()
+
+    def _storing_failed(self) -> None:
+        self._raise("Err68")
+
+    def _raise(self, code: str) -> None:
+        fault = self._control.alarms.find(code)
+        if fault is not None:
+            self._control.raise_alarm(fault)
+
+    def _identify(self) -> None:
+        if self._core.axis.powered or self._control.alarms.active:
+            raise SdoAbort(ABORT_DEVICE_STATE)
+        if self.load is not None:
+            self.load.start()
+
+    def _identification_failed(self) -> None:
+        keys = KEYS.get(self._core.profile.drive)
+        if keys is not None:
+            self._raise(keys.fault)
+
+    def _clear_encoder_fault(self) -> None:
+        """P12.05 of the R6L ends AL.221 and AL.222 (002:1681)."""
+        self._control.alarms.cleared_by_step |= {"AL.221", "AL.222"}
+        self._control.reset_fault()
 
     def _write_settings(self) -> None:
         self._core.od.activate("write_settings")
@@ -65,7 +111,14 @@ class Commands:
     def _restore(self) -> None:
         if self._core.axis.powered:
             raise SdoAbort(ABORT_DEVICE_STATE)
+        if self.store is not None:
+            self.store.begin(self._restore_now, 1.0)
+        else:
+            self._restore_now()
+
+    def _restore_now(self) -> None:
         self._storage.restore()
+        self._control.alarms.cleared_by_step.add("Er.013")  # 000:3883
         self._core.apply_settings()
 
     def _zero_position(self) -> None:

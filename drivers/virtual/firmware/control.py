@@ -140,7 +140,7 @@ class DeviceControl:
         option = 0 if key is None else self._option(key, 0)
         if option == 1:
             self._stop(1, lambda: self._disable(new))
-        elif stops.off is not None:
+        elif stops.off is not None and self._brake_times() is None:
             self._after_stop = lambda: self._disable(new)
             self._finish_now(self._stops.servo_off(stops.off))
         elif stops.waits:

@@ -137,7 +137,7 @@ class Identification:
 
     def _conclude(self, samples: list[tuple[float, float, float]]) -> None:
         core = self._core
-        fit = _regress(samples)
+        fit = regress(samples)
         if fit is None:
             self._status(ERROR)
             return
@@ -154,7 +154,7 @@ class Identification:
         self._status(COMPLETE)
 
 
-def _regress(samples: list[tuple[float, float, float]]) -> tuple[float, float, float] | None:
+def regress(samples: list[tuple[float, float, float]]) -> tuple[float, float, float] | None:
     """Least squares of T = J·a + b·ω + Tc·sign(ω) + Tg; None when the data do not carry it."""
     if len(samples) < 20:
         return None

@@ -99,7 +99,10 @@ P_SIZE = P_NOTCHES + 16
 ) = range(60)  # fmt: skip
 S_NOTCHES = 60
 """Start of the notch states, two per notch."""
-S_SIZE = S_NOTCHES + 8
+S_TRACE = S_NOTCHES + 8
+"""Start of the last TRACE_STEPS torque commands, as a ring by the step counter."""
+TRACE_STEPS = 4096
+S_SIZE = S_TRACE + TRACE_STEPS
 
 Array = npt.NDArray[np.float64]
 
@@ -687,6 +690,7 @@ def run(  # type: ignore[no-untyped-def]
         _supply(p, s, x)
         _measure(p, s, x, random)
         _protect(p, s)
+        s[S_TRACE + int(s[S_STEP]) % TRACE_STEPS] = s[S_TORQUE_COMMAND]
         s[S_STEP] += 1.0
         _monitor(p, s)
         if int(s[S_EVENTS]) & int(p[P_EVENT_MASK]):

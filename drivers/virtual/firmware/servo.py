@@ -8,6 +8,7 @@ from typing import Final
 
 from drivers.virtual.device import (
     ABORT_DEVICE_STATE,
+    ABORT_READ_ONLY,
     ABORT_STORE,
     ABORT_VALUE_RANGE,
     EntryInfo,
@@ -16,6 +17,7 @@ from drivers.virtual.device import (
 )
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.alarms import FaultLog
+from drivers.virtual.firmware.automatic import Automatic
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.commands import Commands
 from drivers.virtual.firmware.control import DeviceControl, Emergency
@@ -143,15 +145,20 @@ class VirtualServo:
     # --- dictionary ------------------------------------------------------------------------
     def read(self, index: int, subindex: int) -> bytes:
         """Value of an object. Raises SdoAbort."""
+        if self._commands.store is not None:
+            self._commands.store.guard()
         return self.od.read(index, subindex)
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
         """Write an object. Raises SdoAbort with nothing changed."""
+        if self._commands.store is not None:
+            self._commands.store.guard()
         self._write_entry(self.od.find(index, subindex), data)
 
     def _write_entry(self, entry: Entry, data: bytes) -> None:
         if entry.parameter.settable == "stopped" and self.axis.powered:
             raise SdoAbort(ABORT_DEVICE_STATE)
+        self._check_protection(entry)
         try:
             self.od.write_entry(entry, data)
             self._storage.autosave(entry)
@@ -159,12 +166,23 @@ class VirtualServo:
             if refused.code == ABORT_STORE:
                 self.control.raise_fault(k.F_MEMORY)
             raise
+        if self._commands.load is not None and entry.key == "6040:00":
+            self._commands.load.stop()  # whoever commands the axis ends its own swings
         if entry.parameter.effective == "stopped" and not self.axis.powered:
             entry.active = entry.value
             self.core.apply_settings()
         if entry.parameter.pdo in ("rx", "rxtx"):
             self.control.modes.on_cyclic()
         self._terminals_changed()
+
+    def _check_protection(self, entry: Entry) -> None:
+        """A parameter that protects the others from being written (P02.21, 000:3248)."""
+        protect = self._family.traits.write_protect
+        if protect is None or not 0x2000 <= (entry.parameter.index or 0) < 0x6000:
+            return
+        open_keys = protect[1].get(int(self.od.number(protect[0])))
+        if open_keys is not None and entry.key not in open_keys:
+            raise SdoAbort(ABORT_READ_ONLY)
 
     def read_register(self, register: int, count: int) -> list[int]:
         """Registers of the profile's table, 32-bit values in its word order."""
@@ -204,6 +222,8 @@ class VirtualServo:
             if key in self.od.numbered:
                 self.od.numbered[key].getter = getter
         commands = Commands(self.core, self.control, self._storage, self._schedule_reset)
+        self._commands = commands
+        self._automatic = Automatic(self.core)
         special: dict[str, Callable[[Raw], None]] = {
             "6040:00": lambda value: self.control.set_control_word(int(value)),
             "6060:00": self._set_mode,
@@ -242,6 +262,7 @@ class VirtualServo:
         return check
 
     def _setting_changed(self, _: Raw) -> None:
+        self._automatic.settings_changed()
         self.core.apply_settings()
         self.control.modes.refresh()
 

@@ -39,6 +39,8 @@ class Storage:
         self._motor = motor
         self._volatile = VOLATILE | set(family.traits.commands)
         self.nvm = Nvm(nvm_path)
+        self.writes = 0
+        """Times that the memory was written since the drive was made; it wears (Er.013)."""
 
     def power_on(self) -> None:
         """Every value as after switching on."""
@@ -57,6 +59,13 @@ class Storage:
             }
         )
         self._od.load(self._family.factory_values(self._mechanics, self._motor))
+
+    def changed_share(self) -> float:
+        """Share of the storable values that differ from what is stored, 0 to 1."""
+        stored = self.nvm.load()
+        entries = [e for e in self._od if e.parameter.access == "rw"]
+        changed = sum(e.value != stored.get(e.key, e.default()) for e in entries)
+        return changed / max(len(entries), 1)
 
     def save(self) -> None:
         """All writable parameters to the NVM. Raises SdoAbort if it cannot be written."""
@@ -88,6 +97,9 @@ class Storage:
                 return
 
     def _store(self, values: dict[str, Raw]) -> None:
+        self.writes += 1
+        if self.writes > self._family.traits.eeprom_writes:
+            raise SdoAbort(ABORT_STORE)
         try:
             self.nvm.save(values)
         except OSError:

@@ -234,7 +234,9 @@ def test_ep3e_saves_by_1010_and_shows_home_in_bit_15(family, tmp_path: Path) -> 
     profile = family_profile("ep3e", parameter("1010:01", "UINT32", 0))
     b = family(profile, None, tmp_path)
     b.set("6081:00", 4321)
+    assert b.get("1010:01") == 1  # 001:1209
     b.set("1010:01", 0x45534554)
+    b.run(10.1)
     assert b.get("1010:01") == 0
     assert family(profile, None, tmp_path).get("6081:00") == 4321
     b.set("607C:00", 500)
@@ -459,6 +461,7 @@ def test_gear_without_a_printed_default_starts_at_one_turn_and_acts_after_power_
     b.set("6092:01", 3600)
     b.set("6091:01", 3)
     b.set("1010:01", 0x45534554)
+    b.run(10.1)
     b.servo.power_cycle()
     assert b.servo.core.units.position_per_rad * TURN == pytest.approx(3600 / 3)
 

@@ -240,6 +240,11 @@ class Traits:
     disabled_bits: int = 0x40
     listed_options_only: bool = False
     acts_with_network: bool = False
+    slow_store: bool = False
+    eeprom_writes: float = math.inf
+    """Writes that the memory bears; own number where the manual warns of wear without one."""
+    write_protect: tuple[str, dict[int, frozenset[str]]] | None = None
+    """A parameter, and what stays writable in the maker's objects for each of its values."""
     communication_fault: int = k.F_WATCHDOG
     faults: dict[int, FaultInfo] = field(default_factory=dict)
     commands: dict[str, dict[int, str]] = field(default_factory=dict)

@@ -57,7 +57,10 @@ M6L = Traits(
     commands={
         "2011:1B": {1: "restore", 2: "save"},
         "2002:17": {1: "clear_history", 2: "restore"},
+        "2009:01": dict.fromkeys(range(1, 0x10000), "identify"),
     },
+    eeprom_writes=1e5,
+    write_protect=("2002:16", {1: frozenset({"2002:16", "2006:02"}), 2: frozenset({"2002:16"})}),
     autosave=(Autosave("2011:19", 1, 0x2000, 0x6FFF),),
     torque_homing=TorqueHoming(
         {-1: (1, False), -2: (-1, False), -3: (-1, True), -4: (1, True)}, "2017:15", "2017:16"
@@ -250,6 +253,7 @@ EP3E = Traits(
     speed_filter=("2013:00", "ms"),
     feed_forward=FeedForward(speed_gain="2015:00", speed_filter="2016:00"),
     acts_with_network=True,
+    slow_store=True,
     torque_limits=("2041:00", "2042:00"),
     disabled_bits=0x60,
     zero_speed_key="20A0:00",

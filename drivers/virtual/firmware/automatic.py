@@ -1,0 +1,157 @@
+"""What a drive sets by itself: gains from a rigidity level, notches from a resonance it hears.
+
+M6-L: P09.06, P09.07 (000:3423), P09.08 and P09.22 (000:3427, 000:3444). R6L: P07.00, P07.01
+(002:11088-11109), P07.11 (002:11168). Neither manual prints its table of levels: the bandwidths
+are those that the MMS7's manual prints for its 32 levels (table 38, 004:3003). How a resonance is
+found is not printed either: here it is the strongest line of the speed error above 80 Hz.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.core import Core
+from profiles.loader import load_profile
+
+_LOWEST_HZ = 80.0
+_PERIOD_S = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class RigidityKeys:
+    """Level and mode, and the gains that they set: (position, speed, integral) per set."""
+
+    mode: str
+    level: str
+    first: tuple[str, str, str]
+    second: tuple[str, str, str]
+    on: tuple[int, ...] = (1, 2)
+
+
+@dataclass(frozen=True, slots=True)
+class NotchKeys:
+    """Mode and the notches that it may set: frequency and width; ``result`` shows a resonance."""
+
+    mode: str
+    notches: tuple[tuple[str, str], ...]
+    off_raw: int
+    width_raw: int
+    count: dict[int, int]
+    restore: int
+    result: str | None = None
+
+
+RIGIDITY: dict[str, RigidityKeys] = {
+    "m6l": RigidityKeys(
+        "2009:07", "2009:08", ("2008:03", "2008:01", "2008:02"), ("2008:07", "2008:05", "2008:06")
+    ),
+    "r6l": RigidityKeys(
+        "2007:01", "2007:02", ("2006:03", "2006:01", "2006:02"), ("2006:06", "2006:04", "2006:05")
+    ),
+}
+NOTCHES: dict[str, NotchKeys] = {
+    "m6l": NotchKeys(
+        "2009:09", (("2009:0F", "2009:10"), ("2009:11", "2009:12")), 0, 100, {1: 1, 2: 2, 3: 0}, 4,
+        result="2009:17",
+    ),
+    "r6l": NotchKeys(
+        "2007:0C", (("2007:13", "2007:14"), ("2007:16", "2007:17")), 4000, 4, {1: 1, 2: 2}, 4
+    ),
+}  # fmt: skip
+
+
+class Automatic:
+    """Watches its two modes; called after settings have changed and by its own timer."""
+
+    def __init__(self, core: Core) -> None:
+        self._core = core
+        self._axis = core.axis
+        self._rigidity = RIGIDITY.get(core.profile.drive)
+        self._notches = NOTCHES.get(core.profile.drive)
+        self._level: tuple[int, int] | None = None
+        known = core.profile.by_key
+        if self._rigidity is not None and self._rigidity.level not in known:
+            self._rigidity = None
+        if self._notches is not None and self._notches.mode in known:
+            core.schedule.after(_PERIOD_S, self._listen)
+
+    def settings_changed(self) -> None:
+        """Take a new rigidity level."""
+        keys = self._rigidity
+        if keys is None:
+            return
+        mode, level = int(self._core.number(keys.mode)), int(self._core.number(keys.level))
+        if (mode, level) == self._level:
+            return
+        self._level = (mode, level)
+        if mode not in keys.on:
+            return
+        position_hz, speed_hz, integral_hz = load_profile("mms7").stiffness[0].rows[level]
+        for gains, factor in ((keys.first, 1.0), (keys.second, 1.2 if mode == 2 else 1.0)):
+            self._put(gains[0], position_hz * factor)
+            self._put(gains[1], speed_hz)
+            self._put_raw(gains[2], 1000 / (2 * math.pi * integral_hz))
+
+    def _put(self, key: str, hertz: float) -> None:
+        unit = self._core.profile.by_key[key].unit
+        self._put_raw(key, hertz if "Hz" in unit else 2 * math.pi * hertz)
+
+    def _put_raw(self, key: str, value: float) -> None:
+        parameter = self._core.profile.by_key[key]
+        low, high = parameter.raw_limits
+        raw = parameter.to_raw(value)
+        self._core.od.put(key, min(max(raw, low or 0), raw if high is None else high))
+
+    # --- resonances ------------------------------------------------------------------------
+    def _listen(self) -> None:
+        keys = self._notches
+        if keys is None:
+            return
+        mode = int(self._core.number(keys.mode))
+        if mode == keys.restore:
+            for frequency, width in keys.notches:
+                self._restore(frequency)
+                self._restore(width)
+            self._core.od.put(keys.mode, 0)
+            self._core.apply_settings()
+        elif mode in keys.count and self._axis.powered:
+            found = self._resonance_hz()
+            if found is not None:
+                self._hear(keys, found, keys.count[mode])
+        self._core.schedule.after(_PERIOD_S, self._listen)
+
+    def _restore(self, key: str) -> None:
+        default = self._core.profile.by_key[key].default_raw
+        if isinstance(default, int):
+            self._core.od.put(key, default)
+
+    def _hear(self, keys: NotchKeys, hertz: float, places: int) -> None:
+        if keys.result is not None:
+            self._core.od.put(keys.result, round(hertz))
+        free = [
+            pair
+            for pair in keys.notches[:places]
+            if abs(self._core.number(pair[0]) - keys.off_raw) < 1
+        ]
+        if free:
+            frequency, width = free[0]
+            self._core.od.put(frequency, round(hertz))
+            self._core.od.put(width, keys.width_raw)
+            self._core.apply_settings()
+
+    def _resonance_hz(self) -> float | None:
+        """The strongest line of the torque command, if it stands far above the rest."""
+        trace = self._axis.trace()
+        window = np.hanning(trace.size)
+        spectrum = np.abs(np.fft.rfft((trace - trace.mean()) * window))
+        hertz = np.fft.rfftfreq(trace.size, k.STEP_S)
+        band = (hertz > _LOWEST_HZ) & (hertz < 4000)
+        place = int(np.argmax(np.where(band, spectrum, 0.0)))
+        amplitude = 2 * spectrum[place] / window.sum()
+        strong = amplitude > 0.05 * self._core.motor.rated_torque_nm
+        alone = spectrum[place] > 10 * np.median(spectrum[band])
+        return float(hertz[place]) if strong and alone else None

@@ -1,0 +1,183 @@
+"""The load inertia that a drive measures by itself: by swings of its own, or while it works.
+
+Offline: P09.00 to P09.04 of the M6-L (000:3417-3421), P07.05 to P07.09 with 200Ch:0Ch of the R6L
+(002:11121-11161, 002:11919). Online: P09.05 of the M6-L (000:3422). The inertia is measured, not
+known: the regression of torque on acceleration, speed and the direction of motion gives it. What
+value starts it is not printed in either manual; any but 0 does here, and 0 stops it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+
+from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.families.base import RPM
+from drivers.virtual.firmware.identification import regress
+from drivers.virtual.firmware.schedule import Timer
+
+_SAMPLE_S = 0.002
+_SWINGS = 3
+Sample = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class LoadKeys:
+    """Parameters: top speed [rpm], time to it [ms], pause [ms], the ratio; and the online mode.
+
+    ``ratio_per_one`` is the engineering value of the ratio parameter for a load like the rotor.
+    """
+
+    speed: str
+    ramp: str
+    pause: str
+    ratio: str
+    ratio_per_one: float
+    command: str
+    revolutions: str | None = None
+    online: str | None = None
+    fault: str = ""
+
+
+KEYS: dict[str, LoadKeys] = {
+    "m6l": LoadKeys(
+        "2009:02", "2009:03", "2009:05", "2009:27", 1.0, "2009:01",
+        revolutions="2009:04", online="2009:06", fault="Er.018",
+    ),
+    "r6l": LoadKeys(
+        "2007:07", "2007:08", "2007:09", "2006:0D", 100.0, "200C:0C",
+        revolutions="2007:0A", fault="AL.273",
+    ),
+}  # fmt: skip
+
+
+class LoadIdentification:
+    """Runs one identification at a time; ``active`` while the axis swings."""
+
+    def __init__(self, core: Core, keys: LoadKeys, failed: Callable[[], None]) -> None:
+        self._core = core
+        self._axis = core.axis
+        self._keys = keys
+        self._failed = failed
+        self._script: Generator[float, None, None] | None = None
+        self._timer: Timer | None = None
+        self._samples: list[Sample] = []
+        self._before: tuple[float, float] | None = None
+        self._online = core.schedule.after(_SAMPLE_S, self._watch) if keys.online else None
+        self._show_revolutions()
+
+    @property
+    def active(self) -> bool:
+        """True while swinging."""
+        return self._script is not None
+
+    def start(self) -> None:
+        """Begin swinging; the axis must be free to turn by what the drive tells."""
+        if self.active:
+            return
+        self._samples = []
+        self._script = self._run()
+        self._resume()
+
+    def stop(self) -> None:
+        """End without a result."""
+        if self._script is not None:
+            self._script.close()
+            self._script = None
+            self._axis.power_off()
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _resume(self) -> None:
+        if self._script is None:
+            return
+        try:
+            wait_s = next(self._script)
+        except StopIteration:
+            self._script = None
+            self._timer = None
+        else:
+            self._timer = self._core.schedule.after(wait_s, self._resume)
+
+    def _value(self, key: str) -> float:
+        return float(self._core.profile.by_key[key].to_value(self._core.number(key)))
+
+    def _show_revolutions(self) -> None:
+        """How far each swing goes, up and down the ramp: P09.03, P07.09."""
+        key = self._keys.revolutions
+        if key is None or key not in self._core.profile.by_key:
+            return
+        turns = self._value(self._keys.speed) / 60 * self._value(self._keys.ramp) * 1e-3
+        self._core.od.put(key, self._core.profile.by_key[key].to_raw(turns))
+
+    def _run(self) -> Generator[float, None, None]:
+        axis, keys = self._axis, self._keys
+        self._show_revolutions()
+        speed = self._value(keys.speed) * RPM
+        ramp = speed / (self._value(keys.ramp) * 1e-3)
+        axis.hold()
+        yield 0.05
+        for _ in range(_SWINGS):
+            for direction in (1.0, -1.0):
+                axis.run_velocity(direction * speed, ramp, ramp)
+                yield from self._collect(speed / ramp)
+                axis.run_velocity(0.0, ramp, ramp)
+                yield from self._collect(speed / ramp)
+                yield self._value(keys.pause) * 1e-3
+        axis.power_off()
+        self._conclude()
+
+    def _collect(self, seconds: float) -> Generator[float, None, None]:
+        self._before = None
+        for _ in range(max(2, round(seconds / _SAMPLE_S))):
+            self._sample()
+            yield _SAMPLE_S
+
+    def _sample(self) -> None:
+        speed, now = self._axis.speed_rad_s, float(self._axis.s[k.S_STEP]) * k.STEP_S
+        if self._before is not None and now > self._before[1]:
+            rate = (speed - self._before[0]) / (now - self._before[1])
+            mean = (speed + self._before[0]) / 2
+            if abs(mean) > 2.0 and speed * self._before[0] > 0:
+                self._samples.append((self._axis.torque_nm, rate, mean))
+        self._before = (speed, now)
+
+    def _conclude(self) -> None:
+        inertia = self._inertia()
+        if inertia is None:
+            self._failed()
+        else:
+            self._take(inertia, 1.0)
+
+    def _inertia(self) -> float | None:
+        if len(self._samples) < 20:
+            return None
+        fit = regress(self._samples)
+        return None if fit is None else fit[0]
+
+    def _take(self, inertia: float, share: float) -> None:
+        """Move the ratio by this share of the way."""
+        parameter = self._core.profile.by_key[self._keys.ratio]
+        rotor = self._core.motor.rotor_inertia_kgm2
+        measured = max(0.0, inertia / rotor - 1.0) * self._keys.ratio_per_one
+        before = self._value(self._keys.ratio)
+        raw = parameter.to_raw(before + share * (measured - before))
+        low, high = parameter.raw_limits
+        self._core.od.put(self._keys.ratio, min(max(raw, low or 0), high or raw))
+        self._core.apply_settings()
+
+    def _watch(self) -> None:
+        """Online: look at the motion that others command, and adapt every half second of it."""
+        mode = int(self._core.number(self._keys.online or ""))
+        share = {1: 0.05, 2: 0.2, 3: 0.5}.get(mode, 0.0)
+        if share and self._axis.powered and not self.active:
+            self._sample()
+            if len(self._samples) >= 250:
+                rates = [abs(sample[1]) for sample in self._samples]
+                inertia = self._inertia() if max(rates) > 200.0 else None
+                if inertia is not None:
+                    self._take(inertia, share)
+                self._samples = []
+        self._core.schedule.after(_SAMPLE_S if share else 0.1, self._watch)
