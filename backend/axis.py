@@ -41,6 +41,8 @@ class Axis(PowerState):
         super().__init__(drive)
         self._units: AxisUnits | None = None
         self._unit_raws: dict[str, Raw | None] = {}
+        #: A person enabled it by a transition, and nobody took that back here.
+        self._left_enabled = False
         drive.listen(self._units_may_have_changed)
 
     async def units(self) -> AxisUnits:
@@ -90,7 +92,29 @@ class Axis(PowerState):
             await self.set_mode(mode)
         if goal is State.OPERATION_ENABLED and aims:
             await self.aim_here()
+        # Noted before the word goes out: whatever happens on the way, it may be enabled then.
+        self._left_enabled = goal is State.OPERATION_ENABLED
         await self.go_to(goal)
+
+    async def let_go(self) -> None:
+        """Take the power off an axis that a person enabled here and left enabled.
+
+        For when nobody looks after it any more: the server ends, or the axis leaves the bench.
+
+        Raises:
+            DriveError: the drive does not take it.
+        """
+        if not self._left_enabled:
+            return
+        self._left_enabled = False
+        if await self.state() is State.OPERATION_ENABLED:
+            await shielded(self._power_off, CLEANUP_TIMEOUT_S, self.drive.name)
+
+    async def _power_off(self) -> None:
+        if not await self.standstill(0.5):
+            await self.quick_stop()
+            await self._require_rest(CLEANUP_TIMEOUT_S / 2)
+        await self.go_to(State.SWITCH_ON_DISABLED)
 
     async def halt_and_wait(self, timeout_s: float) -> None:
         """Halt (bit 8) and wait for standstill; quick stop if the axis does not slow down.

@@ -335,6 +335,7 @@ class Bench:
         """
         member = self.member(drive_id)
         self.require_idle(member)
+        await self._let_go(member)
         for url, session in list(self.sessions.items()):
             if member.drive in session.drives:
                 await self.stop_cyclic(url)
@@ -342,6 +343,13 @@ class Bench:
         await member.monitor.close()
         self._save()
         self._drives_changed()
+
+    async def _let_go(self, member: Member) -> None:
+        try:
+            await member.axis.let_go()
+        except DriveError as error:
+            text = f"{member.drive.name} may still be enabled: {error.message}"
+            self.journal.add(text, level="error", drive=member.drive.id)
 
     def rename(self, drive_id: str, name: str | None, notes: str | None) -> Member:
         """Change name or notes; None leaves them."""
@@ -519,6 +527,7 @@ class Bench:
     async def close(self) -> None:
         """Stop what moves, then let go of every bus."""
         await self.jobs.close()
+        await asyncio.gather(*(self._let_go(member) for member in self.members.values()))
         await self.scope.close()
         for url in list(self.sessions):
             with contextlib.suppress(DriveError):

@@ -135,3 +135,27 @@ def test_ended_server_stops_the_axis_first(drives: DemoBench, tmp_path: Path) ->
     server.end()
     seen = asyncio.run(positions(url, 0.3))
     assert abs(seen[-1][1] - seen[0][1]) < 65536 * 0.002
+
+
+@pytest.mark.parametrize("how", ["server ends", "axis leaves the bench"])
+def test_an_axis_left_enabled_loses_its_power(drives: DemoBench, tmp_path: Path, how: str) -> None:
+    """Nobody looks after it any more (DS402 status: not Operation enabled, 6041h bit 2)."""
+    url = drives.addresses["mlink://virtual0"]
+    server = ServerProcess(tmp_path / "state")
+    x = add_drive(server, url)
+    body = {"goal": "Operation enabled", "mode": 1}
+    server.http.post(f"/drives/{x}/transition", json=body).raise_for_status()
+    assert server.http.get(f"/drives/{x}/state").json()["state"] == "Operation enabled"
+    if how == "axis leaves the bench":
+        server.http.delete(f"/drives/{x}").raise_for_status()
+    server.end()
+    assert not asyncio.run(status_word(url)) & 1 << 2
+
+
+async def status_word(url: str) -> int:
+    link = link_for(url)
+    await link.open()
+    try:
+        return int.from_bytes(await link.read(1, Address(0x6041, 0, "UINT16")), "little")
+    finally:
+        await link.close()
