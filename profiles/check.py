@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from profiles.schema import INTEGER_RANGE, Parameter, Profile
+from profiles.schema import INTEGER_RANGE, Chapter, Fault, HomingMethod, Parameter, Profile
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +33,53 @@ def check(profile: Profile) -> list[Finding]:
     findings += [Finding(code, "fault code given twice") for code, n in codes.items() if n > 1]
     methods = Counter(method.method for method in profile.homing_methods)
     findings += [Finding(f"homing {m}", "given twice") for m, n in methods.items() if n > 1]
+    return findings + _check_chapters(profile)
+
+
+def _check_chapters(profile: Profile) -> list[Finding]:
+    """No line of the manual outside a chapter, and none without records unless it says why."""
+    findings: list[Finding] = []
+    expected = 1
+    for chapter in profile.manual_chapters:
+        if chapter.first_line != expected:
+            findings.append(Finding(chapter.title, f"should begin at line {expected}"))
+        expected = chapter.last_line + 1
+        if not sum(counts_of(profile, chapter).values()) and not chapter.empty:
+            findings.append(Finding(chapter.title, "nothing was taken from it, without a reason"))
+    if not profile.manual_chapters and not profile.partial and profile.manual.isdigit():
+        findings.append(Finding(profile.drive, "the chapters of its manual are not listed"))
     return findings
+
+
+def counts_of(profile: Profile, chapter: Chapter) -> dict[str, int]:
+    """How many records of each kind name a line of this chapter, their notes included."""
+    lines = range(chapter.first_line, chapter.last_line + 1)
+
+    def inside(*texts: str) -> bool:
+        return any(
+            int(line) in lines
+            for text in texts
+            for line in re.findall(rf"{profile.manual}:(\d+)", text)
+        )
+
+    def of(records: Iterable[Parameter | Fault | HomingMethod]) -> int:
+        return sum(inside(r.source, r.notes, *getattr(r, "also_printed", ())) for r in records)
+
+    pdo = () if profile.pdo is None else (profile.pdo, *profile.pdo.sets)
+    others = (
+        profile.identity, profile.units, *profile.links, *(link.watchdog for link in profile.links),
+        *profile.procedures, *profile.terminals, *profile.quirks, *profile.conflicts, *pdo,
+        *profile.stiffness,
+    )  # fmt: skip
+    found = {
+        "parameters": of(profile.parameters),
+        "faults": of(profile.faults),
+        "homing methods": of(profile.homing_methods),
+        "other records": sum(
+            inside(getattr(record, "source", ""), getattr(record, "notes", "")) for record in others
+        ),
+    }
+    return {name: number for name, number in found.items() if number}
 
 
 def _check_parameter(profile: Profile, p: Parameter) -> list[Finding]:
@@ -73,7 +121,14 @@ def _check_number(p: Parameter) -> list[Finding]:
 
 def coverage(profile: Profile) -> list[str]:
     """A line per chapter of the manual: what of it is in the profile."""
-    lines = [f"{chapter}: {text}" for chapter, text in profile.chapters.items()]
+    lines = [_chapter_line(profile, chapter) for chapter in profile.manual_chapters]
+    lines += [f"{chapter}: {text}" for chapter, text in profile.chapters.items()]
     groups = Counter(p.group for p in profile.parameters)
     lines += [f"group {group}: {count} parameters" for group, count in groups.items()]
     return lines
+
+
+def _chapter_line(profile: Profile, chapter: Chapter) -> str:
+    counts = ", ".join(f"{n} {name}" for name, n in counts_of(profile, chapter).items())
+    place = f"lines {chapter.first_line}-{chapter.last_line}"
+    return f"{chapter.title} ({place}): {counts or 'no records'}. {chapter.taken}"

@@ -459,6 +459,16 @@ class Conflict(Frozen):
     source: str
 
 
+class Chapter(Frozen):
+    """A chapter of the manual by its lines, so that the check can count what was taken from it."""
+
+    title: str
+    first_line: int = Field(ge=1)
+    last_line: int = Field(ge=1)
+    taken: str = Field(description="what of it is in the profile, or why nothing is")
+    empty: bool = Field(default=False, description="nothing of it belongs into a profile")
+
+
 class Profile(Frozen):
     """Everything that is known about a drive family."""
 
@@ -483,6 +493,9 @@ class Profile(Frozen):
     quirks: tuple[Quirk, ...] = ()
     functions: Functions = Functions()
     conflicts: tuple[Conflict, ...] = ()
+    manual_chapters: tuple[Chapter, ...] = Field(
+        default=(), description="the whole manual, chapter behind chapter, without a gap"
+    )
     chapters: dict[str, str] = Field(
         default_factory=dict,
         description="manual chapter to what of it is in the profile, for the coverage report",
