@@ -4,6 +4,7 @@ import { useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useDrives, useLink } from '../live/store'
 import { AlarmsPage } from '../pages/alarms/AlarmsPage'
+import { AuditPage } from '../pages/audit/AuditPage'
 import { ConnectPage } from '../pages/connect/ConnectPage'
 import { FilesPage } from '../pages/files/FilesPage'
 import { GainsPage } from '../pages/gains/GainsPage'
@@ -52,6 +53,7 @@ const BENCH = {
   rerun: RerunPage,
   scene: ScenePage,
   files: FilesPage,
+  audit: AuditPage,
   people: PeoplePage,
 }
 

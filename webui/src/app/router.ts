@@ -11,7 +11,15 @@ export const AXIS_PAGES = [
   'io',
   'alarms',
 ] as const
-export const BENCH_PAGES = ['connect', 'scope', 'rerun', 'scene', 'files', 'people'] as const
+export const BENCH_PAGES = [
+  'connect',
+  'scope',
+  'rerun',
+  'scene',
+  'files',
+  'audit',
+  'people',
+] as const
 export type AxisPage = (typeof AXIS_PAGES)[number]
 export type BenchPage = (typeof BENCH_PAGES)[number]
 export type Page = AxisPage | BenchPage

@@ -2,6 +2,7 @@ import { axis } from './texts/axis'
 import { bench } from './texts/bench'
 import { frame } from './texts/frame'
 import { functions } from './texts/functions'
+import { library } from './texts/library'
 import { notListed } from './texts/notlisted'
 import { parameters } from './texts/parameters'
 import { people } from './texts/people'
@@ -20,6 +21,7 @@ export const catalogue = {
   ...parameters,
   ...people,
   ...recordings,
+  ...library,
   ...notListed,
   ...scene,
   ...scope,

@@ -190,7 +190,7 @@ export const bench = {
     'Encoder offset, station address and the like. Only for a backup of this very axis.',
     '编码器偏置、站号等。仅用于备份本轴。',
   ],
-  'sets.overwrite': ['Replace a file of this name', '覆盖同名文件'],
+  'sets.overwrite': ['Where the name exists: save as a new version of it', '若同名则保存为新版本'],
   'sets.upload': ['Upload a file', '上传文件'],
   'sets.exportAs': ['{name} as {format}', '将 {name} 导出为 {format}'],
   'sets.listRead': [

@@ -1,12 +1,12 @@
 import { useCallback, useEffect, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
-import type { Problem, SetFileInfo } from '../../api/schema'
+import type { Problem, StoredSet } from '../../api/schema'
 import { useLink } from '../../live/store'
 
 /** Stored parameter sets, newest first. */
 export function useSets() {
   const { open } = useLink()
-  const [sets, setSets] = useState<SetFileInfo[]>([])
+  const [sets, setSets] = useState<StoredSet[]>([])
   const [problem, setProblem] = useState<Problem | null>(null)
   const refresh = useCallback(async () => {
     try {

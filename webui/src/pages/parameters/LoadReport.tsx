@@ -26,13 +26,15 @@ export function LoadReport({
   onDone,
 }: {
   drive: DriveSummary
-  diff: Diff
+  /** Of which set, and whether it is this drive's. */
+  diff: Pick<Diff, 'file' | 'same_profile' | 'same_serial'> & { version?: number | null }
   keys: string[]
   onDone: () => void
 }) {
   const t = useT()
   const [open, setOpen] = useState(false)
   const [accept, setAccept] = useState(false)
+  const [sameMotor, setSameMotor] = useState(false)
   const [id, setId] = useState<string | null>(null)
   const job = useJob(id)
   const load = useAction()
@@ -42,7 +44,13 @@ export function LoadReport({
       const begun = await ask(
         api.POST('/api/v1/drives/{drive_id}/jobs/load_set', {
           params: { path: { drive_id: drive.id } },
-          body: { file: diff.file, keys, accept_other_identity: accept },
+          body: {
+            file: diff.file,
+            version: diff.version ?? null,
+            keys,
+            accept_other_identity: accept,
+            accept_motor_individual: accept && sameMotor,
+          },
         }),
       )
       setJob(begun)
@@ -53,6 +61,7 @@ export function LoadReport({
     setOpen(false)
     setId(null)
     setAccept(false)
+    setSameMotor(false)
   }
   return (
     <>
@@ -69,11 +78,19 @@ export function LoadReport({
             <>
               <p>{t('load.text', { count: keys.length, name: drive.name })}</p>
               {diff.same_serial === false && (
-                <Checkbox
-                  label={t('load.otherDrive')}
-                  checked={accept}
-                  onChange={(event) => setAccept(event.currentTarget.checked)}
-                />
+                <>
+                  <Checkbox
+                    label={t('load.otherDrive')}
+                    checked={accept}
+                    onChange={(event) => setAccept(event.currentTarget.checked)}
+                  />
+                  <Checkbox
+                    label={t('load.sameMotor')}
+                    disabled={!accept}
+                    checked={accept && sameMotor}
+                    onChange={(event) => setSameMotor(event.currentTarget.checked)}
+                  />
+                </>
               )}
               <ProblemNote problem={load.problem} />
               <div className="row end">

@@ -1,0 +1,55 @@
+import { Button, TextInput } from '@mantine/core'
+import { useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { AuditVerdict } from '../../api/schema'
+import { useT } from '../../i18n'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+
+const ANCHOR = /^(\d{1,18}:[0-9a-f]{64})?$/
+
+/** Checks that nothing was changed, and that an entry noted earlier is still in the chain. */
+export function ChainCheck() {
+  const t = useT()
+  const act = useAction()
+  const [anchor, setAnchor] = useState('')
+  const [verdict, setVerdict] = useState<AuditVerdict | null>(null)
+  const good = ANCHOR.test(anchor.trim())
+  const check = () =>
+    act.run(async () => {
+      setVerdict(null)
+      const query = { anchor: anchor.trim() }
+      setVerdict(await ask(api.GET('/api/v1/audit/verify', { params: { query } })))
+    })
+  return (
+    <Panel title={t('audit.check')}>
+      <div className="row wrap end">
+        <TextInput
+          className="grow"
+          label={t('audit.anchor')}
+          value={anchor}
+          error={good ? null : t('audit.anchorBad')}
+          onChange={(event) => setAnchor(event.currentTarget.value)}
+        />
+        <Button loading={act.busy} disabled={!good} onClick={() => void check()}>
+          {t('audit.check')}
+        </Button>
+      </div>
+      <ProblemNote problem={act.problem} onClose={act.clear} />
+      {verdict?.ok && (
+        <div className="note info" role="status">
+          <p>{t('audit.whole', { count: verdict.entries })}</p>
+          <p className="mono anchor">{verdict.head}</p>
+        </div>
+      )}
+      {verdict && !verdict.ok && (
+        <div className="note fault" role="alert">
+          <p>
+            <strong>{t('audit.broken', { number: verdict.broken ?? 0 })}</strong> {verdict.why}
+          </p>
+        </div>
+      )}
+    </Panel>
+  )
+}

@@ -1,0 +1,48 @@
+import { useCallback, useEffect, useRef, useState } from 'react'
+import { api, ask, problemOf } from '../../api/client'
+import type { AuditEvent, AuditNames, AuditStatus, Problem } from '../../api/schema'
+import { useLink } from '../../live/store'
+import { type AuditFilters, auditQuery } from './filters'
+
+/** Entries that fit, newest first; `older` adds the ones before them. */
+export function useAudit(filters: AuditFilters) {
+  const { open } = useLink()
+  const [events, setEvents] = useState<AuditEvent[] | null>(null)
+  const [next, setNext] = useState<number | null>(null)
+  const [names, setNames] = useState<AuditNames | null>(null)
+  const [status, setStatus] = useState<AuditStatus | null>(null)
+  const [problem, setProblem] = useState<Problem | null>(null)
+  const key = JSON.stringify(filters)
+  const asked = useRef(key)
+  asked.current = key
+  const load = useCallback(
+    async (before: number | null) => {
+      const query = { ...auditQuery(JSON.parse(key) as AuditFilters), before }
+      try {
+        setStatus(await ask(api.GET('/api/v1/audit/status')))
+        const page = await ask(api.GET('/api/v1/audit', { params: { query } }))
+        if (asked.current !== key) return // another filter was chosen meanwhile
+        setEvents((known) => (before === null ? page.events : [...(known ?? []), ...page.events]))
+        setNext(page.next ?? null)
+        if (before === null) setNames(await ask(api.GET('/api/v1/audit/names')))
+        setProblem(null)
+      } catch (error) {
+        setProblem(problemOf(error))
+      }
+    },
+    [key],
+  )
+  useEffect(() => {
+    if (!open) return
+    const timer = setTimeout(() => void load(null), 150)
+    return () => clearTimeout(timer)
+  }, [open, load])
+  return {
+    events,
+    names,
+    status,
+    problem,
+    refresh: () => void load(null),
+    older: next === null ? null : () => void load(next),
+  }
+}

@@ -1,0 +1,162 @@
+import { ActionIcon, Button } from '@mantine/core'
+import { useState } from 'react'
+import { API_ROOT, api, ask } from '../../api/client'
+import type { LibraryEntry } from '../../api/schema'
+import { type T, useT } from '../../i18n'
+import { dateTime, duration } from '../../widgets/format'
+import { Icon } from '../../widgets/Icon'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { size } from '../rerun/viewer'
+import { DeleteEntry } from './DeleteEntry'
+import { EntryDetails } from './EntryDetails'
+import { listUrl } from './sets'
+
+export function contentUrl(entry: LibraryEntry, version?: number): string {
+  const query = version === undefined ? '' : `?version=${version}`
+  return `${API_ROOT}/api/v1/library/${entry.id}/content${query}`
+}
+
+/** What an entry is, in one line. */
+export function factsOf(t: T, entry: LibraryEntry): string {
+  const { latest } = entry
+  const fact = (name: string) => latest.facts[name]
+  const seconds = fact('duration_s')
+  return [
+    latest.axis.name,
+    latest.axis.profile,
+    latest.axis.serial !== null && `${t('identity.serial')} ${latest.axis.serial}`,
+    latest.axis.firmware && `${t('identity.firmware')} ${latest.axis.firmware}`,
+    fact('parameters') !== undefined &&
+      t('library.parameters', { count: String(fact('parameters')) }),
+    fact('channels') !== undefined && t('library.channels', { count: String(fact('channels')) }),
+    typeof seconds === 'number' && duration(seconds),
+    fact('measurement'),
+    size(latest.bytes),
+    dateTime(latest.saved),
+    latest.author,
+    entry.station && !entry.here && t('library.elsewhere', { station: entry.station }),
+  ]
+    .filter(Boolean)
+    .join(' · ')
+}
+
+/** One entry of the library. */
+export function LibraryRow({
+  entry,
+  onCompare,
+  onChanged,
+}: {
+  entry: LibraryEntry
+  onCompare: (entry: LibraryEntry, version?: number) => void
+  onChanged: () => void
+}) {
+  const t = useT()
+  const act = useAction()
+  const [deleting, setDeleting] = useState(false)
+  const problem = entry.latest.facts.problem
+  const { name } = entry
+  const takeBack = () =>
+    act
+      .run(() =>
+        ask(
+          api.PATCH('/api/v1/library/{entry_id}', {
+            params: { path: { entry_id: entry.id } },
+            body: { deleted: false },
+          }),
+        ),
+      )
+      .then(onChanged)
+  return (
+    <article className="set library-row" aria-label={name}>
+      <div className="library-head">
+        <div className="grow">
+          <p className="library-name">
+            <span className="library-kind">{t(`library.kind.${entry.kind}`)}</span>
+            <strong>{name}</strong>
+            {entry.versions > 1 && (
+              <span className="mark quiet">
+                {t('library.version', { number: entry.latest.number })}
+              </span>
+            )}
+            {entry.tags.map((tag) => (
+              <span className="library-tag" key={tag}>
+                {tag}
+              </span>
+            ))}
+          </p>
+          <p className="dim">{factsOf(t, entry)}</p>
+          {typeof problem === 'string' && <p className="warn-text">{problem}</p>}
+          {[entry.latest.notes, entry.notes].filter(Boolean).map((notes) => (
+            <p className="notes" key={notes}>
+              {notes}
+            </p>
+          ))}
+        </div>
+        <div className="library-tools">
+          {entry.deleted !== null ? (
+            <Button
+              loading={act.busy}
+              aria-label={t('library.takeBackNamed', { name })}
+              onClick={() => void takeBack()}
+            >
+              {t('library.takeBack')}
+            </Button>
+          ) : (
+            <>
+              {entry.kind === 'set' && (
+                <Button
+                  aria-label={t('library.compareNamed', { name })}
+                  onClick={() => onCompare(entry)}
+                >
+                  {t('library.compare')}
+                </Button>
+              )}
+              {entry.here && (
+                <ActionIcon
+                  component="a"
+                  href={contentUrl(entry)}
+                  download={name}
+                  aria-label={t('library.download', { name })}
+                >
+                  <Icon name="download" />
+                </ActionIcon>
+              )}
+              {entry.kind === 'set' &&
+                (['csv', 'dcf'] as const).map((format) => (
+                  <Button
+                    key={format}
+                    component="a"
+                    href={listUrl(name, format)}
+                    download
+                    aria-label={t('sets.exportAs', { name, format: format.toUpperCase() })}
+                  >
+                    {format.toUpperCase()}
+                  </Button>
+                ))}
+              {entry.here && (
+                <ActionIcon
+                  aria-label={t(entry.station ? 'library.delete' : 'library.putAside', { name })}
+                  onClick={() => setDeleting(true)}
+                >
+                  <Icon name="cross" />
+                </ActionIcon>
+              )}
+            </>
+          )}
+        </div>
+      </div>
+      <ProblemNote problem={act.problem} onClose={act.clear} />
+      {entry.deleted === null && (
+        <EntryDetails
+          entry={entry}
+          onCompare={(version) => onCompare(entry, version)}
+          onChanged={onChanged}
+        />
+      )}
+      {deleting && (
+        <DeleteEntry entry={entry} onClose={() => setDeleting(false)} onDeleted={onChanged} />
+      )}
+    </article>
+  )
+}

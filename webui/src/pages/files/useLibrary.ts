@@ -1,0 +1,40 @@
+import { useCallback, useEffect, useState } from 'react'
+import { api, ask, problemOf } from '../../api/client'
+import type { LibraryEntry, Problem, TagCount } from '../../api/schema'
+import { useLink } from '../../live/store'
+import { type Filters, queryOf } from './filters'
+
+const PAGE = 50
+
+/** What fits the filters, newest first; asked anew a moment after a filter changed. */
+export function useLibrary(filters: Filters) {
+  const { open } = useLink()
+  const [entries, setEntries] = useState<LibraryEntry[] | null>(null)
+  const [total, setTotal] = useState(0)
+  const [tags, setTags] = useState<TagCount[]>([])
+  const [problems, setProblems] = useState<string[]>([])
+  const [problem, setProblem] = useState<Problem | null>(null)
+  const [limit, setLimit] = useState(PAGE)
+  const key = JSON.stringify([filters, limit])
+  const refresh = useCallback(async () => {
+    const [wanted, most] = JSON.parse(key) as [Filters, number]
+    try {
+      const query = queryOf(wanted, most)
+      const page = await ask(api.GET('/api/v1/library', { params: { query } }))
+      setEntries(page.entries)
+      setTotal(page.total)
+      setProblems(page.problems)
+      setTags(await ask(api.GET('/api/v1/library/tags')))
+      setProblem(null)
+    } catch (error) {
+      setProblem(problemOf(error))
+    }
+  }, [key])
+  useEffect(() => {
+    if (!open) return
+    const timer = setTimeout(() => void refresh(), 150)
+    return () => clearTimeout(timer)
+  }, [open, refresh])
+  const more = () => setLimit((before) => Math.min(500, before + PAGE))
+  return { entries, total, tags, problems, problem, refresh, more }
+}
