@@ -8,6 +8,7 @@ import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
 import { HomingPicture } from './HomingPicture'
 import { startValue, useRemembered } from './remembered'
 
@@ -91,30 +92,9 @@ export function HomingPanel({
         </>
       )}
       <div className="fields">
-        <NumberField
-          label={t('homing.fast')}
-          unit={units.velocity ?? ''}
-          value={fast}
-          onChange={setFast}
-          above={0}
-          optional
-        />
-        <NumberField
-          label={t('homing.slow')}
-          unit={units.velocity ?? ''}
-          value={slow}
-          onChange={setSlow}
-          above={0}
-          optional
-        />
-        <NumberField
-          label={t('motion.acceleration')}
-          unit={units.acceleration ?? ''}
-          value={acceleration}
-          onChange={setAcceleration}
-          above={0}
-          optional
-        />
+        <Speed units={units} label={t('homing.fast')} value={fast} onChange={setFast} optional />
+        <Speed units={units} label={t('homing.slow')} value={slow} onChange={setSlow} optional />
+        <Acceleration units={units} value={acceleration} onChange={setAcceleration} optional />
         <NumberField
           label={t('homing.offset')}
           unit={units.position ?? ''}
@@ -122,21 +102,8 @@ export function HomingPanel({
           onChange={setOffset}
           optional
         />
-        <NumberField
-          label={t('motion.travelLimit')}
-          unit={units.position ?? ''}
-          value={travel}
-          onChange={setTravel}
-          above={0}
-        />
-        <NumberField
-          label={t('motion.torqueLimit')}
-          unit="%"
-          value={torque}
-          onChange={setTorque}
-          above={0}
-          max={400}
-        />
+        <TravelLimit units={units} value={travel} onChange={setTravel} />
+        <TorqueLimit value={torque} onChange={setTorque} />
         <NumberField
           label={t('move.timeout')}
           unit="s"

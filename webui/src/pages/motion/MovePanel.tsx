@@ -8,6 +8,7 @@ import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
 import { startValue, useRemembered } from './remembered'
 
 /** CiA 402 modes of operation that this panel commands. */
@@ -96,36 +97,16 @@ export function MovePanel({
       <div className="fields">
         <NumberField label={t('move.target')} unit={unit} value={target} onChange={setTarget} />
         {mode !== 'PV' && (
-          <NumberField
+          <Speed
+            units={units}
             label={t(mode === 'PT' ? 'move.speedLimit' : 'motion.speed')}
-            unit={units.velocity ?? ''}
             value={speed}
             onChange={setSpeed}
-            above={0}
           />
         )}
-        <NumberField
-          label={t('motion.acceleration')}
-          unit={units.acceleration ?? ''}
-          value={acceleration}
-          onChange={setAcceleration}
-          above={0}
-        />
-        <NumberField
-          label={t('motion.travelLimit')}
-          unit={units.position ?? ''}
-          value={travel}
-          onChange={setTravel}
-          above={0}
-        />
-        <NumberField
-          label={t('motion.torqueLimit')}
-          unit="%"
-          value={torque}
-          onChange={setTorque}
-          above={0}
-          max={400}
-        />
+        <Acceleration units={units} value={acceleration} onChange={setAcceleration} />
+        <TravelLimit units={units} value={travel} onChange={setTravel} />
+        <TorqueLimit value={torque} onChange={setTorque} />
         <NumberField
           label={t(mode === 'PP' ? 'move.timeout' : 'move.time')}
           unit="s"

@@ -8,6 +8,7 @@ import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
 import { startValue, useRemembered } from './remembered'
 
 /** Back and forth between two absolute positions. */
@@ -101,20 +102,8 @@ export function SequencePanel({
             {t('sequence.here')}
           </Button>
         </div>
-        <NumberField
-          label={t('motion.speed')}
-          unit={units.velocity ?? ''}
-          value={speed}
-          onChange={setSpeed}
-          above={0}
-        />
-        <NumberField
-          label={t('motion.acceleration')}
-          unit={units.acceleration ?? ''}
-          value={acceleration}
-          onChange={setAcceleration}
-          above={0}
-        />
+        <Speed units={units} value={speed} onChange={setSpeed} />
+        <Acceleration units={units} value={acceleration} onChange={setAcceleration} />
         <NumberField
           label={t('sequence.dwell')}
           unit="s"
@@ -131,21 +120,8 @@ export function SequencePanel({
           max={100000}
           integer
         />
-        <NumberField
-          label={t('motion.travelLimit')}
-          unit={units.position ?? ''}
-          value={travel}
-          onChange={setTravel}
-          above={0}
-        />
-        <NumberField
-          label={t('motion.torqueLimit')}
-          unit="%"
-          value={torque}
-          onChange={setTorque}
-          above={0}
-          max={400}
-        />
+        <TravelLimit units={units} value={travel} onChange={setTravel} />
+        <TorqueLimit value={torque} onChange={setTorque} />
       </div>
       <Button
         variant="filled"

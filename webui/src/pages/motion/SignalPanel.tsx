@@ -8,6 +8,7 @@ import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { Speed, TorqueLimit, TravelLimit } from './fields'
 import { useBuses } from '../connect/useBuses'
 import { startValue, useRemembered } from './remembered'
 
@@ -168,28 +169,9 @@ export function SignalPanel({
           above={0}
           max={120}
         />
-        <NumberField
-          label={t('motion.travelLimit')}
-          unit={units.position ?? ''}
-          value={travel}
-          onChange={setTravel}
-          above={0}
-        />
-        <NumberField
-          label={t('move.speedLimit')}
-          unit={units.velocity ?? ''}
-          value={speed}
-          onChange={setSpeed}
-          above={0}
-        />
-        <NumberField
-          label={t('motion.torqueLimit')}
-          unit="%"
-          value={torque}
-          onChange={setTorque}
-          above={0}
-          max={400}
-        />
+        <TravelLimit units={units} value={travel} onChange={setTravel} />
+        <Speed units={units} label={t('move.speedLimit')} value={speed} onChange={setSpeed} />
+        <TorqueLimit value={torque} onChange={setTorque} />
       </div>
       <Button
         variant="filled"
