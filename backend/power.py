@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 
+from backend.causes import hints
 from backend.cyclic import CyclicSession
 from backend.drive import Drive, address_of
 from backend.faults import active_faults, fault_keys
@@ -149,6 +150,8 @@ class PowerState:
 
     async def _refused(self, state: State, goal: State) -> NotAllowed:
         causes = await self.blocked_by()
+        if goal is State.OPERATION_ENABLED:
+            causes += await hints(self.drive)
         why = "; ".join(causes) or "the drive gives no reason"
         return NotAllowed(
             f"{self.drive.name} stays in “{state.value}” and does not go to “{goal.value}”: {why}",

@@ -180,6 +180,19 @@ class Regeneration(Frozen):
     notes: str = ""
 
 
+class DriveIdentification(Frozen):
+    """Identification that a bit of the control word starts, while an object counts its states."""
+
+    control_bit: int = Field(ge=0, le=15)
+    status_key: str
+    done: tuple[int, ...]
+    failed: tuple[int, ...] = ()
+    keys: tuple[str, ...] = Field(description="results, and parameters that the drive changes")
+    warning: str
+    source: str
+    notes: str = ""
+
+
 class GuideStep(Frozen):
     """One step of a guide: text, parameters to look at, and a procedure to run."""
 
@@ -187,6 +200,9 @@ class GuideStep(Frozen):
     text: str
     keys: tuple[str, ...] = ()
     procedure: str | None = None
+    identifies: bool = Field(
+        default=False, description="the drive's own identification starts here"
+    )
 
 
 class Guide(Frozen):
@@ -233,6 +249,7 @@ class Functions(Frozen):
     brake: BrakeTiming | None = None
     regeneration: Regeneration | None = None
     guides: tuple[Guide, ...] = ()
+    identification: DriveIdentification | None = None
     gear: GearLimits = GearLimits()
 
 
@@ -254,7 +271,9 @@ def referenced_keys(functions: Functions) -> list[str]:
         found += [functions.probe.function_key, functions.probe.status_key]
         for probe in functions.probe.probes:
             found += [key for key in (probe.rising_key, probe.falling_key) if key is not None]
-    for record in (functions.brake, functions.regeneration, functions.gear):
+    for record in (
+        functions.brake, functions.regeneration, functions.gear, functions.identification,
+    ):  # fmt: skip
         found += _named_keys(record)
     for guide in functions.guides:
         for step in guide.steps:

@@ -204,3 +204,12 @@ class BrakingInfo(Message):
     min_ohm: float | None
     max_ohm: float | None
     possible: bool
+
+
+class IdentifyRequest(Message):
+    """Let the drive identify motor and load; travel in the axis' unit from the start point."""
+
+    confirmed: bool = False
+    travel_limit: Positive
+    torque_limit: float = Field(default=300, gt=0, le=400, description="% of rated")
+    timeout_s: float = Field(default=120, gt=0, le=1200)

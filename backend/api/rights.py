@@ -123,6 +123,7 @@ _API: dict[str, Need] = {
     "POST /drives/{drive_id}/jobs/sequence": _MOTION,
     "POST /drives/{drive_id}/jobs/generate": _MOTION,
     "POST /drives/{drive_id}/jobs/home": _MOTION,
+    "POST /drives/{drive_id}/jobs/identify": _MOTION,
     "POST /drives/{drive_id}/jobs/sweep": _MEASURE,
     "POST /drives/{drive_id}/jobs/inertia": _MEASURE,
     "POST /drives/{drive_id}/jobs/step": _MEASURE,

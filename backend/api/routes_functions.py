@@ -11,7 +11,7 @@ from backend import gear, regeneration
 from backend.api import convert
 from backend.api.context import Controlled, TheBench, TheMember
 from backend.api.errors import NotFound
-from backend.api.models import ParameterValue
+from backend.api.models import JobInfo, ParameterValue
 from backend.api.models_functions import (
     AxisRecordInfo,
     BrakingInfo,
@@ -20,21 +20,26 @@ from backend.api.models_functions import (
     GearPlanInfo,
     GearValueInfo,
     GearWritten,
+    IdentifyRequest,
     MechanicsUpdate,
     PastFaultInfo,
     WatchUpdate,
 )
+from backend.axis import Envelope
 from backend.axis_store import AxisRecord, AxisStore
 from backend.bench import Member
 from backend.drive import Drive, Reading
 from backend.fault_history import PastFault, history_of, read_history
 from backend.functions import functions_of
 from backend.mechanics_calc import GearPlan, Mechanics
+from backend.tools import identification
 from drivers.errors import DriveError
 from profiles.functions import FaultHistory, Functions
 
 router = APIRouter()
 _DRIVE = "/drives/{drive_id}"
+#: Speed limit of an envelope that bounds no speed.
+_ANY_RPM = 20_000.0
 
 
 def store_of(request: Request) -> AxisStore:
@@ -115,6 +120,29 @@ def _frozen(reading: Reading) -> ParameterValue:
         time=convert.moment(reading.time) if reading.time else None,
         error=reading.error,
     )
+
+
+# --- identification by the drive --------------------------------------------------------
+
+
+@router.post(f"{_DRIVE}/jobs/identify", status_code=202)
+async def start_identification(
+    bench: TheBench, member: Controlled, request: IdentifyRequest
+) -> JobInfo:
+    """Let the drive identify motor and load by itself; the motor moves."""
+    identification.require_identification(member.axis)
+    # The drive chooses the speed: only travel, torque and time are bounded here.
+    envelope = Envelope(request.travel_limit, _ANY_RPM, request.torque_limit, request.timeout_s)
+    settings = identification.IdentifySettings(envelope, request.confirmed)
+    job = bench.jobs.start(
+        "identify",
+        f"Identification by the drive: {member.drive.name}",
+        lambda progress: identification.identify(member.axis, settings, progress),
+        drive=member.drive.id,
+        motion=True,
+    )
+    bench.journal.add(f"{member.drive.name}: identification by the drive", drive=member.drive.id)
+    return convert.job(job)
 
 
 # --- mechanics and watch list -----------------------------------------------------------

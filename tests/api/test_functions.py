@@ -179,3 +179,27 @@ def test_braking_is_calculated(station: Station) -> None:
     assert answer["verdict"] == "beyond"
     assert answer["average_w"] == pytest.approx(2 * (24.674 - 0.3), abs=0.01)
     assert station.http.post("/calculate/braking", json={**body, "cycle_s": 0}).status_code == 422
+
+
+def test_the_drive_identifies_by_itself(station: Station, x: str) -> None:
+    body = {"travel_limit": 100, "timeout_s": 60}
+    refused = station.job(station.http.post(f"/drives/{x}/jobs/identify", json=body))
+    assert "agreement" in refused["problem"]["detail"]
+    result = station.done(
+        station.http.post(f"/drives/{x}/jobs/identify", json={**body, "confirmed": True}), 60
+    )
+    # Motor and load of the bench are 1500 g·cm² behind a soft coupling: a coarse method.
+    found = raw(station, x, "200C:0A")
+    assert found == pytest.approx(1500, rel=0.25)
+    assert raw(station, x, "2001:06") == found
+    assert raw(station, x, "200C:05") == 12
+    assert result["changed"]
+    assert station.state(x)["state"] == "Switch on disabled"
+
+
+def test_an_identification_that_goes_too_far_is_ended(station: Station, x: str) -> None:
+    body = {"travel_limit": 0.2, "timeout_s": 60, "confirmed": True}
+    job = station.job(station.http.post(f"/drives/{x}/jobs/identify", json=body))
+    assert job["state"] == "failed"
+    assert "0.2 rev" in job["problem"]["limit"]
+    assert station.state(x)["state"] == "Switch on disabled"

@@ -776,6 +776,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/identify": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Identification
+         * @description Let the drive identify motor and load by itself; the motor moves.
+         */
+        post: operations["start_identification"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/inertia": {
         parameters: {
             query?: never;
@@ -3283,6 +3303,37 @@ export interface components {
             unit: string;
         };
         /**
+         * DriveIdentification
+         * @description Identification that a bit of the control word starts, while an object counts its states.
+         */
+        DriveIdentification: {
+            /** Control Bit */
+            control_bit: number;
+            /** Done */
+            done: number[];
+            /**
+             * Failed
+             * @default []
+             */
+            failed: number[];
+            /**
+             * Keys
+             * @description results, and parameters that the drive changes
+             */
+            keys: string[];
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /** Source */
+            source: string;
+            /** Status Key */
+            status_key: string;
+            /** Warning */
+            warning: string;
+        };
+        /**
          * DriveSummary
          * @description A drive of the bench.
          */
@@ -3717,6 +3768,7 @@ export interface components {
              */
             guides: components["schemas"]["Guide"][];
             history?: components["schemas"]["FaultHistory"] | null;
+            identification?: components["schemas"]["DriveIdentification"] | null;
             probe?: components["schemas"]["TouchProbe"] | null;
             regeneration?: components["schemas"]["Regeneration"] | null;
             /** @default {
@@ -4057,6 +4109,12 @@ export interface components {
          */
         GuideStep: {
             /**
+             * Identifies
+             * @description the drive's own identification starts here
+             * @default false
+             */
+            identifies: boolean;
+            /**
              * Keys
              * @default []
              */
@@ -4162,6 +4220,30 @@ export interface components {
             uses_index: boolean;
             /** Uses Limit */
             uses_limit: boolean;
+        };
+        /**
+         * IdentifyRequest
+         * @description Let the drive identify motor and load; travel in the axis' unit from the start point.
+         */
+        IdentifyRequest: {
+            /**
+             * Confirmed
+             * @default false
+             */
+            confirmed: boolean;
+            /**
+             * Timeout S
+             * @default 120
+             */
+            timeout_s: number;
+            /**
+             * Torque Limit
+             * @description % of rated
+             * @default 300
+             */
+            torque_limit: number;
+            /** Travel Limit */
+            travel_limit: number;
         };
         /**
          * ImportFinding
@@ -7398,6 +7480,7 @@ export type CyclicRequest = components['schemas']['CyclicRequest'];
 export type DescribedDevice = components['schemas']['DescribedDevice'];
 export type Diff = components['schemas']['Diff'];
 export type DiffRow = components['schemas']['DiffRow'];
+export type DriveIdentification = components['schemas']['DriveIdentification'];
 export type DriveSummary = components['schemas']['DriveSummary'];
 export type DriveUpdate = components['schemas']['DriveUpdate'];
 export type DrivesChanged = components['schemas']['DrivesChanged'];
@@ -7431,6 +7514,7 @@ export type Hello = components['schemas']['Hello'];
 export type HistorySlot = components['schemas']['HistorySlot'];
 export type HomeRequest = components['schemas']['HomeRequest'];
 export type HomingMethodInfo = components['schemas']['HomingMethodInfo'];
+export type IdentifyRequest = components['schemas']['IdentifyRequest'];
 export type ImportFinding = components['schemas']['ImportFinding'];
 export type ImportedDescription = components['schemas']['ImportedDescription'];
 export type ImportedList = components['schemas']['ImportedList'];
@@ -14216,6 +14300,149 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["HomeRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_identification: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["IdentifyRequest"];
             };
         };
         responses: {

@@ -301,6 +301,11 @@ export const functions = {
   'regen.settings': ['Settings in the drive', '驱动器中的设置'],
   'guide.step': ['Step {n}', '步骤 {n}'],
   'guide.run': ['Run…', '运行…'],
+  'identify.agree': [
+    'I agree. The travel is clear, nobody is near, and a hand is on the emergency stop.',
+    '我同意。行程无障碍，附近无人，手在急停按钮上。',
+  ],
+  'identify.start': ['Start the identification', '开始辨识'],
   'guide.failures': ['These faults report failure', '以下故障表示失败'],
   'guide.noProcedure': [
     'This drive’s profile has no procedure that starts it from here.',

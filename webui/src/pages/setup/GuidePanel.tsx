@@ -1,18 +1,25 @@
-import { Button } from '@mantine/core'
+import { Button, Checkbox } from '@mantine/core'
 import { useState } from 'react'
+import { api, ask } from '../../api/client'
 import type { Guide, ProcedureInfo } from '../../api/schema'
 import { useT } from '../../i18n'
+import { setJob, useAxisState } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
+import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ParameterFields } from '../../widgets/ParameterFields'
+import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProcedureDialog, useProcedures } from '../../widgets/Procedures'
+import { useAction } from '../../widgets/useAction'
+import { useFunctions } from '../../widgets/useFunctions'
+import { useRemembered } from '../motion/remembered'
 
 /** A course of the drive's manual, step by step, with the parameters and procedures of each. */
 export function GuidePanel({ drive, guide }: { drive: string; guide: Guide }) {
   const t = useT()
   const procedures = useProcedures(drive)
   const [chosen, setChosen] = useState<ProcedureInfo | null>(null)
-  const [job, setJob] = useState<string | null>(null)
+  const [job, setShown] = useState<string | null>(null)
   return (
     <Panel title={guide.title}>
       {guide.warning && <p className="note warn">{guide.warning}</p>}
@@ -32,6 +39,7 @@ export function GuidePanel({ drive, guide }: { drive: string; guide: Guide }) {
               {step.procedure && procedures && !procedure && (
                 <p className="note info">{t('guide.noProcedure')}</p>
               )}
+              {step.identifies && <Identify drive={drive} onStarted={setShown} />}
               {procedure && (
                 <Button variant="filled" onClick={() => setChosen(procedure)}>
                   {procedure.title}: {t('guide.run')}
@@ -41,7 +49,7 @@ export function GuidePanel({ drive, guide }: { drive: string; guide: Guide }) {
           )
         })}
       </ol>
-      <JobNote id={job} onClose={() => setJob(null)} />
+      <JobNote id={job} onClose={() => setShown(null)} />
       {(guide.failures ?? []).length > 0 && (
         <p>
           {t('guide.failures')}: <span className="mono">{guide.failures?.join(', ')}</span>
@@ -53,9 +61,72 @@ export function GuidePanel({ drive, guide }: { drive: string; guide: Guide }) {
           drive={drive}
           procedure={chosen}
           onClose={() => setChosen(null)}
-          onStarted={setJob}
+          onStarted={setShown}
         />
       )}
     </Panel>
+  )
+}
+
+/** Starts the identification of the drive itself, within a travel and a time. */
+function Identify({ drive, onStarted }: { drive: string; onStarted: (job: string) => void }) {
+  const t = useT()
+  const state = useAxisState(drive)
+  const spec = useFunctions(drive)?.identification
+  const [travel, setTravel] = useRemembered(drive, 'identify.travel', null)
+  const [time, setTime] = useRemembered(drive, 'identify.time', 120)
+  const [agreed, setAgreed] = useState(false)
+  const act = useAction()
+  if (!spec) return null
+  const start = () =>
+    act.run(async () => {
+      if (travel === null || time === null) return
+      const job = await ask(
+        api.POST('/api/v1/drives/{drive_id}/jobs/identify', {
+          params: { path: { drive_id: drive } },
+          body: { confirmed: agreed, travel_limit: travel, torque_limit: 300, timeout_s: time },
+        }),
+      )
+      setJob(job)
+      setAgreed(false)
+      onStarted(job.id)
+    })
+  return (
+    <>
+      <p className="note warn">{spec.warning}</p>
+      <div className="fields">
+        <NumberField
+          label={t('motion.travelLimit')}
+          unit={state?.units.position ?? ''}
+          value={travel}
+          onChange={setTravel}
+          above={0}
+        />
+        <NumberField
+          label={t('move.timeout')}
+          unit="s"
+          value={time}
+          onChange={setTime}
+          above={0}
+          max={1200}
+        />
+      </div>
+      <Checkbox
+        label={t('identify.agree')}
+        checked={agreed}
+        onChange={(event) => setAgreed(event.currentTarget.checked)}
+      />
+      <Button
+        variant="filled"
+        disabled={
+          !agreed || travel === null || time === null || !state?.fresh || state.moving_job !== null
+        }
+        loading={act.busy}
+        onClick={() => void start()}
+      >
+        {t('identify.start')}
+      </Button>
+      <ProblemNote problem={act.problem} onClose={act.clear} />
+    </>
   )
 }
