@@ -288,6 +288,7 @@ class PeopleLive:
     def _disabled(self, invitation: Invitation, why: str) -> None:
         """A guest may not move anything from now on: what moves stops."""
         session = invitation.session
+        self._bench.journal.add(f"{invitation.guest} may not move anything now: {why}")
         guests = [p for p in self._pages.values() if session and p.identity.session == session]
         for page in guests:
             page.release(None, why)

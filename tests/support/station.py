@@ -19,6 +19,7 @@ from backend.api.app import make_app
 from backend.bench import Bench
 from backend.commands.serve import LOOPBACK, _listen
 from backend.demo import DemoBench
+from backend.people.station import People
 
 
 def until(condition: Callable[[], object], timeout_s: float = 10.0, what: str = "") -> Any:
@@ -37,8 +38,14 @@ class Station:
     """Server and virtual drives. ``http`` talks to the interface, ``drives`` causes trouble."""
 
     def __init__(
-        self, folder: Path, bench_file: Path | None = None, segment_options: Sequence[str] = ()
+        self,
+        folder: Path,
+        bench_file: Path | None = None,
+        segment_options: Sequence[str] = (),
+        people: People | None = None,
     ) -> None:
+        self.people = people
+        self.loop: asyncio.AbstractEventLoop | None = None
         self.folder = folder
         self.drives = DemoBench(
             bench_file, folder / "wires", folder / "nvm", segment_options=segment_options
@@ -59,9 +66,10 @@ class Station:
 
         def run() -> None:
             async def main() -> None:
+                self.loop = asyncio.get_running_loop()
                 bench = Bench(self.folder / "state", self.drives.wires)
                 config = uvicorn.Config(
-                    make_app(bench, hosts=LOOPBACK),
+                    make_app(bench, hosts=LOOPBACK, people=self.people),
                     log_level="warning",
                     ws_per_message_deflate=False,
                     timeout_graceful_shutdown=2,

@@ -4,7 +4,7 @@ import type { InvitationView } from '../api/schema'
 import { useT } from '../i18n'
 import * as live from '../live/live'
 import { usePeople } from '../live/people'
-import { subscribe, useDrives } from '../live/store'
+import { contents, subscribe, useDrives } from '../live/store'
 import { clock } from '../widgets/format'
 import { Icon } from '../widgets/Icon'
 import { ProblemNote } from '../widgets/ProblemNote'
@@ -127,7 +127,9 @@ function EnablingButton({ invitation }: { invitation: InvitationView }) {
     window.addEventListener('blur', blur)
     window.addEventListener('pagehide', hidden)
     document.addEventListener('visibilitychange', hidden)
-    const off = subscribe('link', () => release('connection changed'))
+    const off = subscribe('link', () => {
+      if (!contents.link.open) release('connection lost')
+    })
     stop.current = release
   }
   const release = () => stop.current?.('the enabling button was let go')

@@ -1,6 +1,5 @@
 import { describe, expect, it } from 'vitest'
-import { SILENCE_MS } from './deadman'
-import { EnablingHold } from './enabling'
+import { EnablingHold, SILENCE_MS } from './enabling'
 
 function rig() {
   const sent: string[] = []

@@ -1,0 +1,310 @@
+"""Two and three real browsers on one station: log-in, control, and a guest from afar."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from backend.people.rights import Right, Role
+from backend.people.station import People
+from tests.browser.conftest import HERE, LAPTOP
+from tests.browser.driving import Bench, open_axis
+from tests.browser.test_motion import PLUS, _centre
+from tests.support.guarded import CHEAP, NAMES, PASSWORD
+from tests.support.station import Station, until
+
+#: Greatest time from letting the enabling button go to standstill.
+STOPS_WITHIN_S = 0.2
+
+
+@pytest.fixture(scope="module")
+def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+    folder = Path(tmp_path_factory.mktemp("guarded"))
+    people = People(folder / "state", accounts_needed=True, passwords=CHEAP)
+    running = Station(folder, HERE / "bench.toml", people=people)
+    running.start()
+    assert running.loop is not None
+
+    async def enter() -> str:
+        accounts = people.accounts
+        for role, name in NAMES.items():
+            made = await accounts.add(name, PASSWORD, role)
+            if role is Role.ADMINISTRATOR:
+                owner = made.id
+        secret, _ = await accounts.make_token(owner, "tests", frozenset(Right), timedelta(hours=1))
+        return secret
+
+    token = asyncio.run_coroutine_threadsafe(enter(), running.loop).result(20)
+    running.http.headers["Authorization"] = f"Bearer {token}"
+    yield running
+    running.stop()
+
+
+Open = Callable[[str], Page]
+
+
+@pytest.fixture
+def opened(browser: Browser, station: Station, bench: Bench) -> Iterator[Open]:
+    """Opens a browser of its own at an address of the station."""
+    contexts = []
+    defects: list[str] = []
+
+    def open_at(address: str) -> Page:
+        context = browser.new_context(locale="en", **LAPTOP)  # type: ignore[arg-type]
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(15_000)
+        page.on("pageerror", lambda error: defects.append(str(error)))
+        page.goto(f"{station.url}/{address}")
+        return page
+
+    yield open_at
+    for context in contexts:
+        context.close()
+    assert defects == []
+
+
+def log_in(page: Page, role: Role) -> Page:
+    page.get_by_label("Name").fill(NAMES[role])
+    page.get_by_label("Password").first.fill(PASSWORD)
+    page.get_by_role("button", name="Log in").click()
+    page.get_by_role("link", name="Connect").first.wait_for()
+    return page
+
+
+def person(opened: Open, bench: Bench, role: Role, page: str = "motion") -> Page:
+    shown = log_in(opened(""), role)
+    open_axis(shown, bench.drive, page)
+    shown.get_by_role("heading", level=1).wait_for()
+    return shown
+
+
+def button(page: Page, name: str) -> Locator:
+    return page.get_by_role("button", name=name, exact=True)
+
+
+# --- log-in ---------------------------------------------------------------------------
+
+
+def test_nothing_is_shown_before_the_log_in(opened: Open, bench: Bench) -> None:
+    page = opened(f"#/axis/{bench.drive}/motion")
+    expect(page.get_by_role("heading", name="Log in")).to_be_visible()
+    assert page.get_by_text("X", exact=True).count() == 0
+    page.get_by_label("Name").fill("Olaf")
+    page.get_by_label("Password").first.fill("wrong wrong wrong")
+    button(page, "Log in").click()
+    expect(page.get_by_text("name or password is wrong")).to_be_visible()
+    log_in(page, Role.OPERATOR)
+    button(page, "Appearance and language").click()
+    page.get_by_role("menuitem", name="Log out").click()
+    expect(page.get_by_role("heading", name="Log in")).to_be_visible()
+    page.reload()
+    expect(page.get_by_role("heading", name="Log in")).to_be_visible()
+
+
+# --- control --------------------------------------------------------------------------
+
+
+def test_control_is_asked_for_handed_over_and_overridden(opened: Open, bench: Bench) -> None:
+    olaf = person(opened, bench, Role.OPERATOR)
+    anna = person(opened, bench, Role.ADMINISTRATOR)
+    button(olaf, "Control is free").click()
+    expect(anna.get_by_text("Olaf has control")).to_be_visible()
+    # Conflict: the other page cannot move the axis.
+    anna.mouse.move(*_centre(anna, PLUS))
+    anna.mouse.down()
+    expect(anna.get_by_text("Olaf has control of this axis").first).to_be_visible()
+    anna.mouse.up()
+    assert not bench.moves()
+    # Asked for, kept, asked for, given.
+    button(anna, "Olaf has control").click()
+    anna.get_by_role("menuitem", name="Ask for control").click()
+    expect(olaf.get_by_text("Anna asks for control of X.")).to_be_visible()
+    button(olaf, "Keep control").click()
+    expect(anna.get_by_text("Olaf keeps control of X.")).to_be_visible()
+    button(anna, "Olaf has control").click()
+    anna.get_by_role("menuitem", name="Ask for control").click()
+    button(olaf, "Hand over").click()
+    expect(button(anna, "You have control")).to_be_visible()
+    expect(anna.get_by_text("Olaf gave you control of X.")).to_be_visible()
+    # Handed over for a time.
+    button(anna, "You have control").click()
+    anna.get_by_role("menuitem", name="For 5 min").first.click()
+    button(olaf, "You have control").click()
+    expect(olaf.get_by_text("Yours until")).to_be_visible()
+    olaf.keyboard.press("Escape")
+    # Taken by the administrator, with notice.
+    button(anna, "Olaf has control").click()
+    anna.get_by_role("menuitem", name="Take control now").click()
+    expect(olaf.get_by_text("Anna took control of X from you.")).to_be_visible()
+    expect(button(anna, "You have control")).to_be_visible()
+    # Lost with the connection.
+    anna.close()
+    expect(button(olaf, "Control is free")).to_be_visible(timeout=2_500)
+
+
+def test_a_viewer_moves_nothing_and_can_stop(opened: Open, bench: Bench) -> None:
+    olaf = person(opened, bench, Role.OPERATOR)
+    vera = person(opened, bench, Role.VIEWER)
+    vera.mouse.move(*_centre(vera, PLUS))
+    vera.mouse.down()
+    expect(vera.get_by_text("Vera may not do this")).to_be_visible()
+    vera.mouse.up()
+    olaf.mouse.move(*_centre(olaf, PLUS))
+    olaf.mouse.down()
+    bench.wait_moving()
+    vera.keyboard.press("Escape")
+    bench.wait_standing()
+    olaf.mouse.up()
+
+
+# --- a guest --------------------------------------------------------------------------
+
+
+def invited(host: Page, opened: Open, bench: Bench, *allowed: str) -> Page:
+    """A guest's page, on the motion page of the axis, come in by link and code."""
+    host.evaluate("location.hash = '#/people'")
+    host.get_by_label("Name of the guest").fill("Gert")
+    for each in allowed:
+        host.get_by_label(each, exact=True).first.check()
+    button(host, "Make an invitation").click()
+    told = host.locator(".note.info")
+    link = told.locator(".mono").first.inner_text()
+    code = told.locator("strong.mono").inner_text()
+    guest = opened(link.split("/", 3)[3])
+    guest.get_by_label("Code").fill(code.lower().replace("-", " "))
+    button(guest, "Come in").click()
+    expect(guest.get_by_text("You are a guest of")).to_be_visible()
+    open_axis(guest, bench.drive, "motion")
+    guest.get_by_role("heading", level=1).wait_for()
+    return guest
+
+
+def end_visit(host: Page) -> None:
+    button(host, "End the visit").first.click()
+
+
+def test_a_guest_looks_and_is_seen_and_nothing_more(opened: Open, bench: Bench) -> None:
+    olaf = person(opened, bench, Role.OPERATOR)
+    guest = invited(olaf, opened, bench)
+    expect(guest.get_by_text("can change nothing")).to_be_visible()
+    guest.mouse.move(*_centre(guest, PLUS))
+    guest.mouse.down()
+    expect(guest.get_by_text("a guest may not do this without a grant")).to_be_visible()
+    guest.mouse.up()
+    button(guest, "Control is free").click()
+    expect(guest.get_by_text("may only look")).to_be_visible()
+    assert not bench.moves()
+    # The person on site goes where the guest is, and sees the guest's pointer there.
+    olaf.get_by_role("link", name="Go to their page").click()
+    guest.mouse.move(400, 400)
+    guest.mouse.move(410, 420)
+    pointer = olaf.locator(".pointer", has_text="Gert (guest)")
+    expect(pointer).to_be_visible()
+    box = pointer.bounding_box()
+    assert box is not None
+    assert abs(box["x"] - 410) < 25
+    assert abs(box["y"] - 420) < 25
+    # Chat stays text, whatever is in it.
+    for page in (olaf, guest):
+        page.evaluate("location.hash = '#/people'")
+    guest.get_by_placeholder("A line for everybody here").fill("<img src=x onerror=alert(1)> ok")
+    button(guest, "Send").click()
+    expect(olaf.get_by_text("<img src=x onerror=alert(1)> ok")).to_be_visible()
+    end_visit(olaf)
+    expect(guest.get_by_role("heading", name="Log in")).to_be_visible(timeout=3_000)
+
+
+def enable(olaf: Page) -> None:
+    hold = olaf.get_by_role("button", name="Hold to let it move")
+    box = hold.bounding_box()
+    assert box is not None
+    olaf.mouse.move(box["x"] + 20, box["y"] + 20)
+    olaf.mouse.down()
+
+
+def move_together(olaf: Page, guest: Page, bench: Bench) -> None:
+    """Both hold their button until the axis moves. On a busy machine a page may fall silent for a
+    moment, which rightly lets go; then they press again, as people do."""
+    for _ in range(8):
+        enable(olaf)
+        guest.mouse.move(*_centre(guest, PLUS))
+        guest.mouse.down()
+        with contextlib.suppress(AssertionError):
+            until(bench.moves, 3, "the axis moves")
+            return
+        guest.mouse.up()
+        olaf.mouse.up()
+    raise AssertionError("never did both hold for long enough")
+
+
+def granted(olaf: Page, guest: Page) -> None:
+    button(olaf, "Grant control").click()
+    expect(guest.get_by_text("Not enabled from site")).to_be_visible()
+
+
+def standstill_s(bench: Bench, let_go: Callable[[], None]) -> float:
+    """Seconds from letting go to the first reading at standstill."""
+    began = time.monotonic()
+    let_go()
+    until(lambda: not bench.moves(), 5, "the axis stands")
+    return time.monotonic() - began
+
+
+def test_a_guest_moves_only_while_the_button_on_site_is_held(opened: Open, bench: Bench) -> None:
+    olaf = person(opened, bench, Role.OPERATOR)
+    guest = invited(olaf, opened, bench, "move")
+    granted(olaf, guest)
+    x, y = _centre(guest, PLUS)
+    guest.mouse.move(x, y)
+    guest.mouse.down()
+    expect(guest.get_by_text("does not hold the enabling button")).to_be_visible()
+    guest.mouse.up()
+    assert not bench.moves()
+    times = []
+    for _ in range(3):
+        move_together(olaf, guest, bench)
+        times.append(standstill_s(bench, olaf.mouse.up))
+        assert bench.jog_job()["state"] != "running" or not bench.moves()
+        guest.mouse.up()
+        bench.wait_standing()
+    print("standstill after letting go:", ", ".join(f"{t * 1e3:.0f} ms" for t in times))
+    assert statistics.median(times) < STOPS_WITHIN_S
+    end_visit(olaf)
+
+
+def test_the_end_of_the_visit_stops_the_guest_at_once(opened: Open, bench: Bench) -> None:
+    olaf = person(opened, bench, Role.OPERATOR)
+    anna = person(opened, bench, Role.ADMINISTRATOR)
+    guest = invited(olaf, opened, bench, "move")
+    granted(olaf, guest)
+    move_together(olaf, guest, bench)
+    # Another person on site may end it too, while the button is still held.
+    end_visit(anna)
+    until(lambda: not bench.moves(), 1, "the axis stands")
+    expect(guest.get_by_role("heading", name="Log in")).to_be_visible(timeout=3_000)
+    again = guest.evaluate("fetch('/api/v1/drives').then(answer => answer.status)")
+    assert again == 401
+    guest.mouse.up()
+    olaf.mouse.up()
+    bench.wait_standing()
+
+
+def test_a_page_on_site_that_goes_away_stops_the_guest(opened: Open, bench: Bench) -> None:
+    olaf = person(opened, bench, Role.OPERATOR)
+    guest = invited(olaf, opened, bench, "move")
+    granted(olaf, guest)
+    move_together(olaf, guest, bench)
+    assert standstill_s(bench, olaf.context.close) < 2
+    guest.mouse.up()
+    bench.wait_standing()
+    anna = person(opened, bench, Role.ADMINISTRATOR)
+    end_visit(anna)
