@@ -88,7 +88,7 @@ def watch(page: Live, axis: str) -> tuple[int, int, int]:
 def main() -> None:
     """Print the figures."""
     folder = Path(tempfile.mkdtemp())
-    station = Station(folder, bench_file(folder))
+    station = Station(folder, bench_file(folder), ["--realtime", "20"])
     station.start()
     try:
         axes = [station.add(n, URL, name=f"A{n}") for n in range(1, AXES + 1)]
@@ -110,6 +110,10 @@ def main() -> None:
         print(f"{SECONDS:.0f} s, {AXES} axes, {len(channels)} channels at 1 kHz")
         print(f"per axis: {received / streams:.0f} samples, {dropped / streams:.0f} counted as "
               f"dropped, {invalid / streams:.0f} not valid")  # fmt: skip
+        whole = (received + dropped) / streams
+        print(
+            f"received and dropped together: {whole:.0f} cycles, {whole / SECONDS:.1f} per second"
+        )
         print(f"host: {detail.get('cyclic_overruns')} overruns, late p99 "
               f"{detail.get('cyclic_late_p99_us')} µs")  # fmt: skip
         p50, p99 = np.percentile(poller.times_ms, [50, 99])

@@ -22,7 +22,7 @@ from drivers.ethercat.segment import Segment
 DISTRUST_S = 0.03
 """Without valid process data for this long no setpoint can be trusted: every axis brakes."""
 
-_DISTRUST_CYCLES = 5
+_DISTRUST_CYCLES, _SUSPICIOUS_CYCLES = 5, 2
 _RECEIVE_US = 300
 _LEAST_WAIT_S = 100e-6
 _LOCKSTEP_WAIT_S = 0.25
@@ -153,6 +153,10 @@ class CyclicLoop:
             return max(self._real_next_ns - time.monotonic_ns(), self.cycle_ns // 2)
         return self.next_ns - time.monotonic_ns() - max(_MARGIN_NS, self.cycle_ns // 5)
 
+    def suspicious(self) -> bool:
+        """True once when several answers running lacked a station."""
+        return self._invalid_run == _SUSPICIOUS_CYCLES and self.counters.last_wkc >= 0
+
     def moving(self) -> bool:
         """Whether any axis plays or brakes."""
         return any(image.axis.phase is not Phase.IDLE for image in self.images)
@@ -214,6 +218,8 @@ class CyclicLoop:
                 self._segment.gave_up()
                 return -1
         wkc: int = self._master.receive_processdata(_RECEIVE_US)
+        if wkc >= 0:
+            self._segment.came_back()
         return wkc
 
     def _count_invalid(self, wkc: int) -> None:

@@ -76,7 +76,8 @@ _ERRORS = {
 }
 
 _RESEND_S = 0.02
-_DEAD_READS = 5
+_DEAD_READS, _DEAD_S, _DEAD_PAUSE_S = 5, 0.05, 0.002
+"""A station is gone after so many reads and so long: the segment may only stand still."""
 _WORTH_WAITING_S = 0.0003
 _LONGEST_WAIT_S, _FIRST_USUAL_S = 0.01, 0.0002
 
@@ -223,13 +224,17 @@ class Mailbox:
         False where a lost frame or a mailbox that is still full leaves it open: `_wait` sends it
         again. What lies in the other mailbox is left alone, it may already be the answer.
         """
-        for _ in range(_DEAD_READS):
+        tries, deadline = 0, self.clock() + _DEAD_S
+        while tries < _DEAD_READS or self.clock() < deadline:
+            tries += 1
             if (yield Write(self.out_address, mail)) is not None:
                 return True
             if (yield Read(SM0_STATUS, 1)) is not None:
                 return False
             if self.epoch != epoch or self.stopping:
                 raise _overtaken()
+            if tries >= _DEAD_READS:
+                yield Pause(_DEAD_PAUSE_S)
         raise _lost()
 
     def _wait(
@@ -244,7 +249,7 @@ class Mailbox:
     ) -> Steps[bytes]:
         asked = self.clock()
         resend_at = asked + _RESEND_S
-        dead = 0
+        dead, dead_from = 0, asked
         pause_s = 0.0
         early, repeat_at = yield from self._first_look(mail, delivered)
         polls = 0
@@ -252,12 +257,17 @@ class Mailbox:
             if early is None:
                 status = yield Read(SM1_STATUS, 1)
                 polls += 1
-                dead = dead + 1 if status is None else 0
+                if status is not None:
+                    dead, dead_from = 0, self.clock()
+                else:
+                    dead += 1
             if self.epoch != epoch:
                 return self._kept(matches, early)
             if dead >= _DEAD_READS:
-                self.unsettled = True
-                raise _lost()
+                if self.clock() - dead_from > _DEAD_S:
+                    self.unsettled = True
+                    raise _lost()
+                yield Pause(_DEAD_PAUSE_S)
             if early is not None or (status is not None and status[0] & _FULL):
                 answer = early or (yield from self._fetch())
                 early = None

@@ -54,6 +54,10 @@ class Roster:
     def housekeeping(self, now: float) -> None:
         """Look after lost and returned stations, and after the interface itself."""
         self.exchange.housekeeping()
+        loop = self.exchange.loop
+        if loop is not None and loop.suspicious():
+            # Whoever is gone is left out before the others lose trust and brake as well.
+            self._next_watch = now
         if now < self._next_watch:
             return
         self._next_watch = now + _WATCH_S
@@ -112,12 +116,7 @@ class Roster:
 
     def _watch(self, station: Station) -> Steps[None]:
         before = station.al_state
-        answers = False
-        for _ in range(3):
-            answers = yield from transactions.al_status(station)
-            if answers:
-                break
-        if not answers:
+        if not (yield from transactions.answers(station, time.monotonic)):
             self._missing(station)
             return
         if station.lost:

@@ -30,6 +30,8 @@ MAX_STATIONS = 199
 _NAME_LIMIT = 15
 _FRAME_TIMEOUT_US = 2000
 _MANY_MISSING, _STALL_S = 8, 0.1
+_FIND_TRIES = 3
+"""A segment that stands still for a moment answers nothing, or too late and to another question."""
 
 
 class Segment:
@@ -123,10 +125,15 @@ class Segment:
             ProtocolError: more slaves than can be handled.
         """
         self.mapped = False
-        self.discard_late_frames()
         self.master.manual_state_change = 0
-        count = self.master.config_init(release_gil=True)
-        self.forget_errors()
+        for attempt in range(_FIND_TRIES):
+            if attempt:
+                time.sleep(_STALL_S)
+            self.discard_late_frames()
+            count = self.master.config_init(release_gil=True)
+            self.forget_errors()
+            if 0 < count <= MAX_STATIONS:
+                break
         if count == -2 or count > MAX_STATIONS:
             raise ProtocolError(f"more than {MAX_STATIONS} slaves on one segment")
         self.slaves = tuple(self.master.slaves) if count > 0 else ()
@@ -147,11 +154,15 @@ class Segment:
             return
 
     def gave_up(self) -> None:
-        """A frame did not come back in time: it is lost, or will be taken for a later one's."""
+        """A frame did not come back in time: it is lost, or may be taken for a later one's."""
         self._missing += 1
         self._missing_since = time.monotonic()
         if self._missing == _MANY_MISSING:
             self._stalled_since = self._missing_since
+
+    def came_back(self) -> None:
+        """A frame came back: a wire keeps their order, so all before it have come or never will."""
+        self._missing = 0
 
     def stalled(self) -> bool:
         """Whether so many frames may still come back that the next answer could be a wrong one.
@@ -193,7 +204,8 @@ class Segment:
         try:
             data: bytes = self.slaves[station - 1]._fprd(register, size, self.frame_timeout_us)  # noqa: SLF001 - the only register access pysoem offers
         except pysoem.WkcError:
-            return b"" if self._came_back(began) and may_be_empty else None
+            return b"" if self._answered_by_nobody(began) and may_be_empty else None
+        self.came_back()
         return data
 
     def write(self, station: int, register: int, data: bytes) -> bool:
@@ -204,14 +216,17 @@ class Segment:
         try:
             self.slaves[station - 1]._fpwr(register, data, self.frame_timeout_us)  # noqa: SLF001 - as above
         except pysoem.WkcError:
-            self._came_back(began)
+            self._answered_by_nobody(began)
             return False
+        self.came_back()
         return True
 
-    def _came_back(self, began: float) -> bool:
-        """Whether a frame that nobody answered came back; SOEM waits its whole time for others."""
+    def _answered_by_nobody(self, began: float) -> bool:
+        """Whether a frame came back although nobody took it: SOEM waits its whole time else."""
         back = time.monotonic() - began < self.frame_timeout_us * 1e-6
-        if not back:
+        if back:
+            self.came_back()
+        else:
             self.gave_up()
         return back
 

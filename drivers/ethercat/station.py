@@ -24,7 +24,7 @@ Item = tuple[int, int, int | None]
 """Index, subindex and length in bytes (None for text)."""
 
 
-_TRIES = 3
+_TRIES, _GONE_S = 3, 1.0
 
 
 @dataclass
@@ -94,12 +94,36 @@ class Station:
 
 def al_status(station: Station) -> Steps[bool]:
     """Read the AL state and code into ``station``; False when it does not answer."""
-    data = yield Read(AL_STATUS, 6)
-    if data is None:
-        return False
+    return (yield from _al_status(station)) is True
+
+
+def _al_status(station: Station) -> Steps[bool | None]:
+    """As `al_status`; None where the frame was lost, which says nothing about the station."""
+    data = yield Read(AL_STATUS, 6, may_be_empty=True)
+    if not data:
+        return None if data is None else False
     station.al_state = data[0] & 0x1F
     station.al_code = int.from_bytes(data[4:6], "little")
     return True
+
+
+def answers(station: Station, clock: Callable[[], float]) -> Steps[bool]:
+    """Whether it is there; its AL state and code are read.
+
+    A frame that comes back untouched is certain after `_TRIES`; lost ones, as while the segment or
+    the computer stands still for a moment, are asked again for `_GONE_S`.
+    """
+    deadline = clock() + _GONE_S
+    untouched = 0
+    while True:
+        told = yield from _al_status(station)
+        if told:
+            return True
+        untouched += told is False
+        if untouched >= _TRIES or clock() > deadline:
+            return False
+        if told is None:
+            yield Pause(0.005)
 
 
 def change_state(
@@ -114,25 +138,23 @@ def change_state(
     """
     limit_s = STATE_TIMEOUT_S[target] if timeout_s is None else timeout_s
     deadline = clock() + limit_s
-    if not (yield from _answers(station)):
+    if not (yield from answers(station, clock)):
         raise _gone(station)
     if station.al_state & ERROR_BIT:
         acknowledged = station.al_state & 0x0F | ERROR_BIT
         yield Write(AL_CONTROL, struct.pack("<H", acknowledged))
-        while (yield from _answers(station)) and station.al_state & ERROR_BIT:
+        while (yield from answers(station, clock)) and station.al_state & ERROR_BIT:
             if clock() > deadline:
                 raise _refused(station, target)
             yield Pause(0.001)
     yield Write(AL_CONTROL, struct.pack("<H", target))
     pause_s = 0.0005
-    silent = 0
     while True:
-        silent = 0 if (yield from al_status(station)) else silent + 1
-        if silent >= 10:
+        if not (yield from answers(station, clock)):
             raise _gone(station)
-        if not silent and station.al_state == target:
+        if station.al_state == target:
             return
-        if not silent and station.al_state & ERROR_BIT:
+        if station.al_state & ERROR_BIT:
             raise _refused(station, target)
         if clock() > deadline:
             raise LinkTimeout(
@@ -142,13 +164,6 @@ def change_state(
             )
         yield Pause(pause_s)
         pause_s = min(pause_s * 2, 0.01)
-
-
-def _answers(station: Station) -> Steps[bool]:
-    for _ in range(5):
-        if (yield from al_status(station)):
-            return True
-    return False
 
 
 def _gone(station: Station) -> LinkLost:
