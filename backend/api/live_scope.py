@@ -104,7 +104,10 @@ class ScopeStreams:
                 await self._renew()
 
     async def close(self) -> None:
-        """End all."""
+        """End all; nothing more is sent, however long the ends take."""
+        for running in self._running.values():
+            for pump in running.pumps:
+                pump.cancel()
         for subscription in list(self._running):
             await self._stop(subscription)
 
