@@ -32,7 +32,7 @@ export function ThreeWayTable({
     return parameter ? shown(parameter, value, raw) : String(value ?? '—')
   }
   return (
-    <div className="scroll-table">
+    <div className="scroll-table three-way">
       <table>
         <thead>
           <tr>
