@@ -3,8 +3,8 @@
 Whatever hangs on a motor answers there like such a chain (Gladwell, *Inverse Problems in
 Vibration*, 2004, ch. 4: a spectrum and the residues at one end determine it), so inertias,
 stiffnesses and dampings are the fewest numbers that say what is possible and nothing else.
-Parameters x: log J of the motor, log of its viscous friction, two delays, and per load log J,
-log k and log d.
+Parameters x: log J of the motor, log of its viscous friction, two delays and log of the speed
+filter's corner (these are the path's), and per load log J, log k and log d.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def loads_of(x: FloatArray) -> FloatArray:
 def chain_response_and_slopes(
     x: FloatArray, frequency_hz: FloatArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Torque to velocity [...] and its slope [n parameters, ...] (zero for the delays).
+    """Torque to velocity [...] and its slope [n parameters, ...] (zero for the path).
 
     From the far end towards the motor by impedances: an inertia is sJ, a coupling k/s + d in
     series with all behind it.
@@ -115,7 +115,7 @@ def _mode(p: complex, q: complex, a: complex, b: complex) -> Mode:
 def modal_start(x: FloatArray) -> FloatArray:
     """Parameters of the free modal form (:func:`mechanical_model.model_of`) for a chain's."""
     model = model_of_chain(x)
-    out = [np.log(model.gain), np.log(max(model.pole_rad_s, 1e-6)), x[2], x[3]]
+    out = [np.log(model.gain), np.log(max(model.pole_rad_s, 1e-6)), *x[2:RIGID_PARAMETERS]]
     for m in model.modes:
         part = m.zero_rad_s / (TURN * m.frequency_hz)
         out += [np.log(m.frequency_hz), np.log(min(m.damping, 0.99)),
@@ -165,11 +165,15 @@ def responses_with_load(
 def chain_of_modes(
     gain: float, frequency_hz: FloatArray, residue: FloatArray, viscous: float, damping: float
 ) -> FloatArray:
-    """Parameters (delays zero) of the chain with these undamped modes; all couplings get the same
-    damping ratio.
+    """Parameters (path left zero) of the chain with these undamped modes.
+
+    All couplings get the same damping ratio.
 
     Lanczos' recursion from the motor gives the tridiagonal matrix that has these poles and
     residues (Gladwell, section 4.3); its entries are k and J of one coupling after the other.
+
+    Raises:
+        ValueError: modes that coincide, or that have no part in the response.
     """
     order = np.argsort(frequency_hz)
     poles = np.concatenate([[0.0], (TURN * frequency_hz[order]) ** 2])
@@ -177,13 +181,15 @@ def chain_of_modes(
     v = np.sqrt(weights / np.sum(weights))
     inertia = 1.0 / float(np.sum(weights))
     before, beta, stiffness = np.zeros_like(v), 0.0, 0.0
-    out = [np.log(inertia), np.log(viscous), 0.0, 0.0]
+    out = [np.log(inertia), np.log(viscous), *np.zeros(RIGID_PARAMETERS - 2)]
     for _ in range(frequency_hz.size):
         alpha = float(v @ (poles * v))
         rest = poles * v - alpha * v - beta * before
         beta = float(np.linalg.norm(rest))
-        before, v = v, rest / beta
         stiffness = alpha * inertia - stiffness
+        if beta <= 0 or stiffness <= 0 or inertia <= 0:
+            raise ValueError("two modes are one, as far as numbers go")
+        before, v = v, rest / beta
         inertia = stiffness**2 / (beta**2 * inertia)
         d = 2.0 * damping * np.sqrt(stiffness * inertia)
         out += [np.log(inertia), np.log(stiffness), np.log(d)]

@@ -23,7 +23,7 @@ from backend.analysis.frf import (
 )
 from backend.analysis.model_fit import fit_loop, fit_sampled_model
 from backend.analysis.sampled_model import LoopModel, SampledFit
-from backend.analysis.sampling import SignalPath, delay_response
+from backend.analysis.sampling import SignalPath, delay_response, lag_response
 
 #: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
 SYSTEMATIC_DB = 0.03
@@ -77,22 +77,22 @@ def identify_mechanics(
         fit = _fit_with_loop(views, records, path, max_modes)
     if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
         # No model explains what was sampled, so neither delay nor images are known.
-        raw = views.velocity or views.position
-        assert raw is not None
+        raw = views.velocity
         low, high = raw.valid_band_hz
         plain = replace(raw, valid_band_hz=(low, min(high, 0.1 * raw.sample_rate_hz)))
         return Identification(plain, plain, fit, trusted=False)
     direct, corrected = [], []
-    for raw, late_s, late_std_s, integrated in (
-        (views.velocity, fit.delay_s, fit.delay_std_s, False),
-        (views.position, fit.position_delay_s, fit.position_delay_std_s, True),
-    ):
-        if raw is None:
-            continue
+    ways = [(views.velocity, fit.delay_s, fit.delay_std_s, False)]
+    if views.position is not None:
+        ways.append((views.position, fit.position_delay_s, fit.position_delay_std_s, True))
+    for raw, late_s, late_std_s, integrated in ways:
         delay_deg = 360.0 * raw.frequency_hz * late_std_s
+        late = delay_response(raw.frequency_hz, late_s)
+        if not integrated and path.response_bandwidth_hz is None:
+            late = late * lag_response(raw.frequency_hz, fit.path.response_bandwidth_hz)
         plain = replace(
             raw,
-            response=np.asarray(raw.response / delay_response(raw.frequency_hz, late_s)),
+            response=np.asarray(raw.response / late),
             std_deg=np.hypot(raw.std_deg, delay_deg),
         )
         factor = fit.image_factor(raw.frequency_hz, integrated=integrated)
@@ -106,7 +106,7 @@ def identify_mechanics(
 class _Views:
     """The same mechanics by way of the reported velocity and of the reported position."""
 
-    velocity: Frf | None
+    velocity: Frf
     position: Frf | None
 
 
@@ -114,14 +114,14 @@ def _views(
     records: tuple[Record, ...], path: SignalPath, quantity: Quantity, coulomb_nm: float | None,
     jitter_s: float,
 ) -> _Views:  # fmt: skip
-    """Estimates from what was recorded; the velocity only where its filter is known."""
+    """Estimates from what was recorded."""
     velocity = estimate_periodic(records, path, quantity, coulomb_nm=coulomb_nm, jitter_s=jitter_s)
     if any(record.position is None for record in records):
         return _Views(velocity, None)
     position = estimate_periodic(
         records, path, quantity, coulomb_nm=velocity.coulomb_nm, jitter_s=jitter_s, position=True
     )
-    return _Views(velocity if path.response_bandwidth_hz else None, position)
+    return _Views(velocity, position)
 
 
 def _pooled(parts: list[Frf]) -> Frf:

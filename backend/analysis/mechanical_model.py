@@ -103,13 +103,13 @@ def _product(polynomials: list[FloatArray]) -> FloatArray:
 
 # --- parameters of a fit ----------------------------------------------------------------
 
-#: Gain, pole and two delays come before the modes' four parameters each.
-RIGID_PARAMETERS = 4
+#: Gain, pole, two delays and the speed filter's log corner come before the modes' four each.
+RIGID_PARAMETERS = 5
 MODE_PARAMETERS = 4
 
 
 def model_of(x: FloatArray) -> MechanicalModel:
-    """Parameters to a model: log gain, log pole, (two delays), and per mode log frequency, log
+    """Parameters to a model: log gain, log pole, (path), and per mode log frequency, log
     damping, log residue and β/ω; logarithms, so that what is positive stays so.
     """
     modes = tuple(
@@ -127,7 +127,7 @@ def model_of(x: FloatArray) -> MechanicalModel:
 def response_and_slopes(
     x: FloatArray, frequency_hz: FloatArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Response [...] of `model_of` (x), and its slope [n parameters, ...] (zero for the delays)."""
+    """Response [...] of `model_of` (x), and its slope [n parameters, ...] (zero for the path)."""
     s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
     gain, pole = np.exp(x[0]), np.exp(x[1])
     rigid = gain / (s + pole)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -41,6 +41,8 @@ from backend.analysis.sampling import DIRECT_SHARE, SignalPath, delay_response, 
 
 #: Delays that no path tells are small: this one standard deviation, in s, beside the lines.
 _USUAL_DELAY_S = 60e-6
+#: A speed filter that nobody tells, log of Hz and its standard deviation.
+_USUAL_CORNER, _CORNER_SPREAD = float(np.log(2000.0)), 1.0
 #: β of a mode is this share of ω at most in ordinary machines (one standard deviation).
 _USUAL_ZERO = 0.1
 #: Couplings have about this damping ratio, within a factor of e² (one standard deviation).
@@ -92,7 +94,8 @@ def fit_sampled_model(
         )
         for part in given
     )
-    found = _best(views, period_s, longest_delay_s, max_modes)
+    free_filter = path.response_bandwidth_hz is None and from_position is not None
+    found = _best(views, period_s, longest_delay_s, max_modes, free_filter)
     freedom = max(found.residuals.size - found.x.size, 1)
     variance = float(found.residuals @ found.residuals) / freedom
     covariance = np.linalg.pinv(found.jacobian.T @ found.jacobian) * variance
@@ -100,7 +103,9 @@ def fit_sampled_model(
     return SampledFit(
         model=found.model,
         loop=loop,
-        path=path,
+        path=replace(path, response_bandwidth_hz=float(np.exp(found.x[4])))
+        if free_filter
+        else path,
         delay_s=float(found.x[2]) * period_s,
         delay_std_s=float(spread[2]),
         position_delay_s=float(found.x[3]) * period_s,
@@ -170,6 +175,8 @@ class _Problem:
     views: tuple[_View, ...]
     period_s: float
     form: _Form
+    free_filter: bool
+    """Whether the drive's speed filter is unknown."""
 
     @cached_property
     def _frequencies(self) -> FloatArray:
@@ -187,15 +194,21 @@ class _Problem:
         slopes[2] = turn * plant
         values, gradients = [], []
         for view in self.views:
-            further = None
+            corner = np.exp(x[4])
+            further: ComplexArray | None = None
             if view.integrated:
                 further = delay_response(f, float(x[3] - x[2]) * self.period_s)
+            elif self.free_filter:
+                further = lag_response(f, float(corner))
             seen, by_plant, by_further = view.sampler.seen(plant, further)
             gradient = np.einsum("pil,il->pl", slopes, by_plant)
-            if further is not None:
+            if further is not None and view.integrated:
                 by_delay = np.sum(turn * further * by_further, axis=0)
                 gradient[2] -= by_delay
                 gradient[3] += by_delay
+            elif further is not None:
+                by_corner = further * (1j * f / corner) / (1.0 + 1j * f / corner)
+                gradient[4] = np.sum(by_corner * by_further, axis=0)
             values.append(np.log(seen / view.g))
             gradients.append(gradient / seen)
         return values, gradients
@@ -204,16 +217,18 @@ class _Problem:
         """Weighted logarithmic error: peaks and valleys alike, sane far from the solution."""
         values, _ = self._parts(x)
         rows = [v * view.weight for v, view in zip(values, self.views, strict=True)]
-        usual = [x[2:4] * self.period_s / _USUAL_DELAY_S, self.form.prior(x)[0]]
+        path = [*(x[2:4] * self.period_s / _USUAL_DELAY_S), (x[4] - _USUAL_CORNER) / _CORNER_SPREAD]
+        usual = [np.array(path), self.form.prior(x)[0]]
         return np.concatenate([p for e in rows for p in (e.real, e.imag)] + usual)
 
     def slope(self, x: FloatArray) -> FloatArray:
         """Jacobian [residuals, parameters] of `misfit`."""
         _, gradients = self._parts(x)
         rows = [g * view.weight for g, view in zip(gradients, self.views, strict=True)]
-        delays = np.zeros((2, x.size))
-        delays[0, 2] = delays[1, 3] = self.period_s / _USUAL_DELAY_S
-        usual = [delays, self.form.prior(x)[1]]
+        path = np.zeros((3, x.size))
+        path[0, 2] = path[1, 3] = self.period_s / _USUAL_DELAY_S
+        path[2, 4] = 1.0 / _CORNER_SPREAD
+        usual = [path, self.form.prior(x)[1]]
         return np.concatenate([p.T for e in rows for p in (e.real, e.imag)] + usual)
 
     def solve(self, start: FloatArray) -> _Found:
@@ -222,10 +237,11 @@ class _Problem:
         # A delay that a start brings along is looked for around it.
         around = start[2:4]
         low[2:4], high[2:4] = np.maximum(around - 1.0, -0.3), around + 1.0
+        low[4], high[4] = np.log(100.0), np.log(20000.0)
         count = (start.size - RIGID_PARAMETERS) // len(self.form.steps)
         fit = least_squares(
             self.misfit, np.clip(start, low + 1e-9, high - 1e-9), self.slope, bounds=(low, high),
-            x_scale=np.array([0.3, 1.0, 0.05, 0.05, *self.form.steps * count]),
+            x_scale=np.array([0.3, 1.0, 0.05, 0.05, 0.3, *self.form.steps * count]),
             loss="soft_l1", f_scale=3.0, max_nfev=40, ftol=1e-4, xtol=1e-5,
         )  # fmt: skip
         points = sum(2 * int(np.count_nonzero(view.weight)) for view in self.views)
@@ -251,12 +267,8 @@ def _median(values: FloatArray, weight: FloatArray) -> float:
 def _rigid_bounds(gain: float, f: FloatArray) -> tuple[list[float], list[float]]:
     """Gain, pole and delays (these are set by the problem)."""
     highest = float(np.log(0.5 * TURN * np.sqrt(f[0] * f[-1])))
-    return [gain - 2.5, float(np.log(1e-3 * TURN * f[0])), 0.0, 0.0], [
-        gain + 2.5,
-        highest,
-        0.0,
-        0.0,
-    ]
+    lowest = float(np.log(1e-3 * TURN * f[0]))
+    return [gain - 2.5, lowest, 0.0, 0.0, 0.0], [gain + 2.5, highest, 0.0, 0.0, 0.0]
 
 
 def _modal_bounds(x: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -281,7 +293,8 @@ def _chain_bounds(x: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]
     whole = float(np.log(np.exp(x[0]) + np.sum(loads_of(x)[:, 0])))
     slow = np.log(1e-3 * TURN * f[0])
     fast = np.log(0.5 * TURN * np.sqrt(f[0] * f[-1]))
-    low, high = [whole - 6.0, whole + slow, 0.0, 0.0], [whole + 1.5, whole + fast, 0.0, 0.0]
+    low, high = [whole - 6.0, whole + slow], [whole + 1.5, whole + fast]
+    low, high = [*low, 0.0, 0.0, 0.0], [*high, 0.0, 0.0, 0.0]
     stiffest = 2 * np.log(TURN * 2 * _HIGHEST_TRIED * f[-1])
     softest = 2 * np.log(TURN * f[0])
     for _ in range((x.size - RIGID_PARAMETERS) // LOAD_PARAMETERS):
@@ -311,10 +324,11 @@ _MODAL = _Form(response_and_slopes, model_of, _modal_bounds, _modal_prior, (0.03
 
 
 def _best(
-    views: tuple[_View, ...], period_s: float, longest_delay_s: float, max_modes: int
-) -> _Found:
+    views: tuple[_View, ...], period_s: float, longest_delay_s: float, max_modes: int,
+    free_filter: bool,
+) -> _Found:  # fmt: skip
     """The chain that the criterion likes best, or modes where they gain much over it."""
-    chain = _Problem(views, period_s, _CHAIN)
+    chain = _Problem(views, period_s, _CHAIN, free_filter)
     found = _grown(chain, _rigid_start(views[0], 0.0), max_modes)
     if found.error > 0.05:
         # Perhaps there is a delay that no path told.
@@ -325,7 +339,7 @@ def _best(
             again = _rigid_start(views[0], float(start.x[2]))
             found = min(found, _grown(chain, again, max_modes), key=lambda t: t.score)
     if found.x.size > RIGID_PARAMETERS:
-        modal = _Problem(views, period_s, _MODAL).solve(modal_start(found.x))
+        modal = _Problem(views, period_s, _MODAL, free_filter).solve(modal_start(found.x))
         # Free modes also imitate delays and noise, so they must explain much that no chain does.
         if modal.score < found.score - _MODES_GAIN and modal.error < 0.7 * found.error:
             return modal
@@ -336,7 +350,8 @@ def _rigid_start(view: _View, delay: float) -> FloatArray:
     """A single inertia, from the low lines, where every chain moves as one."""
     low = slice(0, max(3, view.f.size // 6))
     inertia = 1.0 / float(np.median(np.abs(view.g[low]) * TURN * view.f[low]))
-    return np.array([np.log(inertia), np.log(0.02 * TURN * view.f[0] * inertia), delay, delay])
+    return np.array([np.log(inertia), np.log(0.02 * TURN * view.f[0] * inertia), delay, delay,
+                     _USUAL_CORNER])  # fmt: skip
 
 
 def _grown(problem: _Problem, start: FloatArray, max_modes: int) -> _Found:
@@ -427,14 +442,17 @@ def _with_one_more_mode(problem: _Problem, found: _Found) -> list[FloatArray]:
     residue = float(explained[best] / norm[best])
     if residue <= 0:
         return []
-    x = chain_of_modes(
-        model.gain,
-        np.array([*(m.frequency_hz for m in model.modes), hz[best]]),
-        np.array([*(max(m.residue, 1e-9) for m in model.modes), residue]),
-        float(np.exp(found.x[1])), _USUAL_DAMPING,
-    )  # fmt: skip
-    x[2:4] = found.x[2:4]
-    return [x] if np.all(np.isfinite(x)) else []
+    try:
+        x = chain_of_modes(
+            model.gain,
+            np.array([*(m.frequency_hz for m in model.modes), hz[best]]),
+            np.array([*(max(m.residue, 1e-9) for m in model.modes), residue]),
+            float(np.exp(found.x[1])), _USUAL_DAMPING,
+        )  # fmt: skip
+    except ValueError:
+        return []
+    x[2:RIGID_PARAMETERS] = found.x[2:RIGID_PARAMETERS]
+    return [x]
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import minimize_scalar
+from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from backend.analysis.arrays import ComplexArray, FloatArray
@@ -26,6 +26,8 @@ MODEL_SHARE = 0.4
 
 #: A drive interpolates in the steps of its own loop (50 µs) and so is half a step ahead of a line.
 STEP_LEAD_S = 25e-6
+#: Set-points are in force after this many cycles at most.
+_MOST_CYCLES = 3
 
 
 @dataclass(frozen=True)
@@ -124,59 +126,89 @@ def fit_path(
     path: SignalPath,
     *,
     loop_closed: bool,
-    most_cycles: int = 3,
+    hold_known: bool = False,
 ) -> SignalPath:
-    """Delay from the sent values to the torque, and the current loop's corner where unknown.
+    """Hold and delay from the sent values to the torque, and an unknown current loop's corner.
 
     ``commands`` and ``torques`` [n] are whole periods that follow the same period (steady state),
-    ``lines`` the excited bins. Judged by the upper lines; there a closed loop adds about a/s of
-    what is injected, which is fitted along. That leaves no more than whole cycles to be told
-    apart in a closed loop, less the `STEP_LEAD_S` of interpolation.
+    ``lines`` the excited bins.
     """
-    period_s = 1.0 / path.sample_rate_hz
-    lead_s = STEP_LEAD_S if path.hold == "linear" else 0.0
+    judge = _PathJudge(commands, torques, lines, loop_closed)
+    holds: tuple[Hold, ...] = (path.hold,) if hold_known else ("linear", "zero")
+    tried = [judge.whole_cycles(replace(path, hold=hold)) for hold in holds]
+    best = min(tried, key=lambda found: found[1])[0]
+    if loop_closed or path.current_bandwidth_hz is None:
+        # A corner and a fraction of a cycle are hardly told apart: the mechanics' fit finds it.
+        return best
+    return judge.refined(best, corner=False, delay=True)[0]
 
-    def rest(delay_s: float, bandwidth_hz: float | None) -> float:
-        trial = replace(path, command_delay_s=delay_s, current_bandwidth_hz=bandwidth_hz)
-        total = 0.0
-        for sent, torque, bins in zip(commands, torques, lines, strict=True):
+
+@dataclass(frozen=True)
+class _PathJudge:
+    """How well a path explains the reported torque, on the upper lines.
+
+    There a closed loop adds about a/s of what is injected, which is fitted along. That leaves no
+    more than whole cycles to be told apart in a closed loop, less the `STEP_LEAD_S` of
+    interpolation.
+    """
+
+    commands: tuple[FloatArray, ...]
+    torques: tuple[FloatArray, ...]
+    lines: tuple[npt.NDArray[np.int64], ...]
+    loop_closed: bool
+
+    def whole_cycles(self, path: SignalPath) -> tuple[SignalPath, float]:
+        """The best number of cycles, and corner where unknown, with what is left unexplained.
+
+        Half a cycle and a hold look like none and an interpolation, as far as samples tell.
+        """
+        period_s = 1.0 / path.sample_rate_hz
+        lead_s = STEP_LEAD_S if path.hold == "linear" else 0.0
+        known = path.current_bandwidth_hz
+        corners = np.geomspace(150.0, 6000.0, 7) if known is None else np.array([known])
+        trials = [
+            replace(path, command_delay_s=max(c * period_s - lead_s, 0.0),
+                    current_bandwidth_hz=float(b))
+            for c in range(_MOST_CYCLES + 1) for b in corners
+        ]  # fmt: skip
+        costs = [float(np.sum(self._rest(trial) ** 2)) for trial in trials]
+        start = trials[int(np.argmin(costs))]
+        return self.refined(start, corner=known is None, delay=False)
+
+    def refined(self, start: SignalPath, *, corner: bool, delay: bool) -> tuple[SignalPath, float]:
+        """Gauss-Newton from a start; microseconds matter here."""
+        period_s = 1.0 / start.sample_rate_hz
+
+        def path_of(x: FloatArray) -> SignalPath:
+            late = start.command_delay_s
+            if delay:
+                late = max(late + float(np.clip(x[0], -0.2, 0.2)) * period_s, 0.0)
+            bandwidth = start.current_bandwidth_hz
+            if corner:
+                bandwidth = float(np.exp(np.clip(x[1], 3.0, 10.0)))
+            return replace(start, command_delay_s=late, current_bandwidth_hz=bandwidth)
+
+        x0 = np.array([start.command_delay_s / period_s, np.log(start.current_bandwidth_hz or 1.0)])
+        if not corner and not delay:
+            return start, float(np.sum(self._rest(start) ** 2))
+
+        def rest(x: FloatArray) -> FloatArray:
+            return self._rest(path_of(x))
+
+        found = least_squares(rest, x0, x_scale=[0.05, 0.1], max_nfev=25)
+        return path_of(found.x), 2.0 * float(found.cost)
+
+    def _rest(self, path: SignalPath) -> FloatArray:
+        """What the path leaves unexplained, real and imaginary parts."""
+        parts = []
+        for sent, torque, bins in zip(self.commands, self.torques, self.lines, strict=True):
             upper = bins[(3 * bins.size) // 4 :]
             twice = np.concatenate([sent, sent])
-            u = np.fft.rfft(sampled_command(twice, trial)[sent.size :])[upper]
-            t = np.fft.rfft(torque)[upper]
-            error = t - u
-            if loop_closed:
+            u = np.fft.rfft(sampled_command(twice, path)[sent.size :])[upper]
+            error = np.fft.rfft(torque)[upper] - u
+            if self.loop_closed:
                 column = u / (1j * upper)
-                error = error - column * (
-                    np.vdot(column, error).real / np.vdot(column, column).real
-                )
-            total += float(np.sum(np.abs(error) ** 2))
-        return total
-
-    def best_delay(bandwidth_hz: float | None) -> tuple[float, float]:
-        cycles = np.arange(0.0, most_cycles + 0.01, 1.0 if loop_closed else 0.25)
-        grid = np.maximum(cycles * period_s - lead_s, 0.0)
-        costs = [rest(float(d), bandwidth_hz) for d in grid]
-        near = float(grid[int(np.argmin(costs))])
-        if loop_closed:
-            return near, min(costs)
-        bounds = (max(near - 0.3 * period_s, 0.0), near + 0.3 * period_s)
-        found = minimize_scalar(
-            lambda d: rest(float(d), bandwidth_hz), bounds=bounds, method="bounded",
-            options={"xatol": 1e-6},
-        )  # fmt: skip
-        return float(found.x), float(found.fun)
-
-    bandwidth = path.current_bandwidth_hz
-    if bandwidth is None:
-        low = 0.1 * path.sample_rate_hz
-        corners = np.geomspace(low, 8000.0, 12)
-        costs = [best_delay(float(b))[1] for b in corners]
-        place = int(np.argmin(costs))
-        around = (corners[max(place - 1, 0)], corners[min(place + 1, corners.size - 1)])
-        found = minimize_scalar(
-            lambda x: best_delay(float(np.exp(x)))[1], bounds=tuple(np.log(around)),
-            method="bounded", options={"xatol": 0.01},
-        )  # fmt: skip
-        bandwidth = float(np.exp(found.x))
-    return replace(path, command_delay_s=best_delay(bandwidth)[0], current_bandwidth_hz=bandwidth)
+                share = np.vdot(column, error).real / np.vdot(column, column).real
+                error = error - column * share
+            parts += [error.real, error.imag]
+        return np.concatenate(parts)

@@ -27,6 +27,7 @@ from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.tools import excite
+from backend.tools import notch as notch_tool
 from backend.tools.axis_facts import AxisFacts, read_facts
 from backend.tools.go_back import go_back
 from backend.tools.probe import PULLED, Probed, holding_torque, probe_axis
@@ -186,12 +187,25 @@ def _check(settings: SweepSettings) -> None:
 
 
 async def _filters_off(axis: Axis, settings: SweepSettings) -> dict[str, int]:
-    """Notches lie in the path of the torque: mechanics are measured without them."""
-    notch = axis.drive.profile.notch
-    if settings.kind != "mechanics" or not settings.notches_off or notch is None:
+    """Notches and the torque filter lie in the path of the torque: mechanics are measured without.
+
+    A family without an enable bit takes a notch out by its highest frequency.
+    """
+    if settings.kind != "mechanics" or not settings.notches_off:
         return {}
-    keys = {slot.enable_key for slot in notch.slots if slot.enable_key is not None}
-    return {key: 0 for key in sorted(keys) if await axis.drive.raw(key) != 0}
+    drive, off = axis.drive, dict[str, int]()
+    for number, slot in enumerate(drive.profile.notch.slots if drive.profile.notch else ()):
+        if slot.enable_key is not None:
+            off[slot.enable_key] = 0
+        else:
+            off |= notch_tool.encode(drive.profile, drive.name, number, None, None).raw
+    gains = drive.profile.gains
+    if gains is not None and gains.torque_filter is not None:
+        low, _high = drive.parameter(gains.torque_filter).raw_limits
+        if low == 0:
+            off[gains.torque_filter] = 0
+    reachable = {k: v for k, v in off.items() if not drive.unreachable_why(drive.parameter(k))}
+    return {key: raw for key, raw in sorted(reachable.items()) if await drive.raw(key) != raw}
 
 
 def _choose(
@@ -436,7 +450,10 @@ def _found_path(records: tuple[Record, ...], path: SignalPath, closed: bool) -> 
         lines.append(e.lines)
     if not commands:
         return path
-    return fit_path(tuple(commands), tuple(torques), tuple(lines), path, loop_closed=closed)
+    return fit_path(
+        tuple(commands), tuple(torques), tuple(lines), path, loop_closed=closed,
+        hold_known=path.hold == "linear",
+    )  # fmt: skip
 
 
 def _saturated(
