@@ -32,6 +32,7 @@ CHECKS: list[tuple[str, list[str], Path]] = [
     ("format", [str(BIN / "ruff"), "format", "--check", "."], ROOT),
     ("lint", [str(BIN / "ruff"), "check", "."], ROOT),
     ("types", [str(BIN / "mypy")], ROOT),
+    ("dependencies", [str(BIN / "deptry"), "."], ROOT),
     ("import contracts", [str(BIN / "lint-imports")], ROOT),
     ("page: types and lint", [*NPM, "run", "--silent", "check"], ROOT / "webui"),
     ("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),
