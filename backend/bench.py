@@ -71,7 +71,7 @@ class Bench:
         self._stops: set[asyncio.Task[dict[str, str]]] = set()
         self._changing: set[str] = set()
         self.leases = Leases(self._lease_changed)
-        self._witness = Witness(self.audit, self._name_of)
+        self._witness = Witness(self.audit, self.name_of)
         self.on_job.append(self._witness.job_changed)
         self.scope = ScopeHub(lambda drive: self.member(drive).axis)
         self.state_folder = state_folder
@@ -439,7 +439,8 @@ class Bench:
         self._witness.lease_changed(drive_id, self.leases.holder(drive_id))
         self._drives_changed()
 
-    def _name_of(self, drive_id: str) -> str:
+    def name_of(self, drive_id: str) -> str:
+        """Name of a drive, or its id where it is not on the bench."""
         member = self.members.get(drive_id)
         return member.drive.name if member is not None else drive_id
 

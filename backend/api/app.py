@@ -146,7 +146,9 @@ def make_app(
     ):
         api.include_router(part.router)
     app.include_router(api)
-    app.add_middleware(AuditedAnswers, audit=bench.audit, stop_path=f"{PREFIX}/stop")
+    app.add_middleware(
+        AuditedAnswers, audit=bench.audit, name_of=bench.name_of, stop_path=f"{PREFIX}/stop"
+    )
 
     @app.websocket(f"{PREFIX}/live")
     async def live_socket(socket: WebSocket) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,10 @@ import httpx
 import pytest
 
 from backend.api.app import make_app
+from backend.api.audited import AuditedAnswers
+from backend.api.rights import ROUTES
 from backend.bench import Bench
+from backend.people.rights import Right
 from drivers.link import Found
 from tests.support.servo import Servo, bench_with
 
@@ -241,6 +245,7 @@ async def test_the_audit_tells_who_wrote_what(http: httpx.AsyncClient, bench: Be
     assert (event["axis"], event["target"], event["old"], event["new"], event["outcome"]) == (
         "X", GAIN, before, 360, "",
     )  # fmt: skip
+    assert event["person"] == "local user"
     await put(http, set_of(350))
     await load(http, [GAIN])
     await http.post("/stop", json={})
@@ -262,6 +267,31 @@ async def test_the_audit_tells_who_wrote_what(http: httpx.AsyncClient, bench: Be
     assert [json.loads(line)["number"] for line in lines] == list(range(1, len(events) + 1))
     table = (await http.get("/audit/export", params={"kind": "stop"})).text.splitlines()
     assert len(table) == 2
+
+
+async def test_no_change_of_files_or_station_is_forgotten(
+    http: httpx.AsyncClient, bench: Bench
+) -> None:
+    answer = await http.patch("/drives/x", json={"notes": "greased"})
+    assert answer.is_success, answer.text
+    assert (await http.patch("/drives/nothing", json={"notes": ""})).status_code == 404
+    events = (await http.get("/audit?kind=station")).json()["events"]
+    assert [(e["action"], e["axis"], e["target"], e["person"]) for e in events] == [
+        ("changed", "X", "/drives/x", "local user")
+    ]
+    told = AuditedAnswers(make_app(bench, hosts=frozenset()), bench.audit, str, "/stop")
+    silent = []
+    for route, need in ROUTES.items():
+        method, _, path = route.partition(" ")
+        changes = need.right in (Right.FILES, Right.STATION) and method not in ("GET", "WS")
+        if changes and told._fact(method, re.sub(r"{\w+(:path)?}", "x", path)) is None:
+            silent.append(route.replace("/api/v1", ""))
+    # These are told where they happen, with versions and values, or as jobs.
+    assert sorted(silent) == [
+        "DELETE /library/{entry_id}", "DELETE /sets/{file}",
+        "PATCH /library/{entry_id}", "POST /drives/{drive_id}/jobs/firmware",
+        "POST /drives/{drive_id}/sets", "POST /scan", "POST /sets/list", "PUT /sets/{file}",
+    ]  # fmt: skip
 
 
 async def audit_status(http: httpx.AsyncClient, *, troubled: bool) -> Any:
