@@ -38,6 +38,21 @@ class SweepRequest(TuneLimits):
     base_motion: bool = True
 
 
+class ExcitationInfo(Message):
+    """What a frequency response would play, as far as it is known before the axis is felt."""
+
+    unit: str
+    time_s: list[float]
+    value: list[float] = Field(description="one realisation; extremes of every stretch")
+    frequency_hz: list[float]
+    amplitude: list[float] = Field(description="of every line, in the same unit")
+    peak: float
+    crest: float
+    duration_s: float = Field(description="of all realisations together")
+    realisations: int
+    inertia_kgm2: float = Field(description="that was assumed")
+
+
 class InertiaRequest(TuneLimits):
     """Inertia and friction."""
 

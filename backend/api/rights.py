@@ -152,6 +152,7 @@ _API: dict[str, Need] = {
     "PUT /drives/{drive_id}/gains": _PARAMETERS,
     "POST /drives/{drive_id}/tune/candidates": _LOOK,
     "POST /drives/{drive_id}/tune/predict": _LOOK,
+    "POST /drives/{drive_id}/tune/excitation": _LOOK,
     "POST /drives/{drive_id}/tune/undo": _PARAMETERS,
     "GET /measurements": _LOOK,
     "POST /measurements": _FILES_UPLOAD,

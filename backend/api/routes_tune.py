@@ -12,10 +12,11 @@ import numpy.typing as npt
 from fastapi import APIRouter
 
 from backend.api import convert, routes_design, routes_measurements, routes_report
-from backend.api.context import Controlled, TheBench
+from backend.api.context import Controlled, TheBench, TheMember
 from backend.api.models import JobInfo
 from backend.api.models_tune import (
     AutotuneRequest,
+    ExcitationInfo,
     InertiaRequest,
     StepRequest,
     SweepRequest,
@@ -29,6 +30,7 @@ from backend.jobs import JobResult, Progress
 from backend.measurements import MeasurementStore
 from backend.report.changes import Change
 from backend.tools import autotune, inertia, step_response, sweep
+from backend.tools.sweep_preview import preview
 from drivers.errors import DriveError
 
 router = APIRouter()
@@ -103,13 +105,29 @@ def _envelope(request: TuneLimits) -> Envelope:
     )
 
 
-@router.post("/drives/{drive_id}/jobs/sweep", status_code=202)
-async def start_sweep(bench: TheBench, member: Controlled, request: SweepRequest) -> JobInfo:
-    """Measure a frequency response. The result has the form of ``servodeck sweep --out``."""
-    settings = sweep.SweepSettings(
+def _sweep_settings(request: SweepRequest) -> sweep.SweepSettings:
+    return sweep.SweepSettings(
         _envelope(request), request.kind, request.loop, request.f_min_hz, request.f_max_hz,
         request.share, request.realisations, request.base_motion, request.rated_torque_nm,
     )  # fmt: skip
+
+
+@router.post("/drives/{drive_id}/tune/excitation")
+async def preview_excitation(member: TheMember, request: SweepRequest) -> ExcitationInfo:
+    """What a frequency response would play. Nothing moves."""
+    found = await preview(member.axis, _sweep_settings(request), 1e3 / request.cycle_ms)
+    return ExcitationInfo(
+        unit=found.unit, time_s=found.time_s.tolist(), value=found.value.tolist(),
+        frequency_hz=found.frequency_hz.tolist(), amplitude=found.amplitude.tolist(),
+        peak=found.peak, crest=found.crest, duration_s=found.duration_s,
+        realisations=found.realisations, inertia_kgm2=found.inertia_kgm2,
+    )  # fmt: skip
+
+
+@router.post("/drives/{drive_id}/jobs/sweep", status_code=202)
+async def start_sweep(bench: TheBench, member: Controlled, request: SweepRequest) -> JobInfo:
+    """Measure a frequency response. The result has the form of ``servodeck sweep --out``."""
+    settings = _sweep_settings(request)
 
     async def tool(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
         return sweep.as_json(await sweep.sweep(member.axis, session, settings, progress, keep))

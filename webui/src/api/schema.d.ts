@@ -1290,6 +1290,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/tune/excitation": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Preview Excitation
+         * @description What a frequency response would play. Nothing moves.
+         */
+        post: operations["preview_excitation"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/tune/predict": {
         parameters: {
             query?: never;
@@ -3511,6 +3531,44 @@ export interface components {
             stations: components["schemas"]["SegmentStation"][];
             /** Url */
             url: string;
+        };
+        /**
+         * ExcitationInfo
+         * @description What a frequency response would play, as far as it is known before the axis is felt.
+         */
+        ExcitationInfo: {
+            /**
+             * Amplitude
+             * @description of every line, in the same unit
+             */
+            amplitude: number[];
+            /** Crest */
+            crest: number;
+            /**
+             * Duration S
+             * @description of all realisations together
+             */
+            duration_s: number;
+            /** Frequency Hz */
+            frequency_hz: number[];
+            /**
+             * Inertia Kgm2
+             * @description that was assumed
+             */
+            inertia_kgm2: number;
+            /** Peak */
+            peak: number;
+            /** Realisations */
+            realisations: number;
+            /** Time S */
+            time_s: number[];
+            /** Unit */
+            unit: string;
+            /**
+             * Value
+             * @description one realisation; extremes of every stretch
+             */
+            value: number[];
         };
         /**
          * FaultHistory
@@ -7489,6 +7547,7 @@ export type EnableRelease = components['schemas']['EnableRelease'];
 export type EnableRenew = components['schemas']['EnableRenew'];
 export type EthercatPermissions = components['schemas']['EthercatPermissions'];
 export type EthercatSegment = components['schemas']['EthercatSegment'];
+export type ExcitationInfo = components['schemas']['ExcitationInfo'];
 export type FaultHistory = components['schemas']['FaultHistory'];
 export type FaultHistoryInfo = components['schemas']['FaultHistoryInfo'];
 export type Forcing = components['schemas']['Forcing'];
@@ -18290,6 +18349,149 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CandidatesInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    preview_excitation: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SweepRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ExcitationInfo"];
                 };
             };
             /** @description Not a request of this interface */

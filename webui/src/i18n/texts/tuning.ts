@@ -48,6 +48,12 @@ export const tuning = {
     'The axis is enabled and follows a small, fast changing command, with at most {torque} % of rated torque. It stays within ±{travel} rev of where it stands and below {speed} rpm, returns to its place, and is disabled. Nobody may be near it.',
     '轴将使能并跟随快速变化的小幅指令，最大 {torque}% 额定转矩，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并去使能。请确保无人靠近。',
   ],
+  'excite.title': ['Preview of the excitation', '激励预览'],
+  'excite.one': ['first realisation', '第一次激励'],
+  'excite.told': [
+    '{count} runs, {duration} in all; {lines} lines from {from} to {to}; peak {peak} {unit}, crest factor {crest}. Scaled once more to the axis as it is felt before it starts, never above the limits.',
+    '{count} 次，共 {duration}；{from} 至 {to} 共 {lines} 条谱线；峰值 {peak} {unit}，峰值因数 {crest}。开始前会按实测轴特性再次缩放，绝不超过限制。',
+  ],
   'sweep.start': ['Start measuring', '开始测量'],
   'response.empty': [
     'No response is shown. Measure one, or choose a stored one.',

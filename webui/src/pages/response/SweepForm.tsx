@@ -1,4 +1,4 @@
-import { Button, Checkbox, NativeSelect } from '@mantine/core'
+import { Button, Checkbox, NativeSelect, useComputedColorScheme } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AxisState, SweepRequest } from '../../api/schema'
@@ -9,6 +9,7 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { useRemembered } from '../motion/remembered'
+import { ExcitationPreview } from './ExcitationPreview'
 import { LimitFields, useLimits } from './limits'
 
 const KINDS = ['mechanics', 'speed_loop', 'position_loop'] as const
@@ -26,25 +27,30 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
   const [base, setBase] = useState(true)
   const limits = useLimits(drive)
   const start = useAction()
-  const complete = limits.limits !== null && low !== null && share !== null && count !== null
+  const dark = useComputedColorScheme('light') === 'dark'
+  const [previewed, setPreviewed] = useState(false)
+  const request: SweepRequest | null =
+    limits.limits === null || low === null || share === null || count === null
+      ? null
+      : {
+          ...limits.limits,
+          kind,
+          loop: kind === 'mechanics' ? loop : 'auto',
+          f_min_hz: low,
+          f_max_hz: high,
+          share: share / 100,
+          realisations: count,
+          base_motion: base,
+          cycle_ms: 1,
+        }
   const go = () =>
     start.run(async () => {
-      if (!limits.limits || low === null || share === null || count === null) return
+      if (!request) return
       setJob(
         await ask(
           api.POST('/api/v1/drives/{drive_id}/jobs/sweep', {
             params: { path: { drive_id: drive } },
-            body: {
-              ...limits.limits,
-              kind,
-              loop: kind === 'mechanics' ? loop : 'auto',
-              f_min_hz: low,
-              f_max_hz: high,
-              share: share / 100,
-              realisations: count,
-              base_motion: base,
-              cycle_ms: 1,
-            },
+            body: request,
           }),
         ),
       )
@@ -114,6 +120,10 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
           onChange={(event) => setBase(event.currentTarget.checked)}
         />
       </details>
+      <details onToggle={(event) => setPreviewed(event.currentTarget.open)}>
+        <summary>{t('excite.title')}</summary>
+        {previewed && <ExcitationPreview drive={drive} request={request} dark={dark} />}
+      </details>
       {limits.limits && (
         <p className="note warn">
           {t(kind === 'mechanics' ? 'sweep.moves' : 'sweep.movesLoop', {
@@ -126,7 +136,7 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
       )}
       <Button
         variant="filled"
-        disabled={!complete || state?.moving_job != null || !state?.fresh}
+        disabled={!request || state?.moving_job != null || !state?.fresh}
         loading={start.busy}
         onClick={() => void go()}
       >

@@ -1,0 +1,96 @@
+import { useEffect, useMemo, useState } from 'react'
+import { api, ask, problemOf } from '../../api/client'
+import type { ExcitationInfo, Problem, SweepRequest } from '../../api/schema'
+import { useT } from '../../i18n'
+import { figure } from '../../widgets/format'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { TRACE_COLORS } from '../scope/channels'
+import { fixed, hertz } from './bode'
+import { StepPlot } from './StepPlot'
+
+const SETTLE_MS = 400
+
+/** What would be played: the curve over time, its lines, and how long it takes. */
+export function ExcitationPreview({
+  drive,
+  request,
+  dark,
+}: {
+  drive: string
+  /** Null while the settings are not complete. */
+  request: SweepRequest | null
+  dark: boolean
+}) {
+  const t = useT()
+  const [found, setFound] = useState<ExcitationInfo | null>(null)
+  const [problem, setProblem] = useState<Problem | null>(null)
+  const asked = JSON.stringify(request)
+  useEffect(() => {
+    if (!request) return
+    let current = true
+    const timer = setTimeout(() => {
+      ask(
+        api.POST('/api/v1/drives/{drive_id}/tune/excitation', {
+          params: { path: { drive_id: drive } },
+          body: request,
+        }),
+      ).then(
+        (made) => {
+          if (!current) return
+          setFound(made)
+          setProblem(null)
+        },
+        (error: unknown) => {
+          if (!current) return
+          setFound(null)
+          setProblem(problemOf(error))
+        },
+      )
+    }, SETTLE_MS)
+    return () => {
+      current = false
+      clearTimeout(timer)
+    }
+  }, [asked, drive])
+  const name = t('excite.one')
+  const traces = useMemo(
+    () =>
+      found
+        ? [
+            {
+              label: name,
+              color: TRACE_COLORS[dark ? 'dark' : 'light'][0] ?? '',
+              time: found.time_s,
+              value: found.value,
+            },
+          ]
+        : [],
+    [found, dark, name],
+  )
+  if (problem) return <ProblemNote problem={problem} />
+  if (!found) return <p className="dim">{t('loading')}</p>
+  return (
+    <div className="preview-plot">
+      <StepPlot
+        traces={traces}
+        unit={found.unit === '% of rated torque' ? t('step.torqueUnit') : found.unit}
+        label={t('excite.title')}
+        timeLabel={t('predict.time')}
+        dark={dark}
+        height={170}
+      />
+      <p className="dim">
+        {t('excite.told', {
+          count: found.realisations,
+          duration: fixed(found.duration_s, 1, 's'),
+          lines: found.frequency_hz.length,
+          from: hertz(found.frequency_hz[0]),
+          to: hertz(found.frequency_hz.at(-1)),
+          peak: figure(found.peak, 3),
+          unit: found.unit === '% of rated torque' ? t('step.torqueUnit') : found.unit,
+          crest: fixed(found.crest, 2),
+        })}
+      </p>
+    </div>
+  )
+}
