@@ -2,7 +2,10 @@
 
 Counts every cycle that did not arrive at the browser's side, and times the interface meanwhile.
 ``SERVODECK_SOAK_S`` sets the length; 600 s are the ten minutes that the product promises. Aims:
-every missing cycle counted, API p99 below 50 ms, memory flat.
+every missing cycle counted, API p99 below 50 ms, memory flat. The segment's time is that of
+``make run``: a cycle that a busy computer begins late is late, but not skipped, so a loaded machine
+shows in the cycles per second. With ``SERVODECK_SOAK_REAL_TIME=1`` late cycles are skipped and
+counted, as with real drives; that needs a machine that does nothing else.
 """
 
 from __future__ import annotations
@@ -13,15 +16,19 @@ import struct
 import tempfile
 import threading
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import httpx
 import numpy as np
 
+from drivers.link import Link
 from tests.support.station import Live, Station
 
 URL = "ethercat://virtual0"
 SECONDS = float(os.environ.get("SERVODECK_SOAK_S", "60"))
+REAL_TIME = bool(os.environ.get("SERVODECK_SOAK_REAL_TIME"))
 AXES = 4
 KEYS = ("6064:00", "606C:00", "6077:00", "60F4:00")
 
@@ -58,14 +65,17 @@ def watch(page: Live, axis: str) -> tuple[int, int, int]:
     """Received cycles, cycles counted as dropped, cycles in which a sample was not valid."""
     received = dropped = invalid = 0
     end = time.monotonic() + SECONDS
-    forward, turn = 1, 0.0
+    forward, turn, renewed = 1, 0.0, 0.0
     jogging = False
     while time.monotonic() < end:
         if not jogging:
             page.send(type="jog_start", drive=axis, direction=forward, speed=200.0,
                       acceleration=2000.0, travel_limit=30.0, torque_limit=200.0)  # fmt: skip
             jogging, turn = True, time.monotonic() + 4
-        page.send(type="jog_renew", drive=axis)
+        if time.monotonic() > renewed + 0.05:
+            # As often as the page does; the server takes no flood of messages.
+            renewed = time.monotonic()
+            page.send(type="jog_renew", drive=axis)
         if time.monotonic() > turn:
             page.send(type="jog_stop", drive=axis)
             turn = end
@@ -88,8 +98,14 @@ def watch(page: Live, axis: str) -> tuple[int, int, int]:
 def main() -> None:
     """Print the figures."""
     folder = Path(tempfile.mkdtemp())
-    station = Station(folder, bench_file(folder), ["--realtime", "20"])
-    station.start()
+    station = Station(
+        folder, bench_file(folder), ["--realtime", "20"] if REAL_TIME else ["--steady"]
+    )
+    station.drives.start()
+    if not REAL_TIME:
+        open_bus: Callable[..., Link] = station.drives.wires[URL]
+        station.drives.wires[URL] = partial(open_bus, lockstep=1.0)
+    station.start_server()
     try:
         axes = [station.add(n, URL, name=f"A{n}") for n in range(1, AXES + 1)]
         station.ok(station.http.post("/buses/cyclic", json={"url": URL, "cycle_us": 1000}))

@@ -144,7 +144,7 @@ class Preparation:
         }
         self._run("mailbox", fences, "taking the mailboxes over")
         guards = {
-            number: setup_.arm_watchdog(self._stations[number - 1], plan.watchdog_ms)
+            number: setup_.arm_watchdog(self._stations[number - 1], plan)
             for number, plan in self._setups.items()
         }
         self._run("register", guards, "setting the watchdogs")

@@ -28,9 +28,10 @@ from drivers.ethercat import permissions
 IO_MAP_BYTES = 4096
 MAX_STATIONS = 199
 _NAME_LIMIT = 15
+_EMERGENCY = "an emergency or another unexpected mail came in between"
 _FRAME_TIMEOUT_US = 2000
 _MANY_MISSING, _STALL_S = 8, 0.1
-_FIND_TRIES = 3
+_FIND_TRIES, _MAP_TRIES = 3, 3
 """A segment that stands still for a moment answers nothing, or too late and to another question."""
 
 
@@ -249,12 +250,19 @@ class Segment:
             )
         self.forget_errors()
         self.master.manual_state_change = 1
-        try:
-            self.master.config_map()
-        except pysoem.ConfigMapError as error:
-            self.forget_errors()
-            told = "; ".join(sorted({_mapping_error(item) for item in error.error_list}))
-            raise ProtocolError(f"the process data could not be mapped: {told}") from error
+        for attempt in range(_MAP_TRIES):
+            try:
+                self.master.config_map()
+            except pysoem.ConfigMapError as error:
+                self.forget_errors()
+                told = sorted({_mapping_error(item) for item in error.error_list})
+                # SOEM takes an emergency for the answer that it waited for: once more, then.
+                if told != [_EMERGENCY] or attempt == _MAP_TRIES - 1:
+                    raise ProtocolError(
+                        f"the process data could not be mapped: {'; '.join(told)}"
+                    ) from error
+            else:
+                break
         self.mapped = True
 
     def set_output(self, station: int, data: bytes) -> None:
@@ -347,4 +355,4 @@ def _mapping_error(item: Exception) -> str:
         return f"station {item.slave_pos}: {item.desc}"
     if isinstance(item, pysoem.PacketError):
         return f"station {item.slave_pos}: {item.desc}"
-    return "an emergency or another unexpected mail came in between"
+    return _EMERGENCY

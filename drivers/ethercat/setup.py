@@ -15,11 +15,13 @@ from drivers.ethercat import coe
 from drivers.ethercat.al_status import AlState
 from drivers.ethercat.mailbox import Read, Steps, Write
 from drivers.ethercat.mapping import Entry, Pdo
-from drivers.ethercat.station import Station, change_state
+from drivers.ethercat.station import Station, change_state, read_again
 
 FMMU, SYNC_MANAGERS = 0x600, 0x800
 WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x400, 0x420
-_SM2_CONTROL, _SM2_ACTIVATE, _SM_WATCHDOG = 0x814, 0x816, 0x40
+_MANAGERS, _OUTPUTS, _SM_WATCHDOG = 4, 0x04, 0x40
+"""Control byte of a sync manager (ETG.1000.4 clause 6.7): three buffers, written by the master."""
+
 _DC_SYSTEM_TIME, _DC_OFFSET, _DC_DELAY = 0x910, 0x920, 0x928
 _DC_ACTIVATE, _DC_START, _DC_CYCLE = 0x981, 0x990, 0x9A0
 _ASSIGN = {"rx": 0x1C12, "tx": 0x1C13}
@@ -53,10 +55,13 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
     Raises:
         NotAllowed: the drive refuses the mapping; the message says which object and why.
     """
+    assign = yield from _assignments(station)
     for direction, pdo in (("rx", setup.rx), ("tx", setup.tx)):
         try:
-            yield from _write_pdo(station, _ASSIGN[direction], pdo)
+            yield from _write_pdo(station, assign[direction], pdo)
         except Rejected as error:
+            if (yield from _has_them_anyway(station, assign[direction], pdo)):
+                continue
             raise NotAllowed(
                 f"station {station.number} does not take these process data: {error.message}",
                 parameter=error.parameter,
@@ -89,6 +94,26 @@ def _write_pdo(station: Station, assign: int, pdo: Pdo) -> Steps[None]:
     if pdo.entries:
         yield from coe.download(box, assign, 1, struct.pack("<H", pdo.index))
         yield from coe.download(box, assign, 0, b"\x01")
+
+
+def _assignments(station: Station) -> Steps[dict[str, int]]:
+    """Which object assigns outputs and which inputs: those of their sync managers.
+
+    Usually 1C12h and 1C13h; 1C00h tells where a drive has them the other way round
+    (ETG.1000.6 clause 5.6.7.4.9: 3 is outputs, 4 is inputs).
+    """
+    kinds = yield from _read_list(station, 0x1C00, 1)
+    if kinds[2:4] == [4, 3]:
+        return {"rx": _ASSIGN["tx"], "tx": _ASSIGN["rx"]}
+    return _ASSIGN
+
+
+def _has_them_anyway(station: Station, assign: int, pdo: Pdo) -> Steps[bool]:
+    """Whether a drive whose assignment cannot be written carries just these process data."""
+    if (yield from _read_list(station, assign, 2)) != ([pdo.index] if pdo.entries else []):
+        return False
+    words = yield from _read_list(station, pdo.index, 4)
+    return words == [entry.word for entry in pdo.entries]
 
 
 def interpolation_period(cycle_ns: int) -> tuple[int, int]:
@@ -147,14 +172,15 @@ def initial_outputs(station: Station, entries: Sequence[Entry]) -> Steps[list[in
     return values
 
 
-def arm_watchdog(station: Station, milliseconds: float) -> Steps[None]:
-    """Set the process-data watchdog of the slave, switch it on for SM2, and read both back.
+def arm_watchdog(station: Station, setup: StationSetup) -> Steps[None]:
+    """Set the process-data watchdog of the slave, have its outputs trigger it, read both back.
 
     Raises:
         NotAllowed: the slave does not take it. No axis may then be moved over this bus, because
             nothing would stop it when the computer dies.
     """
-    divider = yield Read(WATCHDOG_DIVIDER, 2)
+    milliseconds = setup.watchdog_ms
+    divider = yield from read_again(WATCHDOG_DIVIDER, 2)
     if divider is None:
         raise ProtocolError(f"station {station.number} does not answer for its watchdog")
     # ETG.1000.4 clause 6.3: unit is 40 ns times (divider + 2).
@@ -163,25 +189,45 @@ def arm_watchdog(station: Station, milliseconds: float) -> Steps[None]:
     if not 0 < ticks <= 0xFFFF:
         raise NotAllowed(f"a watchdog of {milliseconds:g} ms does not fit station {station.number}")
     yield Write(WATCHDOG_TIME, struct.pack("<H", ticks))
-    told = yield Read(WATCHDOG_TIME, 2)
-    control = yield Read(_SM2_CONTROL, 1)
-    if control is not None and not control[0] & _SM_WATCHDOG:
-        yield Write(_SM2_ACTIVATE, b"\0")
-        yield Write(_SM2_CONTROL, bytes([control[0] | _SM_WATCHDOG]))
-        yield Write(_SM2_ACTIVATE, b"\x01")
-        control = yield Read(_SM2_CONTROL, 1)
-    if told != struct.pack("<H", ticks) or control is None or not control[0] & _SM_WATCHDOG:
+    told = yield from read_again(WATCHDOG_TIME, 2)
+    watched = yield from _watch_outputs()
+    if told != struct.pack("<H", ticks) or watched < bool(setup.rx.size):
         raise NotAllowed(
             f"station {station.number} does not take its process-data watchdog",
             remedy="cyclic motion is refused: nothing would stop the axis if the computer died",
         )
 
 
+def _watch_outputs() -> Steps[int]:
+    """Have every sync manager of outputs trigger the watchdog, usually number 2.
+
+    Returns how many do; 0 when one of them does not take it.
+    """
+    managers = yield from read_again(SYNC_MANAGERS, 8 * _MANAGERS)
+    watching = 0
+    if managers is None:
+        return 0
+    for number in range(_MANAGERS):
+        base = SYNC_MANAGERS + 8 * number
+        control, active = managers[8 * number + 4], managers[8 * number + 6]
+        if not active & 1 or control & 0x0F != _OUTPUTS:
+            continue
+        if not control & _SM_WATCHDOG:
+            yield Write(base + 6, b"\0")
+            yield Write(base + 4, bytes([control | _SM_WATCHDOG]))
+            yield Write(base + 6, b"\x01")
+        after = yield from read_again(base + 4, 1)
+        if after is None or not after[0] & _SM_WATCHDOG:
+            return 0
+        watching += 1
+    return watching
+
+
 def take_snapshot() -> Steps[Snapshot]:
     """Registers that a power cycle clears."""
-    fmmu = yield Read(FMMU, 48)
-    managers = yield Read(SYNC_MANAGERS, 32)
-    delay = yield Read(_DC_DELAY, 4)
+    fmmu = yield from read_again(FMMU, 48)
+    managers = yield from read_again(SYNC_MANAGERS, 32)
+    delay = yield from read_again(_DC_DELAY, 4)
     if fmmu is None or managers is None:
         raise ProtocolError("the slave stopped answering while it was being set up")
     return Snapshot(fmmu, managers, delay or bytes(4))
@@ -214,7 +260,7 @@ def restore(
         part = snapshot.sync_managers[8 * number : 8 * number + 8]
         yield Write(SYNC_MANAGERS + 8 * number, part)
     yield Write(FMMU, snapshot.fmmu)
-    yield from arm_watchdog(station, setup.watchdog_ms)
+    yield from arm_watchdog(station, setup)
     if setup.dc:
         yield from _restore_clock(setup, snapshot, dc_time)
     yield from change_state(station, AlState.SAFEOP, clock)

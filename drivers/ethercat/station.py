@@ -189,9 +189,9 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
     What a slave does not have stays empty; a slave that refuses PREOP keeps a note in words.
     """
     station.notes.clear()
-    alias = yield from _read_again(0x12, 2)
+    alias = yield from read_again(0x12, 2)
     station.alias = int.from_bytes(alias or b"\0\0", "little")
-    features = yield from _read_again(0x08, 2)
+    features = yield from read_again(0x08, 2)
     station.distributed_clock = bool(features and features[0] & 0x04)
     if (yield from read_ports(station)):
         station.wiring = station.ports
@@ -242,7 +242,7 @@ def _try_read(station: Station, index: int, subindex: int) -> Steps[bytes | None
         return None
 
 
-def _read_again(register: int, size: int) -> Steps[bytes | None]:
+def read_again(register: int, size: int) -> Steps[bytes | None]:
     """A register, asked again when a single frame is lost."""
     for _ in range(_TRIES):
         data = yield Read(register, size)
@@ -273,14 +273,14 @@ def read_ports(station: Station) -> Steps[bool]:
 
     Returns whether the station answered; its last figures stay where it did not.
     """
-    status = yield from _read_again(esc.DL_STATUS, 2)
+    status = yield from read_again(esc.DL_STATUS, 2)
     if status is None:
         return False
-    counters = yield from _read_again(esc.ERROR_COUNTERS, esc.ERROR_COUNTERS_SIZE)
+    counters = yield from read_again(esc.ERROR_COUNTERS, esc.ERROR_COUNTERS_SIZE)
     if counters is not None:
         station.ports = esc.decode_ports(station.number, status, counters)
     if station.distributed_clock:
-        difference = yield from _read_again(esc.TIME_DIFFERENCE, 4)
+        difference = yield from read_again(esc.TIME_DIFFERENCE, 4)
         if difference is not None:
             station.clock_ahead_ns = esc.decode_time_difference(difference)
     return counters is not None

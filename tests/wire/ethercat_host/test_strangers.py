@@ -1,0 +1,130 @@
+"""Our host and slaves that are not ours: see `plain_slaves`, which shares no line with our own."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers.cia402 import Mode, State
+from drivers.errors import DriveError, NotAllowed, Rejected
+from drivers.ethercat.link import EthercatLink
+from drivers.link import Address, CyclicSignal, Envelope, Trajectory
+from drivers.virtual.wires.netns import Namespace
+from profiles.schema import PdoSet, PdoSpec, Profile
+from tests.wire.ethercat_host.conftest import Bus, until
+from tests.wire.ethercat_host.servo_device import servo_profile
+
+HERE = Path(__file__).parent
+SERVO = 3
+RECORD = [Address(0x2000, 0, "UINT8"), Address(0x2000, 1, "UINT16"), Address(0x2000, 2, "UINT16")]
+
+
+@pytest.fixture(scope="module")
+def wire(namespace: Namespace) -> Iterator[Namespace]:
+    """Coupler, digital outputs, and a servo drive behind them."""
+    process = namespace.popen(
+        [sys.executable, str(HERE / "plain_slaves.py"), "ec0s", "coupler,outputs,servo"],
+        stdout=subprocess.PIPE,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline().strip() == "ready"
+    yield namespace
+    process.kill()
+    process.wait()
+    process.stdout.close()
+
+
+@pytest.fixture
+async def bus(wire: Namespace) -> Bus:
+    return Bus(EthercatLink("ec0m", launcher=wire.command([])))
+
+
+def odd_profile() -> Profile:
+    """Fixed process data: outputs 1600h on sync manager 3, inputs 1A00h on 2."""
+    base = servo_profile(remappable=False, dc=False)
+    spec = PdoSpec(
+        sets=(
+            PdoSet(index=0x1600, direction="rx", source="test", entries=("6040:00", "607A:00")),
+            PdoSet(index=0x1A00, direction="tx", source="test", entries=("6041:00", "6064:00")),
+        ),
+        default_rx=0x1600, default_tx=0x1A00, max_entries=2, remappable=False,
+        sync_modes=("SM",), source="test",
+    )  # fmt: skip
+    fields = {name: getattr(base, name) for name in Profile.model_fields}
+    return Profile(**(fields | {"pdo": spec}))
+
+
+async def test_couplers_and_plain_slaves_share_the_segment_with_a_drive(bus: Bus) -> None:
+    await bus.link.open()
+    try:
+        coupler, outputs, servo = await bus.link.scan(lambda _s, _t: None)
+        assert [f.vendor_id for f in (coupler, outputs, servo)] == [0xBAD] * 3
+        for plain in (coupler, outputs):
+            assert any("no mailbox" in note for note in plain.notes)
+            assert plain.serial is None
+        assert servo.name == "ODD-1 drive"
+        assert servo.serial == 0xC0FFEE
+        assert servo.state == "PREOP", "the error it was left with has been acknowledged"
+        assert "connected behind station 2" in servo.notes[0]
+        with pytest.raises(NotAllowed, match="has no mailbox"):
+            await bus.link.read(1, RECORD[0])
+    finally:
+        await bus.link.close()
+
+
+async def test_a_drive_with_a_mailbox_unlike_ours_is_read_and_written(bus: Bus) -> None:
+    await bus.link.open()
+    try:
+        await bus.link.scan(lambda _s, _t: None)
+        for _ in range(4):
+            answers = await bus.link.read_many(SERVO, [*RECORD, Address(0x7777, 0, "UINT8")])
+            assert answers[:3] == [b"\x02", b"\x11\x22", b"\x33\x44"]
+            refused = answers[3]
+            assert isinstance(refused, Rejected), "an abort as response 84h"
+            assert refused.code == 0x06020000
+        await bus.link.write(SERVO, RECORD[1], b"\x55\x66")
+        assert await bus.link.read(SERVO, RECORD[1]) == b"\x55\x66"
+        await bus.link.write(SERVO, RECORD[1], b"\x11\x22")
+        with pytest.raises(Rejected, match="can only be read"):
+            await bus.link.write(SERVO, Address(0x1C12, 0, "UINT8"), b"\0")
+        with pytest.raises(DriveError, match="mailbox"):
+            await bus.link.enumerate(SERVO, lambda _s, _t: None)
+        assert await bus.link.read(SERVO, RECORD[0]) == b"\x02"
+        assert any("emergency 0x8130" in text for text in bus.texts)
+    finally:
+        await bus.link.close()
+
+
+async def test_its_fixed_process_data_on_swapped_sync_managers_move_it(bus: Bus) -> None:
+    await bus.link.open()
+    cyclic = bus.link.process_data
+    try:
+        await bus.link.scan(lambda _s, _t: None)
+        bus.link.know(SERVO, odd_profile())
+        mapped = await cyclic.configure(
+            [CyclicSignal(SERVO, Address(0x6064, 0, "INT32"), "position")],
+            [CyclicSignal(SERVO, Address(0x607A, 0, "INT32"), "target")],
+            0.004,
+        )
+        assert {signal.channel for signal in mapped} == {"position", "target"}
+        assert cyclic.dc is False
+        await cyclic.start()
+        positions: list[float] = []
+        cyclic.blocks(lambda b: positions.extend(b.samples[:, b.channels.index("position")]))
+        await cyclic.drive_to(SERVO, State.OPERATION_ENABLED, Mode.CSP)
+        await until(lambda: cyclic.axis_state(SERVO)[0] == "Operation enabled", 5.0)
+        values = np.arange(0, 500, 5, dtype=np.int64)
+        target = Address(0x607A, 0, "INT32")
+        await cyclic.run([Trajectory(SERVO, target, values, Envelope())])
+        await asyncio.sleep(0.2)
+        assert max(positions) == 495
+        assert positions == sorted(positions)
+        await cyclic.stop()
+    finally:
+        await bus.link.close()
