@@ -103,10 +103,13 @@ async def read_measurement(bench: TheBench, name: str) -> MeasurementContent:
 
 @router.get("/measurements/{name}/file", response_class=Response)
 async def download_measurement(bench: TheBench, name: str) -> Response:
-    """The file itself, raw signals included."""
-    load_measurement(bench, name)
+    """The file itself, raw signals included, also when it is damaged."""
+    try:
+        data = await asyncio.to_thread(bench.measurements.read, name)
+    except NotAllowed as error:
+        raise NotFound(error.message, value=name) from error
     return Response(
-        bench.measurements.read(name),
+        data,
         media_type="application/octet-stream",
         headers={"Content-Disposition": f'attachment; filename="{name}"'},
     )
@@ -120,12 +123,15 @@ async def upload_measurement(
     data = await request.body()
     if len(data) > _MAX_BYTES:
         raise OutOfRange(f"{name} is too large", value=len(data), limit=f"{_MAX_BYTES} bytes")
-    stored = bench.measurements.store(name.removesuffix(SUFFIX) + SUFFIX, data)
+    whole = name.removesuffix(SUFFIX) + SUFFIX
+    stored = await asyncio.to_thread(bench.measurements.store, whole, data)
     return _info(stored, bench.measurements.head(stored))
 
 
 @router.delete("/measurements/{name}", status_code=204)
 async def delete_measurement(bench: TheBench, name: str) -> None:
-    """Delete a file."""
-    load_measurement(bench, name)
-    bench.measurements.delete(name)
+    """Delete a file, also one that is damaged."""
+    try:
+        bench.measurements.delete(name)
+    except NotAllowed as error:
+        raise NotFound(error.message, value=name) from error
