@@ -112,7 +112,7 @@ class Commands:
         if self._core.axis.powered:
             raise SdoAbort(ABORT_DEVICE_STATE)
         if self.store is not None:
-            self.store.begin(self._restore_now, 1.0)
+            self.store.begin(self._restore_now, self._storage.changed_share())
         else:
             self._restore_now()
 

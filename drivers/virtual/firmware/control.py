@@ -145,7 +145,7 @@ class DeviceControl:
             self._finish_now(self._stops.servo_off(stops.off))
         elif stops.waits:
             self._after_stop = lambda: self._disable(new)
-            self._stops.coast()
+            self._finish_now(self._stops.coast())
         else:
             self._switch_off()
             self.state = new

@@ -8,7 +8,7 @@ from drivers.virtual.device import ABORT_DEVICE_STATE, SdoAbort
 from drivers.virtual.firmware.core import Core
 
 _SHORTEST_S = 0.5
-_LONGEST_S = 10.0
+_LONGEST_S = 9.9
 _KEY = "1010:01"
 
 

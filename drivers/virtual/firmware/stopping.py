@@ -52,15 +52,18 @@ class Stopping:
             axis.power_off()
             return False
         elif traits.waits:
-            self.coast()
+            return self.coast()
         else:
             return False
         return True
 
-    def coast(self) -> None:
+    def coast(self) -> bool:
         """Power off now; the state changes when the axis stands (001:882)."""
         self._axis.power_off()
+        if abs(self._axis.speed_rad_s) <= self._axis.p[k.P_STOP_SPEED]:
+            return False
         self._axis.await_standstill()
+        return True
 
     def servo_off(self, choice: tuple[str, dict[int, OffStop]]) -> bool:
         """As a parameter chooses: (while moving, afterwards)."""

@@ -67,7 +67,7 @@ class DirectLink:
         self.device = device
         self.profile = profile
         self.now_ns = 0
-        self.dc = False
+        self.dc = True
         self.cycle_ns = 1_000_000
         self.cut = False
         """The cable is pulled: nothing comes back."""
