@@ -119,6 +119,8 @@ class Drive:
     def __init__(self, drive_id: str, name: str, profile: Profile, ports: Sequence[Port]) -> None:
         self.id = drive_id
         self.name = name
+        self.resting = False
+        """A procedure leaves the drive alone (it stores): no routine polling meanwhile."""
         self.notes = ""
         self.profile = profile
         self.ports = tuple(ports)

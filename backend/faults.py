@@ -17,6 +17,12 @@ def fault_keys(drive: Drive) -> list[str]:
     kind = drive.profile.quirk("warning_bit_7")
     if kind is not None and kind.key is not None:
         reachable.add(kind.key)
+    history = drive.profile.functions.history
+    if history is not None and history.kind == "selected":
+        # The newest record tells which fault it is where 603Fh does not (R6L, 002:12361).
+        for key in (history.select_key, history.code_key, drive.key("status_word")):
+            if key is not None and not drive.unreachable_why(drive.parameter(key)):
+                reachable.add(key)
     return sorted(reachable)
 
 
@@ -33,6 +39,8 @@ def active_faults(drive: Drive, readings: Mapping[str, Reading]) -> list[Fault]:
         if by_bit or (code and fault.code_raw is not None and fault.code_raw in (code, masked)):
             found.append(fault)
     found = _of_the_present_kind(drive, readings, found)
+    if not found and (newest := _newest_record(drive, readings)) is not None:
+        found.append(newest)
     if code and not found:
         found.append(
             Fault(
@@ -55,6 +63,23 @@ def _of_the_present_kind(
         return found
     kind = "warning" if status >> 7 & 1 else "fault"
     return [fault for fault in found if fault.kind == kind] or found
+
+
+def _newest_record(drive: Drive, readings: Mapping[str, Reading]) -> Fault | None:
+    """The fault of the newest record of a drive in "fault", where its window shows that record."""
+    history = drive.profile.functions.history
+    if history is None or history.kind != "selected" or not history.code_format:
+        return None
+    status = integer(readings.get(drive.key("status_word") or "")) or 0
+    if not status & 0x08 or integer(readings.get(history.select_key or "")) != 0:
+        return None
+    number = integer(readings.get(history.code_key or "")) or 0
+    code = history.code_format.format(number + history.code_base)
+    found = next((fault for fault in drive.profile.faults if fault.code == code), None)
+    if found is None:
+        return None
+    # Which record is the newest is not printed (002:12361): say where the name comes from.
+    return found.model_copy(update={"name": f"{found.name} (by record 0 of the drive's log)"})
 
 
 def integer(reading: Reading | None) -> int | None:

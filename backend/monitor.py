@@ -103,11 +103,16 @@ class Monitor:
                 await asyncio.wait_for(self._wake.wait(), period)
 
     async def refresh(self) -> Snapshot:
-        """Read the state now. A failure becomes a snapshot that says so, with the old values."""
+        """Read the state now. A failure becomes a snapshot that says so, with the old values.
+
+        A drive that a procedure leaves alone is not asked; the last snapshot stands.
+        """
         before = self.snapshot
         if await self.axis.repeat_stop():
             text = f"{self.axis.drive.name}: the stop that had not reached it was sent again"
             self._journal.add(text, level="warning", drive=self.axis.drive.id)
+        if self.axis.drive.resting:
+            return before
         try:
             snapshot = await self._read()
         except DriveError as error:

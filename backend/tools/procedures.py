@@ -99,7 +99,12 @@ async def _step(axis: Axis, step: Step) -> None:
                 if raw is not None:
                     await drive.write(key, raw)
         case WaitStep():
-            await asyncio.sleep(step.seconds)
+            # Traffic spoils what an EP3E stores (001:1212): the monitor must be silent, too.
+            drive.resting = True
+            try:
+                await asyncio.sleep(step.seconds)
+            finally:
+                drive.resting = False
         case PollStep():
             await _poll(axis, step)
         case ReconnectStep():
