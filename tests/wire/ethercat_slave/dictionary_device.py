@@ -256,5 +256,5 @@ class DictionaryDevice:
 def make_device(
     drive: str, mechanics: MechanicsSpec, nvm: Path | None = None, station: int = 1
 ) -> DictionaryDevice:
-    """Factory for the command line."""
-    return DictionaryDevice()
+    """Factory for the command line; the drive "firmware" takes files."""
+    return DictionaryDevice(make_profile(foe=drive == "firmware"))

@@ -162,12 +162,80 @@ def interactive(interface: str) -> dict[str, Any]:
     return {}
 
 
+def stranger(interface: str) -> dict[str, Any]:
+    """What other programmes with pysoem do with a slave, one thing after the other."""
+    master, _ = opened(interface)
+    slave = master.slaves[0]
+    result: dict[str, Any] = {"empty_mailbox": slave.mbx_receive()}
+    record = slave.sdo_read(0x2001, 0, ca=True)
+    changed = bytearray(record)
+    changed[2:4] = b"\x5a\xa5"
+    slave.sdo_write(0x2001, 0, bytes(changed), ca=True)
+    result["written_whole"] = slave.sdo_read(0x2001, 1).hex()
+    slave.sdo_write(0x2001, 0, record, ca=True)
+    words = [slave.eeprom_read(word)[:2] for word in range(0x40)]
+    result["mailbox_words"] = b"".join(words[0x18:0x1C]).hex()
+    slave.set_watchdog("processdata", 80)
+    result["watchdog_ms"] = slave.get_watchdog("processdata")
+    slave.state = pysoem.OP_STATE
+    slave.write_state()
+    time.sleep(0.02)
+    master.read_state()
+    result["refused"] = [slave.state, slave.al_status]
+    slave.state = pysoem.PREOP_STATE + pysoem.STATE_ACK
+    slave.write_state()
+    result["acknowledged"] = slave.state_check(pysoem.PREOP_STATE, 500_000)
+    result["overlap_map"] = master.config_overlap_map() > 0
+    result["clock"] = bool(master.config_dc())
+    slave.state = pysoem.SAFEOP_STATE
+    slave.write_state()
+    result["safeop"] = slave.state_check(pysoem.SAFEOP_STATE, 2_000_000)
+    master.send_overlap_processdata()
+    result["overlap_wkc"] = int(master.receive_processdata(ANSWER_US)) > 0
+    slave.state = pysoem.INIT_STATE
+    slave.write_state()
+    result["init"] = slave.state_check(pysoem.INIT_STATE, 500_000)
+    master.close()
+    return result
+
+
+def firmware(interface: str) -> dict[str, Any]:
+    """A download as SOEM's own firmware updater does it: INIT, BOOT mailboxes, BOOT, FoE, INIT."""
+    master, _ = opened(interface)
+    slave = master.slaves[0]
+    slave.state = pysoem.INIT_STATE
+    slave.write_state()
+    result: dict[str, Any] = {"init": slave.state_check(pysoem.INIT_STATE, 500_000)}
+    words = b"".join(slave.eeprom_read(word)[:2] for word in range(0x14, 0x18))
+    out, out_size, back, back_size = (
+        int.from_bytes(words[n : n + 2], "little") for n in range(0, 8, 2)
+    )
+    slave.amend_mbx("out", out, out_size)
+    slave.amend_mbx("in", back, back_size)
+    slave.state = pysoem.BOOT_STATE
+    slave.write_state()
+    result["boot"] = slave.state_check(pysoem.BOOT_STATE, 500_000)
+    data = bytes(n % 251 for n in range(3000))
+    slave.foe_write("app.bin", 0, data)
+    result["same"] = slave.foe_read("app.bin", 0, 4000)[: len(data)] == data
+    # SOEM gives back its own error number, or nothing, for a file that is not there.
+    missing = slave.foe_read("none.bin", 0, 100)
+    result["missing"] = bytes(missing or b"").rstrip(b"\0").hex()
+    slave.state = pysoem.INIT_STATE
+    slave.write_state()
+    result["back"] = slave.state_check(pysoem.INIT_STATE, 500_000)
+    master.close()
+    return result
+
+
 SCENARIOS: dict[str, Callable[[str], dict[str, Any]]] = {
     "everything": everything,
     "lockstep": lockstep,
     "watchdog": watchdog,
     "emergency": emergency,
     "interactive": interactive,
+    "stranger": stranger,
+    "firmware": firmware,
 }
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import subprocess
 import sys
@@ -114,6 +115,34 @@ def test_an_emergency_reaches_the_master(namespace: Namespace, shared: VirtualSe
     assert json.loads(process.stdout.readline()) == {"ready": True}
     shared.command("inject", slave=0, what="emergency", value=0x7305)
     assert finish(process)["codes"] == [0x7305]
+
+
+def test_what_strangers_do_with_pysoem(namespace: Namespace) -> None:
+    with segment(namespace, 1):
+        got = finish(start(namespace, "stranger"))
+    assert got["empty_mailbox"] <= 0, "nothing there, as SOEM tells it"
+    assert got["written_whole"] == "5aa5"
+    assert got["mailbox_words"] == "0010000100110001", "1000h and 1100h, 256 bytes each"
+    assert got["watchdog_ms"] == pytest.approx(80, rel=0.01)
+    assert got["refused"] == [0x12, 0x11], "from PREOP straight to OP is no step"
+    assert got["acknowledged"] == 2
+    assert got["overlap_map"] is True
+    assert got["clock"] is True
+    assert got["safeop"] == 4
+    assert got["overlap_wkc"] is True
+    assert got["init"] == 1
+
+
+def test_soems_own_way_of_loading_firmware(namespace: Namespace) -> None:
+    drives = ["--drive", "firmware", "--factory", FACTORY]
+    with VirtualSegment.start(SLAVE, drives, namespace) as running:
+        got = finish(start(namespace, "firmware"))
+        files = running.command("files", slave=0)
+    assert (got["init"], got["boot"], got["back"]) == (1, 3, 1)
+    assert got["same"] is True
+    assert got["missing"] == ""
+    whole = hashlib.sha256(bytes(n % 251 for n in range(3000))).hexdigest()
+    assert files == {"app.bin": whole}
 
 
 class Master:
