@@ -14,7 +14,7 @@ from typing import Annotated
 import typer
 
 from backend.bench import Bench
-from backend.commands import keep, measure, params, people, profile, report
+from backend.commands import functions, keep, measure, params, people, profile, report
 from backend.commands.serve import Serving, state_folder
 from backend.commands.serve import serve as run_server
 from backend.commands.session import opened, run, show_progress
@@ -38,6 +38,10 @@ app.command("sweep")(measure.sweep)
 app.command("inertia")(measure.inertia)
 app.command("report")(report.report)
 app.command("recompute")(report.recompute)
+app.command("io")(functions.io)
+app.command("faults")(functions.faults)
+app.command("gear")(functions.gear_command)
+app.command("braking")(functions.braking)
 
 Host = Annotated[
     str,

@@ -59,6 +59,13 @@ def _homing(page: Page, drive: str) -> None:
     page.get_by_text("Homing", exact=True).first.click()
 
 
+def _setup(page: Page, drive: str) -> None:
+    """A screw, with the gear that follows from it."""
+    open_axis(page, drive, "setup")
+    page.get_by_role("textbox", name="Lead").fill("10")
+    page.get_by_role("button", name="Calculate").click()
+
+
 PICTURES: dict[str, Callable[[Page, str], None]] = {
     "connect": _go("connect"),
     "overview": _go("overview"),
@@ -66,6 +73,8 @@ PICTURES: dict[str, Callable[[Page, str], None]] = {
     "motion": _go("motion"),
     "homing": _homing,
     "scope": _scope,
+    "gains": _go("gains"),
+    "setup": _setup,
     "io": _go("io"),
     "files": _go("files"),
 }
@@ -85,6 +94,10 @@ def _prepare(station: Station) -> str:
         "first": here, "second": here + 4, "speed": 300, "acceleration": 1500, "dwell_s": 0.3,
         "count": 100000, "travel_limit": 5, "torque_limit": 100,
     }  # fmt: skip
+    watch = {"keys": ["2040:00", "200E:0B", "60F4:00"]}
+    station.ok(station.http.put(f"/drives/{first}/watch", json=watch))
+    screw = {"mechanics": {"kind": "screw", "lead_mm": 10}}
+    station.ok(station.http.put(f"/drives/{first}/mechanics", json=screw))
     station.ok(station.http.post(f"/drives/{first}/jobs/sequence", json=travel))
     until(lambda: abs(station.state(first)["velocity"]) > 100, what="the axis moves")
     return first
