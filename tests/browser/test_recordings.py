@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 import shutil
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from mcap.reader import make_reader
 from playwright.sync_api import Browser, Page, Playwright, expect
+from rerun.chunk import RrdReader
 
+from backend.recording.reader import RecordingReader
 from tests.browser.conftest import FLAGS
 from tests.browser.driving import Bench
 from tests.support.station import until
@@ -69,19 +75,123 @@ def record(page: Page, bench: Bench, name: str) -> None:
     expect(page.get_by_text("complete", exact=False)).to_be_visible()
 
 
-def test_record_and_export(page: Page, bench: Bench, tmp_path: Path) -> None:
+def fetched(page: Page, kind: str, folder: Path) -> Path:
+    """A recording, exported by the page's button."""
+    with page.expect_download(timeout=60_000) as waiting:
+        page.get_by_role("button", name=f"Export as {kind}").click()
+    path = folder / f"a.{kind.lower()}"
+    waiting.value.save_as(path)
+    return path
+
+
+def test_every_export_has_every_sample(page: Page, bench: Bench, tmp_path: Path) -> None:
+    """Read back with each format's own library, and compared with the recording itself."""
+    move = {"mode": "PV", "target": 200, "acceleration": 3000, "deceleration": 3000,
+            "travel_limit": 200, "torque_limit": 150, "timeout_s": 30, "consent": True}  # fmt: skip
+    bench.station.ok(bench.station.http.post(f"/drives/{bench.drive}/jobs/move", json=move))
+    bench.wait_moving()
     record(page, bench, "browser")
+    bench.station.http.post("/stop", json={})
     info = bench.station.ok(bench.station.http.get("/recordings"))["recordings"][0]
-    with page.expect_download() as waiting:
-        page.get_by_role("button", name="Export as CSV").click()
-    waiting.value.save_as(tmp_path / "a.csv")
-    with (tmp_path / "a.csv").open(newline="") as file:
-        titles, *rows = list(csv.reader(file))
-    assert len(rows) == info["samples"]
-    assert len(titles) == 1 + len(info["channels"])
+    stored = tmp_path / "a.sdrec"
+    stored.write_bytes(bench.station.http.get("/recordings/browser.sdrec/file").content)
+    with RecordingReader(stored) as reader:
+        blocks = list(reader.blocks())
+        names = [channel.name for channel in reader.channels]
+    values = np.concatenate([block.values for block in blocks])
+    times = np.concatenate([block.times_s for block in blocks])
+    assert values.shape == (info["samples"], len(info["channels"]))
+    assert np.count_nonzero(np.ptp(values, axis=0)) >= 2, "position and speed live"
+    since_ns = np.rint((times - times[0]) * 1e9)
+
+    with fetched(page, "CSV", tmp_path).open(newline="") as file:
+        rows = np.array([[float(cell) for cell in row] for row in list(csv.reader(file))[1:]])
+    assert np.array_equal(rows[:, 1:], values)
+    assert np.abs(rows[:, 0] * 1e9 - since_ns).max() <= 1
+
+    with fetched(page, "MCAP", tmp_path).open("rb") as file:
+        messages = [
+            (message.log_time, json.loads(message.data))
+            for _, channel, message in make_reader(file).iter_messages()
+            if channel.topic.endswith("/polled")
+        ]
+    assert [[data[name] for name in names] for _, data in messages] == values.tolist()
+    stamps = np.array([time for time, _ in messages])
+    assert np.abs(stamps - stamps[0] - since_ns).max() <= 1
+
+    found: dict[str, np.ndarray] = {}
+    for chunk in RrdReader(fetched(page, "RRD", tmp_path)).stream().to_chunks():
+        if "time" in chunk.timeline_names and not chunk.entity_path.endswith("events"):
+            batch = chunk.to_record_batch()
+            (name,) = [n for n in batch.schema.names if n.endswith("scalars")]
+            part = np.array(batch.column(name).to_pylist())
+            entity = chunk.entity_path
+            found[entity] = np.concatenate([found[entity], part]) if entity in found else part
+    # One entity for each unit: put side by side they are the recording.
+    together = np.column_stack(list(found.values()))
+    assert sorted(together.T.tolist()) == sorted(values.T.tolist())
+
     page.get_by_role("button", name="Delete browser.sdrec").click()
     page.get_by_role("dialog").get_by_role("button", name="Delete", exact=True).click()
     expect(page.get_by_text("No recordings.")).to_be_visible()
+
+
+def test_armed_kept_and_bounded_from_the_page(page: Page, bench: Bench) -> None:
+    page.get_by_label("Begins").select_option("fault")
+    page.get_by_label("Name").fill("waiting")
+    page.get_by_role("button", name="Arm", exact=True).click()
+    row = page.locator("article", has_text="waiting.sdrec")
+    expect(row).to_contain_text("waits for its trigger")
+    row.get_by_role("button", name="Begin now").click()
+    expect(row).to_contain_text("recording")
+    row.get_by_role("button", name="End").click()
+    expect(row).to_contain_text("complete")
+    row.get_by_text("Notes and tags").click()
+    row.get_by_label("Notes").fill("coupling B")
+    row.get_by_role("checkbox").check()
+    row.get_by_role("button", name="Save").click()
+    expect(row.locator(".tag", has_text="kept")).to_be_visible()
+    page.get_by_label("Search recordings").fill("coupling")
+    expect(row).to_be_visible()
+    page.get_by_label("Search recordings").fill("something else")
+    expect(page.get_by_text("No recordings.")).to_be_visible()
+    page.get_by_label("Search recordings").fill("")
+    page.get_by_text("recording ends when less").click()
+    page.get_by_label("All together at most").fill("7")
+    page.get_by_role("button", name="Set", exact=True).click()
+    answer = bench.station.http
+
+    def bounded() -> bool:
+        retention = bench.station.ok(answer.get("/recordings"))["retention"]
+        return bool(retention["max_total_bytes"] == 7_000_000_000)
+
+    until(bounded, 10, "the bound holds on the server")
+
+
+def test_what_cannot_be_recorded_is_said_in_words(page: Page, bench: Bench) -> None:
+    page.get_by_label("Name").fill("../outside")
+    page.get_by_role("button", name="Record", exact=True).click()
+    expect(page.get_by_role("alert")).to_contain_text("is not a file name")
+    assert bench.station.ok(bench.station.http.get("/recordings"))["recordings"] == []
+
+
+def test_bundles_are_made_armed_and_deleted(page: Page, bench: Bench) -> None:
+    page.get_by_label("Why").fill("odd noise")
+    page.get_by_role("button", name="Make one now").click()
+    link = page.get_by_role("link", name="Download")
+    expect(link).to_be_visible(timeout=30_000)
+    with page.expect_download() as waiting:
+        link.click()
+    assert zipfile.is_zipfile(waiting.value.path())
+    armed = page.get_by_label("Make one on every fault")
+    expect(armed).to_be_checked()
+    armed.click()  # it shows what the server says, so not at once
+    until(lambda: not bench.station.ok(bench.station.http.get("/bundles"))["armed"], 10)
+    expect(armed).not_to_be_checked()
+    armed.click()
+    until(lambda: bench.station.ok(bench.station.http.get("/bundles"))["armed"], 10)
+    page.get_by_role("button", name=re.compile("^Delete .*zip")).click()
+    expect(page.get_by_text("No support bundles.")).to_be_visible()
 
 
 def test_live_data_reach_the_viewer_and_escape_stops_from_there(page: Page, bench: Bench) -> None:
@@ -90,10 +200,10 @@ def test_live_data_reach_the_viewer_and_escape_stops_from_there(page: Page, benc
     expect(status).to_have_attribute("data-phase", "live", timeout=VIEWER_MS)
     until(lambda: int(status.get_attribute("data-blobs") or 0) > 20, 30, "blobs arrive")
     expect(page.frame_locator("iframe").locator("canvas")).to_be_visible()
-    page.frame_locator("iframe").locator("canvas").click()
+    page.frame_locator("iframe").locator("canvas").click(timeout=VIEWER_MS)
     with page.expect_request("**/api/v1/stop"):
         page.keyboard.press("Escape")
-    page.get_by_role("button", name="Close the viewer").click()
+    page.get_by_role("button", name="Close the viewer").click(timeout=VIEWER_MS)
     expect(page.locator("iframe")).to_have_count(0)
 
 

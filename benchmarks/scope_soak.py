@@ -1,0 +1,271 @@
+"""16 channels at 4 kHz to the disk and to two browsers, one of them suspended for a third.
+
+A station with four EtherCAT axes in a process of its own records 16 channels, and two Chromium
+show them on the Scope page; the second one is stopped (SIGSTOP, as a closed lid does) for the
+middle third. ``SERVODECK_SCOPE_SOAK_S`` sets the length; 1800 s are the half hour promised.
+On a computer that is busy with other things ``SERVODECK_SCOPE_SOAK_STEADY=1`` lets the segment's
+time follow the frames: no cycle is left out, they only come more slowly.
+
+Aims: no sample lost on disk beyond those that the bus itself left out, drops in the view counted,
+memory of the server flat after the first minute, jitter of the cycle as without any browser,
+GET /drives p99 below 50 ms.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from backend.demo import DemoBench
+from backend.recording.reader import RecordingReader
+from tests.support.station import Station
+
+URL = "ethercat://virtual0"
+SECONDS = float(os.environ.get("SERVODECK_SCOPE_SOAK_S", "1800"))
+STEADY = os.environ.get("SERVODECK_SCOPE_SOAK_STEADY") == "1"
+CYCLE_US = 250
+AXES = 4
+KEYS = ("6064:00", "606C:00", "6077:00", "60F4:00")
+FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"]
+#: What the cycle is like with nobody looking, before the soak begins.
+BASELINE_S = 15.0
+
+
+def bench_text() -> str:
+    """Four MMS7 in a row."""
+    return "".join(
+        f'[[axis]]\nname = "A{n}"\ndrive = "mms7"\non = "{URL}"\nstation = {n}\n'
+        for n in range(1, AXES + 1)
+    )
+
+
+def run_station(folder: Path) -> None:
+    """The child: serve until the standard input ends."""
+    bench = folder / "bench.toml"
+    bench.write_text(bench_text())
+    station = Station(folder, bench)
+    if STEADY:
+        station.drives = DemoBench(bench, folder / "wires", folder / "nvm", steady=True)
+    station.start()
+    try:
+        print(json.dumps({"port": station.port, "pid": os.getpid()}), flush=True)
+        sys.stdin.read()
+    finally:
+        station.stop()
+
+
+@contextmanager
+def station_process(folder: Path) -> Iterator[tuple[httpx.Client, int, str]]:
+    """A client, the server's process id, and its address."""
+    child = subprocess.Popen(
+        [sys.executable, "-m", "benchmarks.scope_soak", "--station", str(folder)],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert child.stdin is not None
+    assert child.stdout is not None
+    try:
+        told = json.loads(child.stdout.readline())
+        url = f"http://127.0.0.1:{told['port']}"
+        with httpx.Client(base_url=f"{url}/api/v1", timeout=60) as http:
+            yield http, int(told["pid"]), url
+    finally:
+        child.stdin.close()
+        child.wait(30)
+
+
+class Poller(threading.Thread):
+    """Times an ordinary request ten times a second."""
+
+    def __init__(self, base: str) -> None:
+        super().__init__(daemon=True)
+        self.times_ms: list[float] = []
+        self.stop = threading.Event()
+        self._base = base
+
+    def run(self) -> None:
+        with httpx.Client(base_url=f"{self._base}/api/v1", timeout=30) as http:
+            while not self.stop.wait(0.1):
+                began = time.monotonic()
+                http.get("/drives").raise_for_status()
+                self.times_ms.append((time.monotonic() - began) * 1e3)
+
+
+def memory_mib(pid: int) -> float:
+    """Resident memory of a process."""
+    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+        if line.startswith("VmRSS"):
+            return int(line.split()[1]) / 1024
+    return float("nan")
+
+
+def cpu_s(pid: int) -> float:
+    """Processor time of a process so far."""
+    fields = Path(f"/proc/{pid}/stat").read_text("ascii").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def prepare(http: httpx.Client) -> list[str]:
+    """Four axes, and the exchange at 4 kHz."""
+    drives = []
+    for n in range(1, AXES + 1):
+        body = {"url": URL, "station": n, "profile": "mms7", "name": f"A{n}"}
+        drives.append(str(http.post("/drives", json=body).raise_for_status().json()["id"]))
+    body = {"url": URL, "cycle_us": CYCLE_US}
+    for _ in range(20):  # a computer that is busy with others may need several tries
+        answer = http.post("/buses/cyclic", json=body)
+        if answer.is_success:
+            break
+        time.sleep(1)
+    answer.raise_for_status()
+    return drives
+
+
+def cycle_figures(http: httpx.Client) -> dict[str, Any]:
+    """Counters of the cycle since the exchange began."""
+    (bus,) = http.get("/buses").raise_for_status().json()
+    details: dict[str, Any] = bus["quality"]["details"]
+    return details
+
+
+def open_scope(browser: Browser, url: str, drives: list[str]) -> Page:
+    """A Scope page with all channels."""
+    setup = {
+        "traces": [
+            {"id": f"c{n}", "drive": drive, "key": key, "show": "axis", "factor": 1, "offset": 0,
+             "unit": ""}
+            for n, (drive, key) in enumerate(((d, k) for d in drives for k in KEYS), 1)
+        ],
+        "maths": [], "window_s": 5, "persistence": 0, "trigger": {"mode": "off"},
+    }  # fmt: skip
+    page = browser.new_page()
+    page.goto(url)
+    page.evaluate("s => localStorage.setItem('servodeck.scope.setup', s)", json.dumps(setup))
+    page.goto(f"{url}/#/scope")
+    page.reload()
+    page.locator('[data-trace="c16"]').wait_for(timeout=60_000)
+    return page
+
+
+def processes(browser: Browser) -> list[dict[str, Any]]:
+    """Processes of a browser: type, id, processor time."""
+    session = browser.new_browser_cdp_session()
+    found: list[dict[str, Any]] = session.send("SystemInfo.getProcessInfo")["processInfo"]
+    session.detach()
+    return found
+
+
+def lost(page: Page) -> int:
+    """Samples that the page says its view has lost."""
+    return int(page.locator("[data-lost]").get_attribute("data-lost") or 0)
+
+
+def disk_figures(path: Path) -> tuple[int, int, int]:
+    """Samples on the disk, samples that the bus left out, and samples unaccounted for."""
+    rows: dict[int, int] = {}
+    out: dict[int, int] = {}
+    first: dict[int, float] = {}
+    last: dict[int, float] = {}
+    with RecordingReader(path) as reader:
+        for block in reader.blocks():
+            stream = block.stream
+            rows[stream] = rows.get(stream, 0) + len(block.values)
+            # What was lost before the first block is no loss of the recording.
+            out[stream] = out.get(stream, -block.lost) + block.lost
+            first.setdefault(stream, float(block.times_s[0]))
+            last[stream] = float(block.times_s[-1])
+    dt = CYCLE_US / 1e6
+    missing = sum(round((last[s] - first[s]) / dt) + 1 - rows[s] - out[s] for s in rows)
+    return sum(rows.values()), sum(out.values()), missing
+
+
+def soak(http: httpx.Client, server: int, url: str, folder: Path) -> None:
+    """Run it and print the figures."""
+    drives = prepare(http)
+    time.sleep(BASELINE_S)
+    quiet = cycle_figures(http)
+    channels = [{"drive": d, "key": k} for d in drives for k in KEYS]
+    program = shutil.which("chromium") or "/usr/bin/chromium"
+    with sync_playwright() as playwright:
+        browsers = [
+            playwright.chromium.launch(executable_path=program, args=FLAGS) for _ in range(2)
+        ]
+        pages = [open_scope(browser, url, drives) for browser in browsers]
+        sleeping = [int(p["id"]) for p in processes(browsers[1]) if p["type"] != "browser"]
+        http.post("/recordings", json={"name": "soak", "channels": channels}).raise_for_status()
+        poller = Poller(url)
+        poller.start()
+        began, used = time.monotonic(), cpu_s(server)
+        before = [sum(p["cpuTime"] for p in processes(b)) for b in browsers]
+        memory = []
+        stopped = False
+        while (now := time.monotonic() - began) < SECONDS:
+            asleep = SECONDS / 3 < now < 2 * SECONDS / 3
+            if asleep is not stopped:
+                for pid in sleeping:
+                    os.kill(pid, signal.SIGSTOP if asleep else signal.SIGCONT)
+                stopped = asleep
+            memory.append(memory_mib(server))
+            time.sleep(1)
+        took = time.monotonic() - began
+        after = [sum(p["cpuTime"] for p in processes(b)) for b in browsers]
+        server_cpu = cpu_s(server) - used
+        poller.stop.set()
+        poller.join()
+        pages[1].wait_for_timeout(6000)  # it connects again and draws
+        views = [lost(page) for page in pages]
+        info = http.post("/recordings/soak.sdrec/stop").raise_for_status().json()
+        for browser in browsers:
+            browser.close()
+    busy = cycle_figures(http)
+    samples, left_out, missing = disk_figures(folder / "state/recordings/soak.sdrec")
+    rate = samples / AXES / took
+    print(f"{took:.0f} s, {AXES} axes, {len(channels)} channels at {1e6 / CYCLE_US:.0f} Hz "
+          f"({rate:.0f} cycles a second came); browser 2 stopped for {SECONDS / 3:.0f} s")  # fmt: skip
+    print(f"disk: {samples} rows, {info['bytes'] / 1e6:.0f} MB, {left_out} left out by the bus, "
+          f"{missing} unaccounted for; state {info['state']}")  # fmt: skip
+    print(f"views: browser 1 lost {views[0]} rows, browser 2 {views[1]} "
+          f"(its sleep: about {AXES * rate * SECONDS / 3:.0f})")  # fmt: skip
+    settled = memory[min(60, len(memory) // 3):]  # fmt: skip
+    print(
+        f"server: {100 * server_cpu / took:.0f} % of a core, memory {settled[0]:.0f} MiB after "
+        f"the first minute, {settled[-1]:.0f} MiB at the end, {max(memory):.0f} at most"
+    )
+    shares = [100 * (b - a) / took for a, b in zip(before, after, strict=True)]
+    print(f"browsers: {shares[0]:.0f} % and {shares[1]:.0f} % of a core")
+    for name, figures in (("alone", quiet), ("with all", busy)):
+        late = figures.get("cyclic_late_p50_us"), figures.get("cyclic_late_p99_us")
+        print(f"cycle {name}: late p50 {late[0]} µs, p99 {late[1]} µs, "
+              f"{figures.get('cyclic_overruns')} overruns")  # fmt: skip
+    p50, p99 = np.percentile(poller.times_ms, [50, 99])
+    print(f"GET /drives: p50 {p50:.1f} ms, p99 {p99:.1f} ms ({len(poller.times_ms)} requests); "
+          f"load of the machine {os.getloadavg()[1]:.1f}")  # fmt: skip
+
+
+def main() -> None:
+    """Print the figures."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        with station_process(folder) as (http, server, url):
+            soak(http, server, url, folder)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["--station"]:
+        run_station(Path(sys.argv[2]))
+    else:
+        main()
