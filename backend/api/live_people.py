@@ -34,6 +34,7 @@ from backend.api.live_people_messages import (
     PointerMoved,
     Where,
 )
+from backend.api.people_record import PeopleRecord
 from backend.bench import Bench
 from backend.jobs import Job
 from backend.people.errors import Forbidden
@@ -75,6 +76,7 @@ class PeopleLive:
     def __init__(self, bench: Bench, people: People, pages: Mapping[str, Page]) -> None:
         self._bench, self._people, self._pages = bench, people, pages
         self._support = people.support
+        self._record = PeopleRecord(bench)
         self._tasks: set[asyncio.Task[object]] = set()
         self._hold_pressed = asyncio.Event()
         bench.leases.on_notice.append(self._notice)
@@ -268,7 +270,8 @@ class PeopleLive:
         self._log(drive, identity, "takes control by override")
 
     def _log(self, drive: str, identity: Identity, what: str) -> None:
-        self._bench.journal.add(f"{identity.person} {what}", drive=drive, person=identity.person)
+        text = f"{identity.person} {what}"
+        self._record.note("lease", what, text, drive=drive, person=identity.person)
 
     def _notice(self, notice: Notice) -> None:
         page = self._pages.get(notice.connection)
@@ -283,12 +286,24 @@ class PeopleLive:
         self._support.press(invitation, page.id)
         self._hold_pressed.set()
         guest = self._support.find(invitation).guest
-        self._bench.journal.add(f"enabling button held for {guest}", person=identity.person)
+        self._record.note(
+            "invitation",
+            "motion enabled",
+            f"enabling button held for {guest}",
+            target=guest,
+            person=identity.person,
+        )
 
     def _disabled(self, invitation: Invitation, why: str) -> None:
         """A guest may not move anything from now on: what moves stops."""
         session = invitation.session
-        self._bench.journal.add(f"{invitation.guest} may not move anything now: {why}")
+        self._record.note(
+            "invitation",
+            "motion ended",
+            f"{invitation.guest} may not move anything now: {why}",
+            target=invitation.guest,
+            outcome=why,
+        )
         guests = [p for p in self._pages.values() if session and p.identity.session == session]
         for page in guests:
             page.release(None, why)

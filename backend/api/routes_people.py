@@ -30,8 +30,8 @@ from backend.api.models_people import (
     SetUp,
     TokenInfo,
 )
+from backend.api.people_record import PeopleRecord
 from backend.api.security import COOKIE, SECURE_COOKIE, credentials, require_right
-from backend.journal import Journal
 from backend.people.accounts import Accounts
 from backend.people.credentials import csrf_of
 from backend.people.errors import Forbidden, NoSuchPerson, NotLoggedIn
@@ -50,12 +50,12 @@ def _live_of(request: Request) -> LiveHub:
     return live
 
 
-def _journal_of(request: Request) -> Journal:
-    return _live_of(request).bench.journal
+def _record_of(request: Request) -> PeopleRecord:
+    return PeopleRecord(_live_of(request).bench)
 
 
 TheLive = Annotated[LiveHub, Depends(_live_of)]
-TheJournal = Annotated[Journal, Depends(_journal_of)]
+TheRecord = Annotated[PeopleRecord, Depends(_record_of)]
 
 
 # --- session --------------------------------------------------------------------------
@@ -106,7 +106,7 @@ def _client(request: Request) -> str:
 
 @router.post("/session")
 async def log_in(
-    request: Request, response: Response, people: ThePeople, journal: TheJournal, body: LogIn
+    request: Request, response: Response, people: ThePeople, record: TheRecord, body: LogIn
 ) -> Session:
     """Log in. Wrong tries are answered later and later."""
     people.require_accounts()
@@ -115,22 +115,36 @@ async def log_in(
             body.name, body.password, _address(request), _client(request)
         )
     except NotLoggedIn:
-        journal.add(f"log-in failed for {body.name!r} from {_address(request)}", level="warning")
+        record.note(
+            "login",
+            "refused",
+            f"log-in failed for {body.name!r} from {_address(request)}",
+            target=body.name,
+            person="",
+            outcome="wrong name or password",
+            level="warning",
+        )
         raise
     made = _with_cookie(request, response, people, secret)
-    journal.add(f"{made.person} logged in from {_address(request)}", person=made.person or "")
+    record.note(
+        "login",
+        "logged in",
+        f"{made.person} logged in from {_address(request)}",
+        target=_address(request),
+        person=made.person or "",
+    )
     return made
 
 
 @router.delete("/session", status_code=204)
-async def log_out(people: ThePeople, journal: TheJournal, me: Me) -> Response:
+async def log_out(people: ThePeople, record: TheRecord, me: Me) -> Response:
     """Log out."""
     if me.kind == "session":
         await people.accounts.log_out(me.session)
-        journal.add(f"{me.person} logged out", person=me.person)
+        record.note("login", "logged out", f"{me.person} logged out", person=me.person)
     elif me.is_guest and (found := people.support.of_session(me.session)) is not None:
         people.support.revoke(found.id, "the guest left")
-        journal.add(f"{me.person} left", person=me.person)
+        record.note("invitation", "left", f"{me.person} left", person=me.person)
     response = Response(status_code=204)
     response.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
     response.delete_cookie(SECURE_COOKIE, path="/", secure=True, httponly=True, samesite="strict")
@@ -139,7 +153,7 @@ async def log_out(people: ThePeople, journal: TheJournal, me: Me) -> Response:
 
 @router.post("/setup", status_code=201)
 async def set_up(
-    request: Request, response: Response, people: ThePeople, journal: TheJournal, body: SetUp
+    request: Request, response: Response, people: ThePeople, record: TheRecord, body: SetUp
 ) -> Session:
     """Make the first administrator, with the code that stands in the terminal."""
     people.require_accounts()
@@ -147,19 +161,32 @@ async def set_up(
         body.code, body.name, body.password, _address(request), _client(request)
     )
     made = _with_cookie(request, response, people, secret)
-    journal.add(f"{made.person} is the first administrator", level="warning")
+    record.note(
+        "account",
+        "made",
+        f"{made.person} is the first administrator",
+        target=made.person or "",
+        person=made.person,
+        level="warning",
+    )
     return made
 
 
 @router.put("/session/password", status_code=204)
 async def change_password(
-    request: Request, people: ThePeople, journal: TheJournal, me: Me, body: PasswordChange
+    request: Request, people: ThePeople, record: TheRecord, me: Me, body: PasswordChange
 ) -> Response:
     """Change the own password; other sessions of the account end."""
     account = _own_account(people.accounts, me)
     await people.accounts.require_password(account.id, body.present, _address(request))
     await people.accounts.set_password(account.id, body.password, keep=me.session)
-    journal.add(f"{me.person} changed their password", person=me.person)
+    record.note(
+        "account",
+        "password changed",
+        f"{me.person} changed their password",
+        target=me.person,
+        person=me.person,
+    )
     return Response(status_code=204)
 
 
@@ -204,7 +231,7 @@ def _whose(accounts: Accounts, me: Identity) -> int | None:
 
 
 @router.delete("/sessions/{session_id}", status_code=204)
-async def end_session(people: ThePeople, journal: TheJournal, me: Me, session_id: str) -> Response:
+async def end_session(people: ThePeople, record: TheRecord, me: Me, session_id: str) -> Response:
     """End a log-in at once: an own one, or as an administrator anybody's."""
     accounts = people.accounts
     found = next((s for s in accounts.sessions(_whose(accounts, me)) if s.id == session_id), None)
@@ -212,7 +239,13 @@ async def end_session(people: ThePeople, journal: TheJournal, me: Me, session_id
         raise NoSuchPerson("there is no such session", value=session_id)
     whose = accounts.account(found.account).name
     await accounts.log_out(session_id)
-    journal.add(f"{me.person} ended a session of {whose}", person=me.person)
+    record.note(
+        "login",
+        "session ended",
+        f"{me.person} ended a session of {whose}",
+        target=whose,
+        person=me.person,
+    )
     return Response(status_code=204)
 
 
@@ -238,28 +271,37 @@ def _token(accounts: Accounts, token: Token) -> TokenInfo:
 
 
 @router.post("/tokens", status_code=201)
-async def make_token(people: ThePeople, journal: TheJournal, me: Me, body: NewToken) -> MadeToken:
+async def make_token(people: ThePeople, record: TheRecord, me: Me, body: NewToken) -> MadeToken:
     """Make a token for a script. It can do no more than its owner."""
     account = _own_account(people.accounts, me)
     secret, token = await people.accounts.make_token(
         account.id, body.name, frozenset(body.scopes), timedelta(days=body.days)
     )
-    journal.add(
+    record.note(
+        "account",
+        "token made",
         f"{me.person} made the token {token.name} ({', '.join(sorted(token.scopes))})",
+        target=token.name,
         person=me.person,
     )
     return MadeToken(token=_token(people.accounts, token), secret=secret)
 
 
 @router.delete("/tokens/{token_id}", status_code=204)
-async def revoke_token(people: ThePeople, journal: TheJournal, me: Me, token_id: str) -> Response:
+async def revoke_token(people: ThePeople, record: TheRecord, me: Me, token_id: str) -> Response:
     """Revoke a token at once."""
     accounts = people.accounts
     found = next((t for t in accounts.tokens(_whose(accounts, me)) if t.id == token_id), None)
     if found is None:
         raise NoSuchPerson("there is no such token", value=token_id)
     await accounts.revoke_token(found)
-    journal.add(f"{me.person} revoked the token {found.name}", person=me.person)
+    record.note(
+        "account",
+        "token revoked",
+        f"{me.person} revoked the token {found.name}",
+        target=found.name,
+        person=me.person,
+    )
     return Response(status_code=204)
 
 
@@ -287,38 +329,60 @@ def _account(accounts: Accounts, account: Account, me: Identity) -> AccountInfo:
 
 @router.post("/accounts", status_code=201)
 async def add_account(
-    people: ThePeople, journal: TheJournal, me: Me, body: NewAccount
+    people: ThePeople, record: TheRecord, me: Me, body: NewAccount
 ) -> AccountInfo:
     """Make an account."""
     people.require_accounts()
     made = await people.accounts.add(body.name, body.password, body.role)
-    journal.add(f"{me.person} made the account {made.name} ({made.role})", person=me.person)
+    record.note(
+        "account",
+        "made",
+        f"{me.person} made the account {made.name} ({made.role})",
+        target=made.name,
+        person=me.person,
+    )
     return _account(people.accounts, made, me)
 
 
 @router.patch("/accounts/{account_id}")
 async def change_account(
-    people: ThePeople, journal: TheJournal, me: Me, account_id: int, body: AccountChange
+    people: ThePeople, record: TheRecord, me: Me, account_id: int, body: AccountChange
 ) -> AccountInfo:
     """Change role or password; with the password all sessions of the account end."""
     known = people.accounts.account(account_id)
     if body.role is not None:
         known = await people.accounts.set_role(account_id, body.role)
-        journal.add(f"{me.person} made {known.name} {known.role}", person=me.person)
+        record.note(
+            "account",
+            "role changed",
+            f"{me.person} made {known.name} {known.role}",
+            target=f"{known.name}: {known.role}",
+            person=me.person,
+        )
     if body.password is not None:
         await people.accounts.set_password(account_id, body.password)
-        journal.add(f"{me.person} set a password for {known.name}", person=me.person)
+        record.note(
+            "account",
+            "password set",
+            f"{me.person} set a password for {known.name}",
+            target=known.name,
+            person=me.person,
+        )
     return _account(people.accounts, people.accounts.account(account_id), me)
 
 
 @router.delete("/accounts/{account_id}", status_code=204)
-async def remove_account(
-    people: ThePeople, journal: TheJournal, me: Me, account_id: int
-) -> Response:
+async def remove_account(people: ThePeople, record: TheRecord, me: Me, account_id: int) -> Response:
     """Delete an account; its sessions and tokens end at once."""
     name = people.accounts.account(account_id).name
     await people.accounts.remove(account_id)
-    journal.add(f"{me.person} deleted the account {name}", person=me.person)
+    record.note(
+        "account",
+        "deleted",
+        f"{me.person} deleted the account {name}",
+        target=name,
+        person=me.person,
+    )
     return Response(status_code=204)
 
 
@@ -342,17 +406,31 @@ async def chat(people: ThePeople) -> ChatLog:
 
 @router.post("/guests", status_code=201)
 async def join(
-    request: Request, response: Response, people: ThePeople, journal: TheJournal, body: JoinAsGuest
+    request: Request, response: Response, people: ThePeople, record: TheRecord, body: JoinAsGuest
 ) -> Session:
     """Come in as a guest, by the link and the code of an invitation."""
     people.require_accounts()
     try:
         secret, invitation = people.support.join(body.link, body.code, _address(request))
     except NotLoggedIn as error:
-        journal.add(f"a guest was refused from {_address(request)}: {error.message}",
-                    level="warning")  # fmt: skip
+        record.note(
+            "invitation",
+            "refused",
+            f"a guest was refused from {_address(request)}: {error.message}",
+            target=_address(request),
+            person="",
+            outcome=error.message,
+            level="warning",
+        )
         raise
-    journal.add(f"{invitation.guest} joined as a guest from {_address(request)}", level="warning")
+    record.note(
+        "invitation",
+        "joined",
+        f"{invitation.guest} joined as a guest from {_address(request)}",
+        target=_address(request),
+        person=f"{invitation.guest} (guest)",
+        level="warning",
+    )
     return _with_cookie(request, response, people, secret)
 
 
@@ -364,7 +442,7 @@ async def invitations(live: TheLive, me: Me) -> list[InvitationView]:
 
 @router.post("/invitations", status_code=201)
 async def invite(
-    people: ThePeople, live: TheLive, journal: TheJournal, me: Me, body: NewInvitation
+    people: ThePeople, live: TheLive, record: TheRecord, me: Me, body: NewInvitation
 ) -> MadeInvitation:
     """Invite a guest. The link and the code go to them by different ways."""
     people.require_accounts()
@@ -374,8 +452,11 @@ async def invite(
         me.person, body.guest, frozenset(body.allowed), body.minutes * 60.0
     )
     allowed = ", ".join(sorted(made.allowed)) or "look only"
-    journal.add(
+    record.note(
+        "invitation",
+        "made",
         f"{me.person} invited {made.guest} for {body.minutes:g} min ({allowed})",
+        target=f"{made.guest}: {allowed}",
         level="warning",
         person=me.person,
     )
@@ -385,12 +466,18 @@ async def invite(
 
 @router.delete("/invitations/{invitation_id}")
 async def revoke_invitation(
-    people: ThePeople, live: TheLive, journal: TheJournal, me: Me, invitation_id: str
+    people: ThePeople, live: TheLive, record: TheRecord, me: Me, invitation_id: str
 ) -> InvitationView:
     """End an invitation; its guest is out at once and what they move stops."""
     ended = people.support.revoke(invitation_id, f"ended by {me.person}")
-    journal.add(f"{me.person} ended the invitation of {ended.guest}", level="warning",
-                person=me.person)  # fmt: skip
+    record.note(
+        "invitation",
+        "ended",
+        f"{me.person} ended the invitation of {ended.guest}",
+        target=ended.guest,
+        level="warning",
+        person=me.person,
+    )
     return live.people.invitation(ended, host=True, identity=me)
 
 
@@ -398,7 +485,7 @@ async def revoke_invitation(
 async def grant(
     people: ThePeople,
     live: TheLive,
-    journal: TheJournal,
+    record: TheRecord,
     me: Me,
     invitation_id: str,
     body: NewGrant,
@@ -408,12 +495,15 @@ async def grant(
         require_right(people, me, right, body.drive)
     if body.drive is not None:
         live.bench.member(body.drive)
+    rights = f"{', '.join(sorted(body.rights))} for {body.minutes:g} min"
     granted = people.support.grant(
         invitation_id, me.person, frozenset(body.rights), body.minutes * 60.0, body.drive
     )
-    journal.add(
-        f"{me.person} granted {granted.guest} {', '.join(sorted(body.rights))} "
-        f"for {body.minutes:g} min",
+    record.note(
+        "invitation",
+        "granted",
+        f"{me.person} granted {granted.guest} {rights}",
+        target=f"{granted.guest}: {rights}",
         level="warning",
         drive=body.drive,
         person=me.person,
@@ -423,10 +513,16 @@ async def grant(
 
 @router.delete("/invitations/{invitation_id}/grant")
 async def withdraw_grant(
-    people: ThePeople, live: TheLive, journal: TheJournal, me: Me, invitation_id: str
+    people: ThePeople, live: TheLive, record: TheRecord, me: Me, invitation_id: str
 ) -> InvitationView:
     """Withdraw a grant at once; what the guest moves stops."""
     ended = people.support.withdraw(invitation_id, f"the grant was withdrawn by {me.person}")
-    journal.add(f"{me.person} withdrew the grant of {ended.guest}", level="warning",
-                person=me.person)  # fmt: skip
+    record.note(
+        "invitation",
+        "grant withdrawn",
+        f"{me.person} withdrew the grant of {ended.guest}",
+        target=ended.guest,
+        level="warning",
+        person=me.person,
+    )
     return live.people.invitation(ended, host=True, identity=me)

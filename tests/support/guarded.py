@@ -71,13 +71,13 @@ class Page(Live):
     def refused(self, **message: object) -> Any:
         """Send, then a ping; the problem that came before the pong, or None."""
         self.socket.send(json.dumps(message))
-        self.send(type="ping", n=1)
+        self.send(type="ping", n=987654)
         problem = None
         while True:
             got = self.receive(10)
             if got["type"] == "refused":
                 problem = got["problem"]
-            if got["type"] == "pong":
+            if got["type"] == "pong" and got["n"] == 987654:
                 return problem
 
 

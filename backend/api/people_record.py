@@ -1,0 +1,35 @@
+"""What people do to one another is told twice: in the log of the session, and in the audit."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from backend.audit.facts import Fact
+from backend.bench import Bench
+from backend.journal import Level
+
+
+class PeopleRecord:
+    """Writes both."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+
+    def note(
+        self,
+        kind: Literal["login", "account", "invitation", "lease"],
+        action: str,
+        text: str,
+        *,
+        target: str = "",
+        person: str | None = None,
+        drive: str | None = None,
+        level: Level = "info",
+        outcome: str = "",
+    ) -> None:
+        """``text`` is for the log; the audit keeps ``action``, ``target`` and ``outcome``."""
+        self._bench.journal.add(text, level=level, drive=drive, person=person or "")
+        member = self._bench.members.get(drive) if drive else None
+        axis = member.drive.name if member else ""
+        fact = Fact(kind, action, axis=axis, target=target, outcome=outcome, person=person)
+        self._bench.audit.add(fact)
