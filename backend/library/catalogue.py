@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 from sqlalchemy import Select, func, select
 from sqlalchemy.exc import IntegrityError
@@ -34,6 +34,10 @@ from backend.store.library_tables import Version as VersionRow
 from drivers.errors import NotAllowed
 
 INLINE = 1_000_000
+#: Longer than any storing takes.
+_BLOB_AGE = timedelta(days=1)
+#: Held on PostgreSQL by everybody who stores contents, against deleting unused ones meanwhile.
+_CONTENTS_LOCK = 0x5E2D0DED
 
 
 class NotInLibrary(NotAllowed):
@@ -165,6 +169,7 @@ class Library:
         place = "database" if len(data) <= INLINE else "blob"
         now = datetime.now(UTC)
         with self.store.writing() as session:
+            _guard_contents(session, exclusive=False)
             item = _by_name(session, kind, name, lock=True)
             if item is None:
                 item = Item(kind=kind, name=name, station="", changed=now, notes="", words="")
@@ -250,6 +255,7 @@ class Library:
             DatabaseFailed, BlobFailed: some may remain; calling again goes on.
         """
         with self.store.writing() as session:
+            _guard_contents(session, exclusive=True)
             wanted = select(Item).where(Item.deleted < before)
             gone = [_loaded(item) for item in session.scalars(wanted)]
             for item in session.scalars(wanted):
@@ -260,14 +266,22 @@ class Library:
                 session.delete(content)
         for entry in gone:
             self._tell("purged", entry)
-        self.sweep_blobs()
+        self.sweep_blobs(datetime.now(UTC) - _BLOB_AGE)
         return gone
 
-    def sweep_blobs(self) -> int:
-        """Delete blobs that no version names (left by a crash, or purged); how many."""
+    def sweep_blobs(self, before: datetime) -> int:
+        """Delete blobs stored before this time that no version names; returns how many.
+
+        A crash leaves such, and a purge. One that is younger may be of an entry that somebody
+        is just storing: its row comes after it.
+        """
         with self.store.reading() as session:
             used = set(session.scalars(select(VersionRow.sha256).where(VersionRow.place == "blob")))
-        unused = [name for name in self.blobs.names() if name not in used]
+        unused = [
+            name
+            for name in self.blobs.names()
+            if name not in used and self.blobs.modified(name) < before
+        ]
         for name in unused:
             self.blobs.delete(name)
         return len(unused)
@@ -301,6 +315,16 @@ class Library:
                 detail=facts | detail,
             )
         )
+
+
+def _guard_contents(session: Session, *, exclusive: bool) -> None:
+    """Contents that are in the database already are not deleted while a version of them is made.
+
+    SQLite has one writer at a time anyway.
+    """
+    if session.get_bind().dialect.name == "postgresql":
+        lock = func.pg_advisory_xact_lock if exclusive else func.pg_advisory_xact_lock_shared
+        session.execute(select(lock(_CONTENTS_LOCK)))
 
 
 def _by_name(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 import fsspec
@@ -101,6 +102,20 @@ class Blobs:
             name = str(path).rsplit("/", 1)[-1]
             if _NAME.match(name):
                 yield name
+
+    def modified(self, name: str) -> datetime:
+        """When contents were stored.
+
+        Raises:
+            BlobFailed: missing, or the place cannot be reached.
+        """
+        try:
+            moment = self._fs.modified(self._path(name))
+        except Exception as error:
+            raise self._failed("found", error) from error
+        if not isinstance(moment, datetime):
+            raise BlobFailed(f"{self.place} does not tell when contents were stored", value=name)
+        return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
 
     def delete(self, name: str) -> None:
         """Delete contents that nothing names any more; does nothing where there are none.

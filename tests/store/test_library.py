@@ -125,9 +125,12 @@ def test_large_contents_are_blobs(library: Library, tmp_path: Path) -> None:
     assert file.read_bytes() == data
     assert library.content(entry.id) == data
     library.blobs.put(b"left by a crash" * 1000)
-    assert library.sweep_blobs() == 1
+    later = datetime.now(UTC) + timedelta(minutes=1)
+    assert library.sweep_blobs(later - timedelta(hours=1)) == 0, "its row may be on its way"
+    assert library.sweep_blobs(later) == 1
     library.delete(entry.id)
-    library.purge(datetime.now(UTC) + timedelta(seconds=1))
+    library.purge(later)
+    assert library.sweep_blobs(later) == 1
     assert not file.exists()
 
 
@@ -171,6 +174,37 @@ def test_stations_share_it_and_save_at_once(
     assert [v.number for v in stations[1].versions(entry.id)] == list(range(20, 0, -1))
     contents = {stations[2].content(entry.id, n) for n in range(1, 21)}
     assert contents == {f"{n} {t}".encode() for n in range(4) for t in range(5)}
+
+
+def test_purging_takes_no_contents_away_that_are_being_used(
+    make_store: Callable[[], Store], tmp_path: Path
+) -> None:
+    """Two stations: one stores and deletes the same contents, the other purges all the time."""
+    stations = [Library(make_store(), Blobs(str(tmp_path / "blobs"))) for _ in range(2)]
+    failures: list[Exception] = []
+    done = threading.Event()
+
+    def purge() -> None:
+        try:
+            while not done.is_set():
+                stations[1].purge(datetime.now(UTC) + timedelta(minutes=1))
+        except Exception as error:
+            failures.append(error)
+
+    thread = threading.Thread(target=purge)
+    thread.start()
+    try:
+        for turn in range(30):
+            gone = stations[0].add("set", f"gone {turn}", b"same", Addition(X))
+            stations[0].delete(gone.id)
+            kept = stations[0].add("set", f"kept {turn}", b"same", Addition(X))
+            assert stations[0].content(kept.id) == b"same"
+            if turn % 2:
+                stations[0].delete(kept.id)
+    finally:
+        done.set()
+        thread.join()
+    assert failures == []
 
 
 # --- parameter sets by name ------------------------------------------------------------
@@ -245,6 +279,7 @@ def test_contents_in_an_object_store(store: Store) -> None:
     entry = library.add("recording", "r.sdrec", data, Addition(X))
     assert library.content(entry.id) == data
     assert list(library.blobs.names()) == [entry.latest.sha256]
+    assert library.sweep_blobs(datetime.now(UTC) + timedelta(minutes=1)) == 0
     library.blobs.delete(entry.latest.sha256)
     with pytest.raises(BlobFailed, match="missing"):
         library.content(entry.id)
