@@ -22,6 +22,7 @@ from drivers.ethercat.segment import Segment
 from drivers.ethercat.setup import Snapshot, StationSetup
 from drivers.ethercat.station import Station, al_status, change_state
 
+_WATCHDOG, _OP_TRIES, _OP_PAUSE_S = 0x001B, 5, 0.2
 _LEAVE_S, _SETTLE_DC_S, _SETTLE_S = 0.5, 0.4, 0.02
 
 
@@ -111,7 +112,20 @@ class Exchange:
 
     def _to_op(self, number: int) -> Steps[None]:
         yield Pause(_SETTLE_DC_S if self._dc else _SETTLE_S)
-        yield from change_state(self._stations[number - 1], AlState.OP, time.monotonic)
+        yield from self._enter_op(self._stations[number - 1])
+
+    def _enter_op(self, station: Station) -> Steps[None]:
+        """To OP; once more where process data just stayed away: a computer may stall for 50 ms."""
+        for _ in range(_OP_TRIES - 1):
+            try:
+                yield from change_state(station, AlState.OP, time.monotonic)
+            except NotAllowed:
+                if station.al_code != _WATCHDOG:
+                    raise
+                yield Pause(_OP_PAUSE_S)
+            else:
+                return
+        yield from change_state(station, AlState.OP, time.monotonic)
 
     def stop(self, done: Done) -> None:
         """Brake what moves, disable, leave OP, then end the exchange."""
@@ -227,7 +241,7 @@ class Exchange:
             )
         loop.leave_out(station.number, lost=False)
         yield Pause(0.15 if self._dc and restarted else 0.0)
-        yield from change_state(station, AlState.OP, time.monotonic)
+        yield from self._enter_op(station)
 
     # Axes ----------------------------------------------------------------------------------
 

@@ -31,6 +31,9 @@ _NAME_LIMIT = 15
 _EMERGENCY = "an emergency or another unexpected mail came in between"
 _FRAME_TIMEOUT_US = 2000
 _MANY_MISSING, _STALL_S = 8, 0.1
+_OTHER_FRAME, _TOO_MANY = -2, -4
+"""What SOEM's search returns besides a number of slaves."""
+
 _FIND_TRIES, _MAP_TRIES = 3, 3
 """A segment that stands still for a moment answers nothing, or too late and to another question."""
 
@@ -135,8 +138,13 @@ class Segment:
             self.forget_errors()
             if 0 < count <= MAX_STATIONS:
                 break
-        if count == -2 or count > MAX_STATIONS:
+        if count == _TOO_MANY or count > MAX_STATIONS:
             raise ProtocolError(f"more than {MAX_STATIONS} slaves on one segment")
+        if count == _OTHER_FRAME:
+            raise LinkLost(
+                f"answers on {self.interface} come too late to be told apart",
+                remedy="this computer is too busy, or another master is on the segment: try again",
+            )
         self.slaves = tuple(self.master.slaves) if count > 0 else ()
         return len(self.slaves)
 
