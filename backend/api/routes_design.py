@@ -145,7 +145,9 @@ async def write_gains(bench: TheBench, member: Controlled, request: GainWrite) -
     if request.gains is not None:
         g = request.gains
         wanted = _gains(g.speed_bandwidth_hz, g.integral_hz, g.position_1_s, g.inertia_kgm2)
-        raw = gains.plan_gains(member.drive, wanted, g.inertia_kgm2)
+        raw = gains.plan_gains(
+            member.drive, wanted, g.inertia_kgm2, await gains.rotor_inertia(member.axis)
+        )
     else:
         raw = gains.plan_level(member.drive, request.level or 0)
     before = await write_settings(member.axis, raw)

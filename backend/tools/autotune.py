@@ -24,6 +24,7 @@ from backend.analysis.design import (
     measured_plant,
     speed_loop,
 )
+from backend.analysis.sampling import Hold
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
@@ -128,6 +129,7 @@ async def autotune(
             axis, session, _sweep_settings(settings, outcome),
             _part(progress, 0.3, 0.6, "3 of 6: frequency response"), keep,
         )  # fmt: skip
+    facts = sweep_tool.completed(facts, mechanics)
     progress(0.6, "4 of 6: notches and gains")
     load, candidates = await _candidates(axis, session, settings, facts, outcome, mechanics)
     nothing = AutotuneResult(outcome, mechanics, load, candidates, None, None, None, {}, ())
@@ -156,9 +158,8 @@ async def _pre_checks(axis: Axis, settings: AutotuneSettings) -> AxisFacts:
         )  # fmt: skip
     spec = gain_tool.spec_of(drive)
     if spec.convention == "unit":
-        gain_tool.plan_gains(drive, Gains(1.0, 1.0, 1.0, 1.0), 1e-4)
+        gain_tool.plan_gains(drive, Gains(1.0, 1.0, 1.0, 1.0), 1e-4, 1e-4)
     facts = await read_facts(axis, settings.rated_torque_nm, settings.motor_inertia_kgm2)
-    gain_tool.loops_of(drive, facts)
     if not facts.torque_known:
         raise NotAllowed(
             f"{drive.name}: its rated torque is not known, so no gain can be computed",
@@ -176,7 +177,7 @@ async def _steady_gains(axis: Axis, session: CyclicSession, facts: AxisFacts) ->
             raise
         inertia = facts.drive_inertia_kgm2 or 1e-4
         soft = Gains(0.0, _SOFT_INTEGRAL_HZ, _SOFT_POSITION_1_S, _SOFT_HZ)
-        return gain_tool.plan_gains(axis.drive, soft, inertia)
+        return gain_tool.plan_gains(axis.drive, soft, inertia, facts.motor_inertia_kgm2)
     return {}
 
 
@@ -252,9 +253,12 @@ def candidates_for(
     )  # fmt: skip
 
 
-async def plan(axis: Axis, candidate: Candidate, inertia_kgm2: float) -> dict[str, int]:
+async def plan(
+    axis: Axis, candidate: Candidate, inertia_kgm2: float, motor_inertia_kgm2: float | None = None
+) -> dict[str, int]:
     """Raw values of a candidate: gains, inertia and notches."""
-    raw = gain_tool.plan_gains(axis.drive, candidate.gains, inertia_kgm2)
+    rotor = await gain_tool.rotor_inertia(axis, motor_inertia_kgm2)
+    raw = gain_tool.plan_gains(axis.drive, candidate.gains, inertia_kgm2, rotor)
     if axis.drive.profile.notch is not None:
         raw |= await notch_tool.plan_notches(axis.drive, candidate.notches)
     return raw
@@ -269,11 +273,19 @@ async def _apply_and_verify(
     inertia = found.inertia.result.inertia_kgm2.value
     for number, candidate in enumerate(_order(found.candidates, settings.mark)):
         progress(0.65 + 0.1 * number, "5 of 6: applying")
-        raw = await plan(axis, candidate, inertia)
+        raw = await plan(axis, candidate, inertia, settings.motor_inertia_kgm2)
         before = await write_settings(axis, raw)
         try:
             verified = await _verify(
-                axis, session, settings, facts, candidate, inertia, progress, keep
+                axis,
+                session,
+                settings,
+                facts,
+                candidate,
+                inertia,
+                found.mechanics.hold,
+                progress,
+                keep,
             )
             if verified.kept:
                 step = await step_tool.step_response(
@@ -320,7 +332,8 @@ def _order(candidates: tuple[Candidate, ...], mark: Mark) -> list[Candidate]:
 
 async def _verify(
     axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
-    candidate: Candidate, inertia: float, progress: Progress, keep: Keep | None,
+    candidate: Candidate, inertia: float, hold: Hold | None, progress: Progress,
+    keep: Keep | None,
 ) -> Verified:  # fmt: skip
     """Measure the closed speed loop and compare it with the promise."""
     progress(0.7, "6 of 6: verifying that it stands still")
@@ -328,7 +341,7 @@ async def _verify(
     swept = await sweep_tool.sweep(
         axis, session,
         sweep_tool.SweepSettings(
-            settings.envelope, kind="speed_loop", realisations=1, inertia_kgm2=inertia,
+            settings.envelope, kind="speed_loop", realisations=1, inertia_kgm2=inertia, hold=hold,
             rated_torque_nm=settings.rated_torque_nm,
         ),
         _part(progress, 0.72, 0.92, "6 of 6: measuring the tuned loop"), keep,

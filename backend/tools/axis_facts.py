@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from backend.axis import Axis
@@ -9,6 +10,7 @@ from backend.drive import Drive
 from drivers.errors import NotAllowed
 from profiles.schema import Parameter
 
+_TURN = 2.0 * math.pi
 #: Printed units of parameters to SI.
 _SI = {
     "Nm": 1.0, "mNm": 1e-3, "0.1 Nm": 0.1, "0.01 Nm": 0.01, "A": 1.0, "mA": 1e-3, "0.1 A": 0.1,
@@ -57,6 +59,8 @@ class AxisFacts:
     motor_inertia_kgm2: float | None
     drive_inertia_kgm2: float | None
     interpolates: bool
+    torque_filter_hz: float | None = None
+    """Corner of a first-order filter of the torque command that the profile names, while on."""
 
 
 async def si(drive: Drive, key: str | None) -> float | None:
@@ -93,6 +97,7 @@ async def read_facts(
         total = rotor * (1.0 + inertia)
     elif meaning == "load" and rotor and inertia is not None:
         total = rotor + inertia
+    filter_s = await si(drive, gains.torque_filter if gains else None)
     return AxisFacts(
         rated_torque_nm=torque or 1.0,
         torque_known=bool(torque),
@@ -102,4 +107,5 @@ async def read_facts(
         motor_inertia_kgm2=rotor or None,
         drive_inertia_kgm2=total or None,
         interpolates="60C2:01" in drive.profile.by_key,
+        torque_filter_hz=1.0 / (_TURN * filter_s) if filter_s else None,
     )

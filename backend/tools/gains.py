@@ -15,7 +15,7 @@ import numpy as np
 from backend.analysis.design import DriveLoops, Gains
 from backend.axis import Axis
 from backend.drive import Drive
-from backend.tools.axis_facts import AxisFacts, read_facts, si_raw, si_value
+from backend.tools.axis_facts import AxisFacts, read_facts, si, si_raw, si_value
 from drivers.errors import NotAllowed
 from profiles.schema import GainSpec, StiffnessTable
 
@@ -106,8 +106,13 @@ def _row(drive: Drive, table: StiffnessTable, level: int) -> dict[str, float | N
     return values
 
 
-def plan_gains(drive: Drive, gains: Gains, inertia_kgm2: float) -> dict[str, int]:
+def plan_gains(
+    drive: Drive, gains: Gains, inertia_kgm2: float, rotor_kgm2: float | None = None
+) -> dict[str, int]:
     """Raw values that make the drive's loops these gains, its inertia parameter included.
+
+    ``rotor_kgm2`` is needed where that parameter is a ratio to the motor's own inertia: a speed
+    gain means nothing before the ratio is right.
 
     Raises:
         NotAllowed: a family whose gains have no printed meaning.
@@ -120,8 +125,8 @@ def plan_gains(drive: Drive, gains: Gains, inertia_kgm2: float) -> dict[str, int
             drive=drive.name, remedy="use its stiffness levels and measure the effect",
         )  # fmt: skip
     raw: dict[str, int] = {}
-    if spec.inertia is not None and spec.inertia_meaning == "total":
-        raw[spec.inertia] = si_raw(drive.parameter(spec.inertia), inertia_kgm2)
+    if spec.inertia is not None and spec.inertia_meaning is not None:
+        raw[spec.inertia] = _inertia_raw(drive, spec, inertia_kgm2, rotor_kgm2)
     if spec.speed is not None:
         raw[spec.speed] = si_raw(drive.parameter(spec.speed), gains.speed_bandwidth_hz)
     if spec.integral is not None:
@@ -138,6 +143,31 @@ def plan_gains(drive: Drive, gains: Gains, inertia_kgm2: float) -> dict[str, int
     if table is not None and table.mode_key is not None and table.manual_raw is not None:
         raw[table.mode_key] = table.manual_raw
     return {key: _within(drive, key, value) for key, value in raw.items()}
+
+
+def _inertia_raw(
+    drive: Drive, spec: GainSpec, inertia_kgm2: float, rotor_kgm2: float | None
+) -> int:
+    """The drive's inertia parameter for a whole axis of ``inertia_kgm2``."""
+    parameter = drive.parameter(spec.inertia or "")
+    if spec.inertia_meaning == "total":
+        return si_raw(parameter, inertia_kgm2)
+    if not rotor_kgm2:
+        raise NotAllowed(
+            f"{drive.name}: its load inertia is a ratio to the motor's, which is not known",
+            drive=drive.name, parameter=parameter.key,
+            remedy="enter the motor's inertia, as its nameplate or data sheet tells it",
+        )  # fmt: skip
+    load = max(inertia_kgm2 - rotor_kgm2, 0.0)
+    if spec.inertia_meaning == "load":
+        return si_raw(parameter, load)
+    percent = 100.0 if spec.inertia_meaning == "ratio_percent" else 1.0
+    return round(parameter.to_raw(load / rotor_kgm2 * percent))
+
+
+async def rotor_inertia(axis: Axis, given_kgm2: float | None = None) -> float | None:
+    """The motor's own inertia: given, or from the drive where it tells."""
+    return given_kgm2 or await si(axis.drive, axis.drive.key("motor_inertia"))
 
 
 def _within(drive: Drive, key: str, raw: int) -> int:
@@ -187,5 +217,6 @@ def loops_of(drive: Drive, facts: AxisFacts) -> DriveLoops:
         current_bandwidth_hz=facts.current_bandwidth_hz,
         delay_s=_LOOP_PERIOD_S,
         speed_filter_hz=facts.speed_filter_hz,
+        torque_filter_hz=facts.torque_filter_hz,
         highest_speed_bandwidth_hz=highest,
     )

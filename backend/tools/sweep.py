@@ -17,12 +17,13 @@ import numpy.typing as npt
 
 from backend.analysis import excitation as signals
 from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.excitation import scaled
 from backend.analysis.fit import Resonance
 from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
 from backend.analysis.identify import Identification, identify_mechanics
 from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
 from backend.analysis.mechanical_model import MechanicalModel
-from backend.analysis.sampling import SignalPath, fit_path, sampled_command
+from backend.analysis.sampling import STEP_LEAD_S, Hold, SignalPath, fit_path, sampled_command
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
@@ -57,6 +58,8 @@ _LOWEST_MODE_HZ = 15.0
 _WEAK_DB, _LEAST_DB, _LEAST_SHARE = 3.0, 1.0, 0.2
 #: Share of the distance of two lines that a mode's half width must have.
 _NARROWEST = 0.15
+#: A loop's reference that took too much torque is played again, this much smaller.
+_ATTEMPTS, _WEAKER = 4, 0.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +82,8 @@ class SweepSettings:
     rated_torque_nm: float | None = None
     inertia_kgm2: float | None = None
     notches_off: bool = True
+    hold: Hold | None = None
+    """How the drive holds set-points between cycles; None asks the drive, or the recording."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +108,10 @@ class SweepResult:
     motion_s: float
     saturated_share: float
     warnings: tuple[str, ...] = field(default_factory=tuple)
+    current_bandwidth_hz: float | None = None
+    speed_filter_hz: float | None = None
+    hold: Hold | None = None
+    """What the drive tells of its loops, or what the recording showed of them."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +162,7 @@ async def sweep(
         require_signals(axis, session, _MODE_OF[setup.loop], not closed and setup.loop != "none")
         progress(0.08, "designing the excitation")
         sequences = await asyncio.to_thread(_sequences, setup, settings)
-        records = await _play_all(axis, session, settings, setup, sequences, home, progress)
+        records = await _play_fitting(axis, session, settings, setup, sequences, home, progress)
     await go_back(axis, session, home, settings.envelope, facts)
     raw, meta = _raw(records, setup, settings, session)
     if keep is not None:
@@ -335,6 +344,27 @@ async def _play_all(
     return tuple(records)
 
 
+async def _play_fitting(
+    axis: Axis, session: CyclicSession, settings: SweepSettings, setup: _Setup,
+    sequences: tuple[excite.Sequence, ...], home_raw: int, progress: Progress,
+) -> tuple[tuple[excite.Sequence, Recording], ...]:  # fmt: skip
+    """As `_play_all`; a loop that answers its reference with too much torque gets a smaller one.
+
+    How much torque a reference takes depends on the loop's gains, which are what is measured.
+    """
+    attempts = 1 if settings.kind == "mechanics" else _ATTEMPTS
+    for attempt in range(attempts):
+        try:
+            return await _play_all(axis, session, settings, setup, sequences, home_raw, progress)
+        except NotAllowed as error:
+            if attempt == attempts - 1 or "torque" not in error.message:
+                raise
+        await quiet(axis)
+        await go_back(axis, session, home_raw, settings.envelope, setup.facts)
+        sequences = tuple(replace(s, excitation=scaled(s.excitation, _WEAKER)) for s in sequences)
+    raise AssertionError
+
+
 async def _to_raw(
     axis: Axis, sequence: excite.Sequence, setup: _Setup, settings: SweepSettings, start: int
 ) -> Play:
@@ -394,11 +424,12 @@ def evaluate(
     Raises:
         ValueError: nothing can be concluded from them.
     """
+    hold: Hold = settings.hold or ("linear" if facts.interpolates else "zero")
     path = SignalPath(
         sample_rate_hz=rate,
-        hold="linear" if facts.interpolates else "zero",
+        hold=hold,
         current_bandwidth_hz=facts.current_bandwidth_hz,
-        command_delay_s=1.0 / rate if dc else 0.0,
+        command_delay_s=max((1.0 / rate if dc else 0.0) - (hold == "linear") * STEP_LEAD_S, 0.0),
         response_bandwidth_hz=facts.speed_filter_hz,
     )
     if settings.kind != "mechanics":
@@ -431,6 +462,18 @@ def evaluate(
         motion_s=_motion_s(records),
         saturated_share=saturated,
         warnings=warnings,
+        current_bandwidth_hz=path.current_bandwidth_hz,
+        speed_filter_hz=found.fit.path.response_bandwidth_hz,
+        hold=path.hold,
+    )
+
+
+def completed(facts: AxisFacts, result: SweepResult) -> AxisFacts:
+    """Facts with what the mechanics' measurement found where the drive tells nothing."""
+    return replace(
+        facts,
+        current_bandwidth_hz=facts.current_bandwidth_hz or result.current_bandwidth_hz,
+        speed_filter_hz=facts.speed_filter_hz or result.speed_filter_hz,
     )
 
 
@@ -687,6 +730,8 @@ def as_json(result: SweepResult) -> dict[str, object]:
         "delay_s": result.delay_s,
         "motion_s": result.motion_s,
         "saturated_share": result.saturated_share,
+        "current_bandwidth_hz": result.current_bandwidth_hz,
+        "speed_filter_hz": result.speed_filter_hz,
         "coulomb_nm": frf.coulomb_nm,
         "noise": _numbers(frf.noise),
         "distortion": _numbers(frf.distortion),
