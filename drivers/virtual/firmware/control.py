@@ -8,8 +8,9 @@ from typing import Final
 
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.alarms import Alarms, FaultLog, Snapshot, snapshot_of
+from drivers.virtual.firmware.brake import HoldingBrake
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.families.base import BrakeTimes, FaultInfo
+from drivers.virtual.firmware.families.base import FaultInfo
 from drivers.virtual.firmware.identification import Identification
 from drivers.virtual.firmware.modes import CST, PP, PT, Modes
 from drivers.virtual.firmware.schedule import Timer
@@ -44,13 +45,13 @@ class DeviceControl:
         self.levels: Callable[[], tuple[int, int]] = lambda: (0, 0)
         """Levels of inputs and outputs, for the record of a fault."""
         self._stops = Stopping(core, self.modes)
+        self.brake = HoldingBrake(core)
         self._halted = False
         self._reported = 0
         self._since_s: dict[str, float] = {}
         self._after_stop: Callable[[], None] | None = None
         self._halt_done: Callable[[], None] | None = None
         self._retry_timer: Timer | None = None
-        self._brake_timer: Timer | None = None
         self._emergency = False
         self.modes.homing.guard_limits()
         self.modes.homing.on_failed = self._homing_failed
@@ -67,7 +68,7 @@ class DeviceControl:
         self._command(decode(word))
         if self.state is not State.OPERATION_ENABLED or self._after_stop is not None:
             return
-        if self._brake_timer is not None:
+        if self.brake.moving:
             return  # the brake is opening: commands are lost (000:1377)
         if word & _IDENTIFY and not before & _IDENTIFY:
             self._begin_identification()
@@ -83,7 +84,7 @@ class DeviceControl:
         if mode == self.modes.mode:
             return
         if self.state is State.OPERATION_ENABLED and self._after_stop is None:
-            if self._brake_timer is not None:
+            if self.brake.moving:
                 self.modes.mode = mode
                 return
             self._halted = False
@@ -126,7 +127,7 @@ class DeviceControl:
         self._after_stop = None
         self._halted = False
         self.modes.limited = False
-        if resumed or not self._open_brake():
+        if resumed or not self.brake.open(lambda: self.modes.start(self.modes.mode)):
             self.modes.start(self.modes.mode)
 
     def _leave_operation(self, new: State, command: Command) -> None:
@@ -140,7 +141,7 @@ class DeviceControl:
         option = 0 if key is None else self._option(key, 0)
         if option == 1:
             self._stop(1, lambda: self._disable(new))
-        elif stops.off is not None and self._brake_times() is None:
+        elif stops.off is not None and self.brake.times() is None:
             self._after_stop = lambda: self._disable(new)
             self._finish_now(self._stops.servo_off(stops.off))
         elif stops.waits:
@@ -177,8 +178,8 @@ class DeviceControl:
         self._after_stop = None
         self._halted = False
         self.modes.end()
-        self._cancel_brake()
-        if at_once or not self._close_brake():
+        self.brake.cancel()
+        if at_once or not self.brake.close(lambda: self.state is State.OPERATION_ENABLED):
             self._stops.after_rest(self._axis)
         self._core.od.activate("stopped")
         for told in self.on_disabled:
@@ -230,77 +231,6 @@ class DeviceControl:
         self._end_identification()
         self.modes.end()
         self._quick_stop(self._option("605A:00", 2) if option == -2 else option)
-
-    # --- brake -----------------------------------------------------------------------------
-    def _open_brake(self) -> bool:
-        """Hold the axis while the brake opens; False where there is no brake to wait for."""
-        times = self._brake_times()
-        if times is None:
-            self._axis.close_brake(False)
-            return False
-        self._axis.close_brake(True)
-        self._axis.hold()
-        schedule = self._core.schedule
-
-        def released() -> None:
-            self._axis.close_brake(False)
-            self._brake_timer = schedule.after(times.command_s, ready)
-
-        def ready() -> None:
-            self._brake_timer = None
-            self.modes.start(self.modes.mode)
-
-        self._brake_timer = schedule.after(times.release_s, released)
-        return True
-
-    def _close_brake(self) -> bool:
-        """Close the brake and keep the power for its time; False where there is none."""
-        times = self._brake_times()
-        if times is None or not self._axis.powered:
-            return False
-        schedule = self._core.schedule
-        standing = abs(self._axis.speed_rad_s) <= times.speed_rad_s
-        hold_s = times.hold_s if standing else times.hold_moving_s
-
-        def off() -> None:
-            self._brake_timer = None
-            if self.state is not State.OPERATION_ENABLED:
-                self._axis.power_off()
-
-        def close() -> None:
-            self._axis.close_brake(True)
-            self._brake_timer = schedule.after(hold_s, off)
-
-        if standing:
-            self._axis.hold()
-            close()
-        else:
-            self._axis.stop_ramp(self._core.deceleration(self._stops.quick_ramp_key))
-            self._await_slow(times.speed_rad_s, times.moving_s, close)
-        return True
-
-    def _await_slow(self, speed_rad_s: float, left_s: float, then: Callable[[], None]) -> None:
-        def look() -> None:
-            if left_s <= 1e-3 or abs(self._axis.speed_rad_s) <= speed_rad_s:
-                then()
-            else:
-                self._await_slow(speed_rad_s, left_s - 1e-3, then)
-
-        self._brake_timer = self._core.schedule.after(1e-3, look)
-
-    def _brake_times(self) -> BrakeTimes | None:
-        """None without a brake on the motor, whatever the parameters say."""
-        return self._core.family.brake(self._core.od) if self._axis.spec.motor.brake else None
-
-    def _cancel_brake(self) -> None:
-        if self._brake_timer is not None:
-            self._brake_timer.cancel()
-            self._brake_timer = None
-
-    @property
-    def brake_released(self) -> bool:
-        """Whether the brake output is on (released)."""
-        return self._axis.powered and self._axis.p[k.P_BRAKE_CLOSED] == 0.0
 
     # --- events ----------------------------------------------------------------------------
     def on_events(self, events: int) -> None:
@@ -402,7 +332,7 @@ class DeviceControl:
         self.identification.stop()
         moving = self._axis.powered
         self.modes.end()
-        self._cancel_brake()
+        self.brake.cancel()
         self.state = State.FAULT_REACTION
         self._after_stop = self._fault_reaction_done
         self._finish_now(moving and self._stops.react(new, self._option("605E:00", 0)))

@@ -26,11 +26,6 @@ class Stopping:
         self._traits = core.family.traits.stops
         self._then = "free"
 
-    @property
-    def quick_ramp_key(self) -> str:
-        """Parameter of the quick stop's ramp; a family without 6085h brakes by another."""
-        return self._traits.quick_ramp_key
-
     def begin(self, option: int) -> bool:
         """Options 0 to 4 of 605Ah–605Eh (004:2451-2551, 001:880-935)."""
         axis, core, traits = self._axis, self._core, self._traits

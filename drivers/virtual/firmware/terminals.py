@@ -96,7 +96,7 @@ class Terminals:
             "zero_speed": lambda: bool(s[k.S_ZERO_T] > 0),
             "in_position": lambda: bool(s[k.S_POSITION_T] > 0),
             "homed": lambda: control.homed,
-            "brake": lambda: control.brake_released,
+            "brake": lambda: control.brake.released,
             "target": lambda: bool(control.status_word() & 1 << 10),
             "on": lambda: True,
         }

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 
 from drivers.virtual.firmware import kernel as k
@@ -18,12 +18,12 @@ from drivers.virtual.firmware.families import power
 from drivers.virtual.firmware.families.base import (
     RPM,
     BrakeTimes,
-    FaultInfo,
     GainKeys,
     Traits,
     Units,
     Wiring,
 )
+from drivers.virtual.firmware.families.reports import faults_of
 from drivers.virtual.firmware.families.terminals import TABLES, TerminalTable
 from drivers.virtual.firmware.settings import (
     Biquad,
@@ -42,28 +42,6 @@ TWO_PI = 2 * math.pi
 _MS = 1e-3
 _UNIT_GAIN = 100
 """Start value of a gain for which the manual prints neither unit nor default."""
-
-#: Names of faults as manuals print them, per protection, and the standard's code (CiA 402-2).
-_FAULT_WORDS: tuple[tuple[int, str, int], ...] = (
-    (k.F_OVER_CURRENT, r"over.?current", 0x2310),
-    (k.F_UNDER_VOLTAGE, r"under.?voltage", 0x3220),
-    (k.F_OVER_VOLTAGE, r"over.?voltage", 0x3210),
-    (k.F_OVER_TEMPERATURE, r"over.?(heat|temperature)|temperature.*(high|too)", 0x4310),
-    (k.F_LOCKED, r"lock(ed)?.?(rotor)?|rotor.?lock|stall", 0x7121),
-    (k.F_OVERLOAD, r"over.?load", 0x3230),
-    (k.F_SENSOR, r"encoder.*(disconnect|error|fault|communication|signal)|encoder", 0x7305),
-    (k.F_MEMORY, r"eeprom|memory|parameter.*(stor|read|writ)", 0x5530),
-    (k.F_OVER_SPEED, r"over.?speed", 0x8400),
-    (k.F_SPEED_ERROR, r"speed.*(deviation|error)", 0x8401),
-    (k.F_FOLLOWING, r"position.*(deviation|out.?of.?toler|error)|following", 0x8611),
-    (
-        k.F_WATCHDOG,
-        r"(bus|ethercat|can|communication).*(disconnect|lost|time.?out|abnormal)",
-        0x8130,
-    ),
-    (k.F_POSITION_LIMIT, r"(limit|over.?travel)", 0x8612),
-    (k.F_POWER_STAGE, r"(ipm|power.?(stage|module))", 0x5400),
-)
 
 
 class Cia402:
@@ -482,39 +460,6 @@ class Cia402:
     def wiring(self, od: ObjectDictionary) -> Wiring:
         """By the functions of the terminals; a family without a table sees all switches."""
         return Wiring() if self.terminals is None else self.terminals.wiring(od)
-
-
-def faults_of(profile: Profile, protections: Mapping[int, str]) -> dict[int, FaultInfo]:
-    """How the protections report: the named entries of the table.
-
-    A family that names none (a profile made from a file) is searched by the printed words. Where
-    the table has no code of 603Fh (R6L), the standard's is shown.
-    """
-    found: dict[int, FaultInfo] = {}
-    for bit, words, standard in _FAULT_WORDS:
-        named = protections.get(bit)
-        if protections and named is None:
-            continue
-        match = next(
-            (
-                fault
-                for fault in profile.faults
-                if fault.kind == "fault"
-                and (
-                    fault.code == named
-                    if named is not None
-                    else fault.code_raw is not None and re.search(words, fault.name, re.IGNORECASE)
-                )
-            ),
-            None,
-        )
-        code = standard if match is None or match.code_raw is None else match.code_raw
-        found[bit] = FaultInfo(
-            code,
-            fixed=bit in (k.F_OVER_CURRENT, k.F_SENSOR, k.F_POWER_STAGE),
-            fault="" if match is None else match.code,
-        )
-    return found
 
 
 def _per_rad_s(unit: str, position_per_rad: float) -> float:

@@ -1,0 +1,102 @@
+"""The holding brake of a motor that has one, in the order of its family (000:1360, 002:8117).
+
+Enabling: power on, the brake opens, then commands are taken. Disabling at rest: the brake closes
+and the power stays on for its time; in motion the axis stops first. A fault closes it at once,
+with the power stage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.families.base import BrakeTimes
+from drivers.virtual.firmware.schedule import Timer
+
+_LOOK_S = 1e-3
+
+
+class HoldingBrake:
+    """See the module docstring."""
+
+    def __init__(self, core: Core) -> None:
+        self._core = core
+        self._axis = core.axis
+        self._timer: Timer | None = None
+
+    def times(self) -> BrakeTimes | None:
+        """None without a brake on the motor, whatever the parameters say."""
+        return self._core.family.brake(self._core.od) if self._axis.spec.motor.brake else None
+
+    @property
+    def moving(self) -> bool:
+        """Opening or closing."""
+        return self._timer is not None
+
+    @property
+    def released(self) -> bool:
+        """Whether the brake output is on."""
+        return self._axis.powered and self._axis.p[k.P_BRAKE_CLOSED] == 0.0
+
+    def cancel(self) -> None:
+        """Something else happens to the axis."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def open(self, ready: Callable[[], None]) -> bool:
+        """Hold the axis while it opens; False where there is none to wait for."""
+        times = self.times()
+        if times is None:
+            self._axis.close_brake(False)
+            return False
+        self._axis.close_brake(True)
+        self._axis.hold()
+        command_s = times.command_s
+
+        def released() -> None:
+            self._axis.close_brake(False)
+            self._timer = self._core.schedule.after(command_s, over)
+
+        def over() -> None:
+            self._timer = None
+            ready()
+
+        self._timer = self._core.schedule.after(times.release_s, released)
+        return True
+
+    def close(self, enabled_again: Callable[[], bool]) -> bool:
+        """Close it and keep the power for its time; False where there is none."""
+        times = self.times()
+        if times is None or not self._axis.powered:
+            return False
+        standing = abs(self._axis.speed_rad_s) <= times.speed_rad_s
+        hold_s = times.hold_s if standing else times.hold_moving_s
+
+        def off() -> None:
+            self._timer = None
+            if not enabled_again():
+                self._axis.power_off()
+
+        def shut() -> None:
+            self._axis.close_brake(True)
+            self._timer = self._core.schedule.after(hold_s, off)
+
+        if standing:
+            self._axis.hold()
+            shut()
+        else:
+            key = self._core.family.traits.stops.quick_ramp_key
+            self._axis.stop_ramp(self._core.deceleration(key))
+            self._await_slow(times.speed_rad_s, times.moving_s, shut)
+        return True
+
+    def _await_slow(self, speed_rad_s: float, left_s: float, then: Callable[[], None]) -> None:
+        def look() -> None:
+            if left_s <= _LOOK_S or abs(self._axis.speed_rad_s) <= speed_rad_s:
+                then()
+            else:
+                self._await_slow(speed_rad_s, left_s - _LOOK_S, then)
+
+        self._timer = self._core.schedule.after(_LOOK_S, look)
