@@ -234,8 +234,8 @@ def soak(http: httpx.Client, server: int, url: str, folder: Path) -> None:
     busy = cycle_figures(http)
     samples, left_out, missing = disk_figures(folder / "state/recordings/soak.sdrec")
     rate = samples / AXES / took
-    print(f"{took:.0f} s, {AXES} axes, {len(channels)} channels at {1e6 / CYCLE_US:.0f} Hz "
-          f"({rate:.0f} cycles a second came); browser 2 stopped for {SECONDS / 3:.0f} s")  # fmt: skip
+    print(f"{took:.0f} s, {AXES} axes, {len(channels)} channels at {1e6 / CYCLE_US:.0f} Hz, "
+          f"{rate:.0f} cycles a second came; browser 2 slept {SECONDS / 3:.0f} s")  # fmt: skip
     print(f"disk: {samples} rows, {info['bytes'] / 1e6:.0f} MB, {left_out} left out by the bus, "
           f"{missing} unaccounted for; state {info['state']}")  # fmt: skip
     print(f"views: browser 1 lost {views[0]} rows, browser 2 {views[1]} "
