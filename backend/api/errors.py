@@ -122,12 +122,24 @@ def answer(problem: Problem) -> JSONResponse:
     )
 
 
+def answer_error(error: DriveError) -> JSONResponse:
+    """A refusal as an HTTP answer, with the headers that belong to it (RFC 9110)."""
+    response = answer(problem_of(error))
+    if isinstance(error, TooOften):
+        response.headers["Retry-After"] = str(max(1, round(error.wait_s)))
+    if isinstance(error, NotLoggedIn):
+        response.headers["WWW-Authenticate"] = "Bearer"
+    if isinstance(error, WrongMethod):
+        response.headers["Allow"] = ", ".join(error.methods)
+    return response
+
+
 def install(app: FastAPI) -> None:
     """Attach the handlers."""
 
     @app.exception_handler(DriveError)
     async def drive_error(_request: Request, error: DriveError) -> JSONResponse:
-        return answer(problem_of(error))
+        return answer_error(error)
 
     @app.exception_handler(RequestValidationError)
     async def bad_request(_request: Request, error: RequestValidationError) -> JSONResponse:

@@ -15,7 +15,7 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from backend.access import Leases
-from backend.api.errors import NotFound, WrongMethod, answer, problem_of
+from backend.api.errors import NotFound, WrongMethod, answer, answer_error, problem_of
 from backend.api.models import Problem
 from backend.api.rights import Matched, Policy
 from backend.api.security_body import BodyRefused, MeasuredBody
@@ -139,14 +139,16 @@ class Gate:
             body.require_accepted()
             await self._run(scope, body, dressed, actor)
         except BodyRefused as refusal:
-            await self._refuse(_refusal(refusal.status), scope, receive, dressed)
+            response = answer(_refusal(refusal.status))
+            response.headers["Connection"] = "close"
+            await response(scope, receive, dressed)
         except DriveError as error:
-            await self._refuse(problem_of(error), scope, receive, dressed, error)
+            await answer_error(error)(scope, receive, dressed)
         except Exception as error:
             log.exception("unhandled error at %s %s", scope["method"], scope["path"])
             if begun:
                 raise
-            await self._refuse(problem_of(error), scope, receive, dressed)
+            await answer(problem_of(error))(scope, receive, dressed)
 
     async def _run(self, scope: Scope, body: MeasuredBody, send: Send, actor: Actor | None) -> None:
         async def unless_refused(message: Message) -> None:
@@ -244,25 +246,6 @@ class Gate:
         if named is None or identity is None:
             return None
         return named if self._sockets.owner(named) == identity.session else None
-
-    async def _refuse(
-        self,
-        problem: Problem,
-        scope: Scope,
-        receive: Receive,
-        send: Send,
-        error: DriveError | None = None,
-    ) -> None:
-        response = answer(problem)
-        if isinstance(error, TooOften):
-            response.headers["Retry-After"] = str(max(1, round(error.wait_s)))
-        if isinstance(error, NotLoggedIn):
-            response.headers["WWW-Authenticate"] = "Bearer"
-        if isinstance(error, WrongMethod):
-            response.headers["Allow"] = ", ".join(error.methods)
-        if problem.status in (408, 413):
-            response.headers["Connection"] = "close"
-        await response(scope, receive, send)
 
     def _dress(self, scope: Scope, message: Message) -> None:
         headers = MutableHeaders(scope=message)

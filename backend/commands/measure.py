@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from enum import StrEnum
@@ -212,7 +213,9 @@ async def _through_server(
     """Run the job on a server and wait for it; its own bus exchange is started where needed."""
     base = server.rstrip("/") + "/api/v1"
     try:
-        async with httpx.AsyncClient(base_url=base, timeout=30.0) as http:
+        token = os.environ.get("SERVODECK_TOKEN")
+        headers = {"Authorization": f"Bearer {token}"} if token else {}
+        async with httpx.AsyncClient(base_url=base, timeout=30.0, headers=headers) as http:
             drives = (await _ok(await http.get("/drives"))).json()
             drive = next((d for d in drives if name in (d["name"], d["id"])), None)
             if drive is None:

@@ -43,6 +43,10 @@ class People:
         """Read the accounts, where there are any to be asked for."""
         if self.accounts_needed:
             await self.accounts.open()
+            file = self._store.sqlite_file
+            if file is not None:
+                # Hashes of passwords are nobody else's business; its side files follow its mode.
+                file.chmod(0o600)
 
     def close(self) -> None:
         """Let go of the database."""

@@ -317,7 +317,7 @@ def test_log_out_is_at_once_and_for_good(server: GuardedServer) -> None:
     assert closed == 4401
     for method, path in (("GET", "/drives"), ("POST", "/stop")):
         again = httpx.request(method, f"{server.url}/api/v1{path}",
-                              headers={"Cookie": f"servodeck={cookie}"})  # fmt: skip
+                              headers={"Cookie": f"servodeck={cookie}"}, timeout=30)  # fmt: skip
         assert again.status_code == 401
 
 
@@ -337,7 +337,9 @@ def _closed(page: Page) -> int:
 def test_a_role_taken_away_is_gone_with_the_next_request(server: GuardedServer) -> None:
     accounts = server.people.accounts
     made = server.run(accounts.add("Rolf", PASSWORD, Role.OPERATOR))
-    answer = httpx.post(f"{server.url}/api/v1/session", json={"name": "rolf", "password": PASSWORD})
+    answer = httpx.post(
+        f"{server.url}/api/v1/session", json={"name": "rolf", "password": PASSWORD}, timeout=30
+    )
     caller = Caller(server, cookie=answer.cookies["servodeck"])
     assert caller.ask("PUT", "/bundles/armed", json={}).status_code == 422
     with caller.live() as page:

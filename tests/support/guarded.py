@@ -37,7 +37,7 @@ class Caller:
         headers = {"Authorization": f"Bearer {token}"} if token else {}
         self.server = server
         self.http = httpx.Client(
-            base_url=f"{server.url}/api/v1", timeout=20, headers=headers,
+            base_url=f"{server.url}/api/v1", timeout=30, headers=headers,
             cookies={"servodeck": cookie} if cookie else None,
         )  # fmt: skip
         server.callers.append(self)
@@ -154,7 +154,9 @@ class GuardedServer:
 
     def log_in(self, role: Role) -> Caller:
         made = httpx.post(
-            f"{self.url}/api/v1/session", json={"name": NAMES[role], "password": PASSWORD}
+            f"{self.url}/api/v1/session",
+            json={"name": NAMES[role], "password": PASSWORD},
+            timeout=30,
         )
         assert made.is_success, made.text
         return Caller(self, cookie=made.cookies["servodeck"])
@@ -172,6 +174,6 @@ class GuardedServer:
                        {"guest": "Gert", "allowed": allowed, "minutes": minutes})  # fmt: skip
         link = made["link"].removeprefix("/guest/")
         joined = httpx.post(f"{self.url}/api/v1/guests",
-                            json={"link": link, "code": made["invitation"]["code"]})  # fmt: skip
+                            json={"link": link, "code": made["invitation"]["code"]}, timeout=30)  # fmt: skip
         assert joined.is_success, joined.text
         return Caller(self, cookie=joined.cookies["servodeck"]), made["invitation"]["id"]
