@@ -33,7 +33,7 @@ from tests.support.station import until
 
 ROOT = Path(__file__).resolve().parents[2]
 SEED = 20261121
-LIVES = 8
+LIVES = 6
 
 
 class Nursery:
@@ -60,12 +60,17 @@ class Nursery:
             os.kill(child, signal.SIGKILL)
         assert self._line() == "dead"
 
+    def cut(self, seed: int, act: str, step: int) -> bool:
+        """One deed that ends itself before this step; True when it came to its end instead."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{seed} {act} {step}\n")
+        self._process.stdin.flush()
+        self._line()
+        assert self._line() == "dead"
+        return any(deed["act"] == "end" for deed in self.told()[-3:])
+
     def told(self) -> list[dict[str, Any]]:
-        try:
-            lines = (self.folder / "told").read_bytes().split(b"\n")
-        except FileNotFoundError:
-            return []
-        return [json.loads(line) for line in lines[:-1]]
+        return json_lines(self.folder / "told")
 
     def _line(self) -> str:
         assert self._process.stdout is not None
@@ -77,6 +82,14 @@ class Nursery:
         self._process.stdin.close()
         self._process.wait(10)
         self._process.stdout.close()
+
+
+def json_lines(path: Path) -> list[dict[str, Any]]:
+    try:
+        lines = path.read_bytes().split(b"\n")
+    except FileNotFoundError:
+        return []
+    return [json.loads(line) for line in lines[:-1]]
 
 
 @contextmanager
@@ -142,6 +155,31 @@ def test_killed_at_any_moment(database: str, tmp_path: Path) -> None:
             check(tmp_path, database, lives.told())
         acts = Counter(deed["act"] for deed in lives.told())
     assert set(acts) == {"save", "event", "file", "change"}, "every kind of writing was hit"
+
+
+@pytest.mark.parametrize(
+    ("act", "database"),
+    [
+        *((act, "sqlite") for act in ("save_large", "event", "drop_file", "change")),
+        # The files are the same there, and the other statements are of the same kind.
+        *((act, "postgresql") for act in ("save_large", "event")),
+    ],
+    indirect=["database"],
+)
+def test_cut_off_at_every_step_to_the_disk(act: str, database: str, tmp_path: Path) -> None:
+    with nursery(tmp_path, database) as lives:
+        assert lives.cut(1, "save", 10_000), "something is there already"
+        for step in range(1, 60):
+            (tmp_path / "told").rename(tmp_path / f"told-{step}")
+            ended = lives.cut(step + 1, act, step)
+            deeds = [*json_lines(tmp_path / f"told-{step}"), *lives.told()]
+            (tmp_path / "told").write_text("".join(json.dumps(d) + "\n" for d in deeds
+                                                   if d["act"] != "end"))  # fmt: skip
+            check(tmp_path, database, lives.told())
+            if ended:
+                break
+        assert ended
+    assert step > 3, "there are steps at which it can be cut off"
 
 
 def test_two_stations_killed_in_turn_leave_one_chain(postgres: Postgres, tmp_path: Path) -> None:

@@ -2,19 +2,29 @@
 
     python -m tests.support.crash_child FOLDER DATABASE
 
-For each seed on its standard input it forks a child, says ``pid NUMBER``, and ``dead`` when that
-has ended. What the child was told to be stored it writes down in ``FOLDER/told`` at once.
+For each line on its standard input it forks a child, says ``pid NUMBER``, and ``dead`` when that
+has ended. What the child was told to be stored it writes down in ``FOLDER/told`` at once. A line
+is a seed, for a life until somebody kills it; or a seed, an act and a number: the child does this
+one thing and kills itself at that step on the way to the disk (statement, commit, flush, rename).
 """
 
 from __future__ import annotations
 
 import asyncio
+import functools
 import hashlib
 import json
 import os
 import random
+import signal
 import sys
+import threading
+import traceback
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Engine, event
 
 from backend.audit import Fact
 from backend.files import write_atomically
@@ -51,6 +61,17 @@ class Life:
     def tell(self, **fact: object) -> None:
         # One write call into the page cache: it outlives the process, whole or not at all.
         self.told.write(json.dumps(fact).encode() + b"\n")
+
+    def once(self, act: str, step: int) -> None:
+        """One thing, cut off before the given step."""
+        # What is not the thing itself, such as opening the database, happens before.
+        self.records.store.open()
+        cut_off_at(step)
+        acts = {"save": self.save, "save_large": self.save_large, "event": self.event,
+                "drop_file": self.drop_file, "change": self.change}  # fmt: skip
+        acts[act]()
+        self.records.audit.close()
+        self.tell(act="end")
 
     def run(self) -> None:
         self.records.audit.start()
@@ -101,13 +122,45 @@ class Life:
             self.tell(act="change", entry=entry.id, notes=self.token)
 
 
+def cut_off_at(step: int) -> None:
+    """End this process as by kill -9 just before its n-th step on the way to the disk."""
+    lock, count = threading.Lock(), 0
+
+    def here(*_: object, **__: object) -> None:
+        nonlocal count
+        with lock:
+            count += 1
+            if count == step:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    def before(function: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(function)
+        def stepped(*arguments: Any, **named: Any) -> Any:
+            here()
+            return function(*arguments, **named)
+
+        return stepped
+
+    for name in ("fsync", "replace", "rename", "unlink"):
+        setattr(os, name, before(getattr(os, name)))
+    event.listen(Engine, "before_cursor_execute", here)
+    event.listen(Engine, "commit", here)
+
+
 def main() -> None:
     folder, database = Path(sys.argv[1]), sys.argv[2]
     for line in sys.stdin:
         child = os.fork()
         if child == 0:
             try:
-                Life(folder, database, int(line)).run()
+                seed, *once = line.split()
+                life = Life(folder, database, int(seed))
+                if once:
+                    life.once(once[0], int(once[1]))
+                else:
+                    life.run()
+            except BaseException:
+                traceback.print_exc()
             finally:
                 os._exit(1)
         print(f"pid {child}", flush=True)
