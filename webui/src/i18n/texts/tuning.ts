@@ -404,6 +404,8 @@ export const tuning = {
     'No gains meet the goals for this load. Look at the mechanics first: coupling, belt, play.',
     '没有满足目标的增益。请先检查机械：联轴器、皮带、间隙。',
   ],
+  'candidate.all': ['Show all {count} designs', '显示全部 {count} 个方案'],
+  'candidate.marked': ['Show the marked designs only', '仅显示推荐方案'],
   'candidate.mark': ['Choice', '选择'],
   'candidate.apply': ['Apply', '应用'],
   'candidate.settling': ['Settling', '调整时间'],
