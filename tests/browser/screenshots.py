@@ -17,6 +17,7 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
+from tests.browser import screenshots_tuning
 from tests.browser.conftest import FLAGS, LAPTOP, PHONE, ROOT
 from tests.browser.driving import find, open_axis
 from tests.support.station import Station, until
@@ -140,6 +141,7 @@ def main() -> None:
             station.drives.command(do="inject", axis="Feed screw", what="over_current")
             until(lambda: station.state(drive)["state"] == "Fault", what="the fault is there")
             _shoot(browser, station, drive, folder, faulty=True)
+            screenshots_tuning.shoot(browser, folder, Path(place) / "tuning", COLOURS)
         finally:
             browser.close()
             station.stop()
