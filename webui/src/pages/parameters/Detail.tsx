@@ -9,6 +9,7 @@ import { Icon } from '../../widgets/Icon'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { type BitField, bitFields, getField, parseTyped, setField } from '../../widgets/parse'
 import { useAction } from '../../widgets/useAction'
+import { setRecord, useRecord } from '../../widgets/useFunctions'
 import { setEdit, useEdits, writeEdits } from './edits'
 import { editable } from './Grid'
 import { editText, pendingKey, range, readingText } from './GridRow'
@@ -94,8 +95,40 @@ export function Detail({
         )}
       </div>
       <ProblemNote problem={problems.get(row.key) ?? act.problem} />
+      <OnWatchList drive={drive} row={row} />
       <Facts row={row} />
     </aside>
+  )
+}
+
+/** Puts a parameter on the watch list of the Overview page. */
+function OnWatchList({ drive, row }: { drive: string; row: ParameterRow }) {
+  const t = useT()
+  const record = useRecord(drive)
+  const act = useAction()
+  if (!record || row.access === 'wo' || !row.reachable) return null
+  if (record.watch.includes(row.key)) {
+    return <p className="dim">{t('watch.onList')}</p>
+  }
+  const put = () =>
+    act.run(async () =>
+      setRecord(
+        drive,
+        await ask(
+          api.PUT('/api/v1/drives/{drive_id}/watch', {
+            params: { path: { drive_id: drive } },
+            body: { keys: [...record.watch, row.key] },
+          }),
+        ),
+      ),
+    )
+  return (
+    <>
+      <Button loading={act.busy} onClick={() => void put()}>
+        {t('watch.put')}
+      </Button>
+      <ProblemNote problem={act.problem} onClose={act.clear} />
+    </>
   )
 }
 
