@@ -222,9 +222,17 @@ class AxisLoop:
             self._control()
 
     def blind(self) -> None:
-        """A cycle without trusted inputs: setpoints go on, nothing is concluded from inputs."""
+        """A cycle without trusted inputs: setpoints go on, nothing is concluded from inputs.
+
+        Once it has braked, the axis is told to quick-stop whether or not it is heard: nobody knows
+        whether it stands, and disabled by other words it would coast.
+        """
         if self.phase is not Phase.IDLE:
             self._advance()
+        elif self.goal not in (None, State.OPERATION_ENABLED) and _CONTROL in self._out:
+            word = self.outputs[self._out[_CONTROL]]
+            if word & cia402.ENABLE_OPERATION == cia402.ENABLE_OPERATION:
+                self.outputs[self._out[_CONTROL]] = cia402.QUICK_STOP
 
     def _fell_out(self) -> None:
         if self.goal is State.OPERATION_ENABLED:

@@ -138,8 +138,14 @@ class Segment:
         for name in (self.a, self.b):
             self.station.ok(self.station.http.delete(f"/drives/{name}"))
 
+    def parameter(self, drive: str) -> Any:
+        """One parameter, asked of the drive now."""
+        return self.station.http.get(f"/drives/{drive}/parameters/2005:03").json()
+
     def peace(self) -> None:
         self.trouble("peace")
+        self.trouble("timing", al_s=0.0, sdo_s=0.0)
+        self.trouble("eeprom_busy", slave=B, for_s=0.0)
         self.trouble("heal")
         self.trouble("mute", slave=B, on=False)
         self.trouble("power_on", slave=B)
@@ -285,6 +291,60 @@ def test_single_lost_frames_are_counted_and_many_brake(running: Segment) -> None
     running.jogs()
     until(lambda: running.view()["exchange"]["lost_frames"] > lost, 10, "counted")
     assert all(s["state"] == "OP" for s in running.view()["stations"])
+
+
+def test_wrong_working_counters_are_counted_and_brake_when_they_stay(running: Segment) -> None:
+    before = running.lines()
+    with running.station.live() as page:
+        turning(page, running)
+        running.trouble("counter", by=-1)
+        with page.holding(running.b):
+            page.wait("jog_ended", drive=running.b, timeout_s=30)
+    running.told("no valid process data", "the axis is braked", after=before)
+    until(lambda: running.view()["exchange"]["wkc_errors"] >= 30, 10)
+    running.responsive()
+    running.stands()
+    running.trouble("peace")
+    running.settled()
+    running.jogs()
+
+
+def test_late_frames_are_waited_for_and_the_axis_goes_on(running: Segment) -> None:
+    """Time follows the frames here: late ones are late for the server, not for the drive."""
+    running.trouble("late", by_s=0.02, chance=0.05, cyclic=True)
+    running.responsive()
+    running.jogs()
+    assert [s["state"] for s in running.view()["stations"]] == ["OP", "OP"]
+
+
+def test_slow_answers_and_slow_states_take_their_time_and_no_more(running: Segment) -> None:
+    # In the drive's time, which a busy machine stretches: the mailbox's own time-out is 1 s.
+    running.trouble("timing", slave=B, sdo_s=0.05, al_s=0.1)
+    until(lambda: running.parameter(running.b).get("raw") is not None, 20, "it is read")
+    running.responsive()
+    running.trouble("timing", slave=B, sdo_s=0.0)
+    running.end_cyclic()
+    running.start_cyclic()
+    assert [s["state"] for s in running.view()["stations"]] == ["OP", "OP"]
+    running.trouble("timing", al_s=0.0, sdo_s=0.0)
+    running.settled()
+    running.jogs()
+
+
+def test_a_busy_eeprom_ends_in_words_and_is_written_later(running: Segment) -> None:
+    running.end_cyclic()
+    body = {"url": URL, "station": 2, "alias": 0, "confirmed": True}
+    running.trouble("eeprom_busy", slave=B)
+    began = time.monotonic()
+    refused = running.station.http.post("/ethercat/alias", json=body)
+    assert time.monotonic() - began < 6
+    assert refused.status_code == 504
+    assert "EEPROM stays busy" in refused.json()["detail"]
+    running.responsive()
+    running.trouble("eeprom_busy", slave=B, for_s=0.0)
+    running.station.ok(running.station.http.post("/ethercat/alias", json=body))
+    running.start_cyclic()
+    running.jogs()
 
 
 def test_damaged_frames_name_their_cable_until_cleared(running: Segment) -> None:

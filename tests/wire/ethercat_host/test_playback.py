@@ -278,6 +278,29 @@ def test_cycles_without_trusted_inputs_go_on_but_conclude_nothing() -> None:
     assert bench.axis.state is State.OPERATION_ENABLED
 
 
+def test_an_axis_that_braked_without_trusted_inputs_is_told_to_quick_stop() -> None:
+    """CiA 402-2 table 29: quick stop is 0002h. It was left enabled for as long as nobody heard."""
+    bench = Bench().enabled()
+    bench.play(list(range(500, 5000, 10)))
+    bench.step(10)
+    bench.axis.stop("no valid process data")
+    for _ in range(round(STOP_S / CYCLE_S)):
+        bench.axis.blind()
+    assert bench.axis.phase is Phase.IDLE
+    bench.axis.blind()
+    assert bench.axis.outputs[0] == 0x0002
+    bench.status = DISABLED
+    bench.obey()
+    assert bench.axis.state is State.READY, "trusted again, it goes where it was going"
+
+
+def test_an_enabled_axis_at_rest_stays_enabled_without_trusted_inputs() -> None:
+    bench = Bench().enabled()
+    for _ in range(10):
+        bench.axis.blind()
+    assert bench.axis.outputs[0] == 0x000F
+
+
 def test_disabling_a_moving_axis_brakes_first() -> None:
     bench = Bench().enabled()
     bench.play(list(range(500, 5000, 10)))
