@@ -223,7 +223,13 @@ def test_a_page_that_never_reads_is_cut_off(
     assert not [r for r in caplog.records if r.levelname == "ERROR"], "an ordinary end"
 
 
-def test_a_half_open_connection_ends_and_with_it_the_polling(station: Station, serial: str) -> None:
+def test_a_half_open_connection_ends_and_with_it_the_polling(
+    station: Station, serial: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert station._server is not None
+    for name in ("ws_ping_interval", "ws_ping_timeout"):
+        monkeypatch.setattr(station._server.config, name, 1.0)  # 20 s each otherwise
+
     def transactions() -> int:
         return int(station.ok(station.http.get(f"/drives/{serial}"))["quality"]["transactions"])
 

@@ -113,8 +113,10 @@ def add_channel(page: Page, words: str) -> None:
 
 
 def peaks(page: Page) -> list[tuple[float, float]]:
-    rows = page.get_by_role("table", name="Highest peaks").locator("tbody tr").all()
-    return [(number(r.locator("td").nth(0)), number(r.locator("td").nth(1))) for r in rows]
+    """Frequency and amplitude, all of one picture: the table changes while the signal runs."""
+    rows = page.get_by_role("table", name="Highest peaks").locator("tbody tr").all_inner_texts()
+    found = [[float(cell.replace("−", "-")) for cell in row.split()] for row in rows]
+    return [(hertz, amplitude) for hertz, amplitude in found]
 
 
 def test_a_step_is_caught_and_the_cursors_read_it(
