@@ -26,8 +26,8 @@ from backend.analysis.sampled_model import LoopModel, SampledFit
 from backend.analysis.sampling import SignalPath, delay_response, lag_response
 
 #: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
-SYSTEMATIC_DB = 0.03
-SYSTEMATIC_DEG = 0.15
+SYSTEMATIC_DB = 0.05
+SYSTEMATIC_DEG = 0.35
 
 #: A model whose median relative misfit is larger, and larger than the noise, corrects nothing.
 TRUSTED_ERROR = 0.03

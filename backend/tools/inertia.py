@@ -250,7 +250,16 @@ async def _first_look(
     speed = forward * hump * travel / (n / rate) * 60.0
     speed *= min(1.0, 0.5 * envelope.speed_rpm / float(np.max(np.abs(speed))))
     whole = np.concatenate([speed, -speed, np.zeros(round(0.1 * rate))])
-    recording = await _csv(axis, session, whole, envelope, facts, lambda _fraction: None)
+    try:
+        recording = await _csv(axis, session, whole, envelope, facts, lambda _fraction: None)
+    except NotAllowed as error:
+        if "torque" not in error.message:
+            raise
+        raise NotAllowed(
+            f"{axis.drive.name}: a short move takes more torque than is permitted: {error.message}",
+            drive=axis.drive.name,
+            remedy="look for a closed brake, a blocked axis or gains that are far too high",
+        ) from error
     moved = float(np.ptp(recording.position_rad)) / _TURN
     if moved < 0.2 * travel:
         peak = float(np.max(np.abs(recording.torque_nm))) / facts.rated_torque_nm

@@ -1,0 +1,136 @@
+"""Measurements and tuning on virtual drives of several families, without a wire.
+
+The same tools as over EtherCAT frames (see `test_accuracy`), on more mechanics than frames leave
+time for; limits are those of `tuning.md`, truth is the analytic response of the chain.
+"""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from backend.axis import Envelope
+from backend.jobs import Progress
+from backend.tools.autotune import AutotuneSettings, autotune
+from backend.tools.inertia import InertiaSettings, inertia
+from backend.tools.sweep import SweepSettings, sweep
+from backend.tools.temporary import put_back
+from drivers.cia402 import State
+from drivers.errors import DriveError, NotAllowed
+from drivers.virtual.mechanics import MechanicsSpec
+from tests.virtual.tools.direct import DirectBench, direct
+from tests.virtual.tools.rig import WIDE, errors, mechanics, silent
+
+ONE = mechanics((1e-4, 60.0, 0.006))
+SOFT = mechanics((5e-4, 12.0, 0.03), viscous=5e-4, coulomb=0.05)
+# Its antiresonance lies in the band of 1 kHz sampling, its resonance at three times that rate.
+FAR = mechanics((1e-3, 6e3, 0.06), coulomb=0.04)
+THREE = mechanics((1e-4, 20.0, 0.002), (5e-5, 100.0, 0.005), (3e-5, 150.0, 0.004))
+HEAVY = mechanics((3e-3, 300.0, 0.05), viscous=1e-3, coulomb=0.06)
+
+
+@pytest.mark.parametrize(
+    ("drive", "spec", "khz"),
+    [("mms7", FAR, 1.0), ("mms7", THREE, 4.0), ("m6l", ONE, 1.0), ("r6l", ONE, 1.0)],
+)
+async def test_mechanics_of_every_family(drive: str, spec: MechanicsSpec, khz: float) -> None:
+    async with direct(spec, 1e-3 / khz, drive=drive) as b:
+        found = await sweep(b.axis, b.session, SweepSettings(WIDE), silent())
+    assert found.trusted
+    assert found.motion_s <= 10.0
+    near = errors(found.direct, spec, 5, 250 * khz)
+    assert near.magnitude_db < 0.3
+    assert near.phase_deg < (2.0 if khz == 1 else 3.0)
+    assert near.covered >= 0.9
+
+
+@pytest.mark.parametrize("loop", ["speed", "position"])
+async def test_mechanics_beside_a_closed_loop(loop: str) -> None:
+    async with direct(ONE) as b:
+        found = await sweep(b.axis, b.session, SweepSettings(WIDE, loop=loop), silent())  # type: ignore[arg-type]
+    near = errors(found.frf, ONE, 5, 200)
+    assert near.magnitude_db < 0.4
+    assert near.phase_deg < 3.0
+    assert near.covered >= 0.9
+
+
+@pytest.mark.parametrize(
+    ("drive", "spec", "limit"),
+    [("mms7", SOFT, 0.02), ("mms7", HEAVY, 0.05), ("m6l", ONE, 0.02), ("r6l", ONE, 0.02)],
+)
+async def test_inertia_of_every_family(drive: str, spec: MechanicsSpec, limit: float) -> None:
+    async with direct(spec, drive=drive) as b:
+        found = (await inertia(b.axis, b.session, InertiaSettings(WIDE), silent())).result
+    assert found.verdict == "ok"
+    assert found.inertia_kgm2.value == pytest.approx(spec.total_inertia_kgm2, rel=limit)
+    assert found.coulomb_nm.value == pytest.approx(spec.friction.coulomb_nm, rel=0.1)
+
+
+@pytest.mark.parametrize("drive", ["mms7", "r6l"])
+async def test_autotune_of_a_family_and_back(drive: str) -> None:
+    async with direct(ONE, 5e-4, drive=drive) as b:
+        result = await autotune(b.axis, b.session, AutotuneSettings(WIDE), silent())
+        assert result.applied is not None
+        assert result.verified is not None
+        found, promised = result.verified.sweep.margins, result.applied.promised
+        assert isinstance(found["phase_margin_deg"], float)
+        assert found["phase_margin_deg"] >= promised.phase_margin_deg - 6.0
+        assert isinstance(found["ms"], float)
+        assert found["ms"] <= promised.ms * 1.2
+        await put_back(b.axis, result.before)
+        for key, raw in result.before.items():
+            assert await b.axis.drive.raw(key) == raw
+
+
+async def _raws(b: DirectBench) -> dict[str, int]:
+    keys = ["2001:06", "2005:01", "2005:03", "2005:04", "2008:01", *_limits(b)]
+    return {key: await b.axis.drive.raw(key) for key in keys}
+
+
+def _limits(b: DirectBench) -> list[str]:
+    roles = ("torque_limit_positive", "torque_limit_negative", "max_torque")
+    return [key for role in roles if (key := b.axis.drive.key(role)) is not None]
+
+
+@pytest.mark.parametrize("step", ["2 of 6", "3 of 6", "6 of 6"])
+async def test_autotune_can_be_cancelled_in_every_step(step: str) -> None:
+    async with direct(ONE, 1e-3) as b:
+        before = await _raws(b)
+        there = asyncio.Event()
+        progress = Progress(lambda: there.set() if step in progress.step else None)
+        task = asyncio.create_task(autotune(b.axis, b.session, AutotuneSettings(WIDE), progress))
+        await asyncio.wait_for(there.wait(), 60.0)
+        await asyncio.sleep(0.05)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert await b.axis.state() is not State.OPERATION_ENABLED
+        assert await _raws(b) == before
+
+
+async def test_an_envelope_that_is_hit_ends_the_measurement() -> None:
+    async with direct(mechanics((1e-4, 60.0, 0.006), coulomb=0.005)) as b:
+        before = await _raws(b)
+        # The loop answers its reference with more torque than the envelope allows, whatever its
+        # size: gravity alone takes it.
+        b.link.device.inject("load_nm", 0.5)
+        with pytest.raises(NotAllowed):
+            await sweep(
+                b.axis, b.session, SweepSettings(Envelope(4.0, 1500.0, 20.0, 60.0)), silent()
+            )
+        assert await b.axis.state() is not State.OPERATION_ENABLED
+        assert await _raws(b) == before
+
+
+async def test_a_closed_brake_is_told_from_an_axis() -> None:
+    async with direct(ONE) as b:
+        before = await _raws(b)
+        b.link.device.inject("coulomb_nm", 5.0)
+        with pytest.raises(DriveError) as swept:
+            await sweep(b.axis, b.session, SweepSettings(WIDE), silent())
+        with pytest.raises(DriveError) as moved:
+            await inertia(b.axis, b.session, InertiaSettings(WIDE), silent())
+        assert "brake" in swept.value.remedy
+        assert "brake" in moved.value.remedy
+        assert await _raws(b) == before
