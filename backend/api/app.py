@@ -32,6 +32,7 @@ from backend.api import (
     routes_tune,
 )
 from backend.api.audited import AuditedAnswers
+from backend.api.described import DescribedApp
 from backend.api.errors import NotFound
 from backend.api.live import LiveHub
 from backend.api.models import Problem
@@ -93,7 +94,7 @@ def make_app(
         await bench.close()
         known.close()
 
-    app = FastAPI(
+    app = DescribedApp(
         title="servodeck",
         version=backend.__version__,
         openapi_url=f"{PREFIX}/openapi.json",

@@ -32,12 +32,18 @@ from drivers.errors import NotAllowed
 router = APIRouter(prefix="/library")
 
 
+#: What a database holds as a number.
+_MOST = 2**31 - 1
+
+
 def _entry(bench: Bench, entry_id: int) -> Entry:
     """Blocks.
 
     Raises:
         NotFound: there is none of this id.
     """
+    if not 0 < entry_id <= _MOST:
+        raise NotFound("there is no such thing in the library", value=entry_id)
     try:
         return bench.records.library.entry(entry_id)
     except NotInLibrary as error:
@@ -120,7 +126,7 @@ async def library_versions(bench: TheBench, entry_id: int) -> list[VersionInfo]:
 
 @router.get("/{entry_id}/content", response_class=Response)
 async def library_content(
-    bench: TheBench, entry_id: int, version: Annotated[int | None, Query(ge=1)] = None
+    bench: TheBench, entry_id: int, version: Annotated[int | None, Query(ge=1, le=_MOST)] = None
 ) -> Response:
     """Contents of a version as a download, the latest by default."""
     records = bench.records

@@ -1,0 +1,91 @@
+"""Requests that the OpenAPI document allows, made up: no 500, and no answer it does not tell of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import schemathesis
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from schemathesis.checks import CHECKS, load_all_checks
+from schemathesis.core.failures import FailureGroup
+
+from backend.api.rights import ROUTES
+from backend.people.rights import Right, Role
+from tests.support.guarded import Caller, GuardedServer
+
+load_all_checks()
+WANTED = ["not_a_server_error", "status_code_conformance", "content_type_conformance",
+          "response_schema_conformance"]  # fmt: skip
+#: Per operation; the seed makes a failure the same on every machine.
+EXAMPLES = 8
+#: Would take away what the other requests are made with, or looks outside this machine.
+LEFT_OUT = {"DELETE /api/v1/session"}
+
+
+def test_the_interface_keeps_to_its_description(server: GuardedServer) -> None:
+    schema = schemathesis.openapi.from_dict(server.app.openapi())
+    caller = server.token(Role.ADMINISTRATOR, *Right)
+    checks = CHECKS.get_by_names(WANTED)
+    wrong: dict[str, str] = {}
+    for result in schema.get_all_operations():
+        operation = result.ok()
+        label = operation.label
+        if label in LEFT_OUT:
+            continue
+
+        @seed(8)
+        @settings(
+            max_examples=EXAMPLES,
+            deadline=None,
+            database=None,
+            derandomize=False,
+            phases=[Phase.generate],
+            suppress_health_check=list(HealthCheck),
+        )
+        @given(case=operation.as_strategy())
+        def ask(case: schemathesis.Case) -> None:
+            if case.path_parameters and "drive_id" in case.path_parameters:
+                case.path_parameters["drive_id"] = "x"
+            response = case.call(base_url=server.url, headers=dict(caller.http.headers), timeout=30)
+            case.validate_response(response, checks=checks)
+
+        try:
+            ask()
+        except (Exception, FailureGroup) as error:
+            wrong[label] = str(error)[:700]
+    assert wrong == {}, "\n\n".join(f"{label}: {text}" for label, text in wrong.items())
+
+
+def test_fuzzing_finds_no_way_in_for_a_viewer(server: GuardedServer) -> None:
+    """What a viewer may not is refused whatever the body holds, before it is looked at."""
+    schema = schemathesis.openapi.from_dict(server.app.openapi())
+    viewer = server.log_in(Role.VIEWER)
+    before = len(server.servo.written)
+    passed: list[str] = []
+    for result in schema.get_all_operations():
+        operation = result.ok()
+        need = ROUTES[operation.label]
+        if isinstance(need.right, Right) and need.right is not Right.LOOK:
+            others = tried(operation, viewer) - {403}
+            passed += [f"{operation.label}: {status}" for status in others]
+    assert passed == []
+    assert len(server.servo.written) == before
+
+
+def tried(operation: Any, viewer: Caller) -> set[int]:
+    """Statuses of two made-up requests."""
+    seen = set()
+
+    @seed(8)
+    @settings(max_examples=2, deadline=None, database=None, phases=[Phase.generate],
+              suppress_health_check=list(HealthCheck))  # fmt: skip
+    @given(case=operation.as_strategy())
+    def ask(case: schemathesis.Case) -> None:
+        headers, cookies = dict(viewer.http.headers), {"servodeck": viewer.cookie}
+        response = case.call(
+            base_url=viewer.server.url, headers=headers, cookies=cookies, timeout=30
+        )
+        seen.add(response.status_code)
+
+    ask()
+    return seen
