@@ -12,6 +12,7 @@ from drivers.ethercat.al_status import ERROR_BIT, AlState, al_status_text, state
 from drivers.ethercat.mailbox import Gap, Mailbox, Pause, Read, Steps, Write
 
 AL_CONTROL, AL_STATUS = 0x120, 0x130
+_SYNC_MANAGERS, _NO_MAILBOXES = 0x800, 0x0016
 _NO_COMPLETE_ACCESS = {0x05040001, 0x06010000, 0x06010004}
 
 #: ETG.1020 clause 5.3.7.2: how long a slave may take for each state.
@@ -205,7 +206,7 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         station.notes.append("no mailbox: only process data")
         return
     try:
-        yield from change_state(station, AlState.PREOP, clock)
+        yield from _to_preop(station, clock)
         told = yield from _try_read(station, 0x1018, 4)
         if told is not None and len(told) == 4:
             station.serial = int.from_bytes(told, "little") or station.serial
@@ -217,6 +218,22 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         yield from _compare_identity(station)
     except DriveError as error:
         station.notes.append(error.message)
+
+
+def _to_preop(station: Station, clock: Callable[[], float]) -> Steps[None]:
+    """To PREOP; where a lost frame left the mailboxes without their sync managers, once more."""
+    try:
+        yield from change_state(station, AlState.PREOP, clock)
+    except NotAllowed:
+        if station.al_code != _NO_MAILBOXES:
+            raise
+        box = station.box
+        for number, (address, size, control) in enumerate(
+            ((box.out_address, box.out_size, 0x26), (box.in_address, box.in_size, 0x22))
+        ):
+            manager = struct.pack("<HHBBBB", address, size, control, 0, 1, 0)
+            yield Write(_SYNC_MANAGERS + 8 * number, manager)
+        yield from change_state(station, AlState.PREOP, clock)
 
 
 def _compare_identity(station: Station) -> Steps[None]:

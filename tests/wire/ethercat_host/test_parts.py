@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 
 import numpy as np
@@ -13,10 +14,11 @@ from drivers.ethercat import esc, permissions, protocol, sii
 from drivers.ethercat.al_status import al_status_text, state_name
 from drivers.ethercat.cyclic import percentile_us
 from drivers.ethercat.lanes import Lanes
-from drivers.ethercat.mailbox import Pause, Read, Steps, Write
+from drivers.ethercat.mailbox import Mailbox, Pause, Read, Step, Steps, Write
 from drivers.ethercat.ring import RING_BYTES, SLOT, VALID, Ring
 from drivers.ethercat.segmentcyclic import _contiguous
 from drivers.ethercat.setup import interpolation_period
+from drivers.ethercat.station import Station, _to_preop
 
 
 @pytest.fixture
@@ -248,3 +250,33 @@ def test_what_a_slave_sends_never_ends_the_process() -> None:
     while lanes.pending():
         lanes.step()
     assert isinstance(ended[0], errors.ProtocolError)
+
+
+def test_mailboxes_whose_sync_managers_were_lost_are_set_again() -> None:
+    """AL status 0016h (ETG.1000.6 table 11): a frame of the search did not arrive."""
+    memory = bytearray(0x1000)
+    memory[0x130] = 1
+    asked: list[int] = []
+
+    def access(step: Step) -> bytes | None:
+        if isinstance(step, Read):
+            return bytes(memory[step.register : step.register + step.size])
+        if isinstance(step, Write):
+            memory[step.register : step.register + len(step.data)] = step.data
+            if step.register == 0x120:
+                asked.append(step.data[0])
+                ready = memory[0x800:0x808] == b"\x00\x10\x80\x00\x26\x00\x01\x00"
+                memory[0x130] = 2 if step.data[0] == 2 and ready else 0x11
+                memory[0x130] = 1 if step.data[0] & 0x10 else memory[0x130]
+                memory[0x134] = 0x16 if memory[0x130] == 0x11 else 0
+        return b""
+
+    station = Station(1, mailbox=Mailbox(0x1000, 128, 0x1080, 128, lambda: 0.0, lambda _d: None))
+    steps = _to_preop(station, lambda: 0.0)
+    step = next(steps)
+    with contextlib.suppress(StopIteration):
+        while True:
+            step = steps.send(access(step))
+    assert station.al_state == 2
+    assert asked == [2, 0x11, 2], "refused, acknowledged, and reached"
+    assert memory[0x808:0x810] == b"\x80\x10\x80\x00\x22\x00\x01\x00"
