@@ -18,6 +18,7 @@ from backend.api.models_audit import (
     AuditStatus,
     AuditVerdict,
 )
+from backend.api.times import in_utc
 from backend.audit.chain import Anchor
 from backend.audit.facts import KINDS
 from backend.audit.trail import Event, Filter
@@ -36,12 +37,8 @@ def _filter(
 ) -> Filter:  # fmt: skip
     return Filter(
         kinds=tuple(kind or ()), person=person, axis=axis, station=station, words=words,
-        since=_zoned(since), until=_zoned(until),
+        since=in_utc(since), until=in_utc(until),
     )  # fmt: skip
-
-
-def _zoned(moment: datetime | None) -> datetime | None:
-    return moment.replace(tzinfo=UTC) if moment is not None and moment.tzinfo is None else moment
 
 
 def _message(event: Event) -> AuditEvent:

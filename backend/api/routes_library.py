@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import mimetypes
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Annotated
 from urllib.parse import quote
 
@@ -22,6 +22,7 @@ from backend.api.models_library import (
     VersionInfo,
 )
 from backend.api.routes_recordings import TheRecordings
+from backend.api.times import in_utc
 from backend.bench import Bench
 from backend.library import NotInLibrary
 from backend.library.entries import Entry
@@ -89,17 +90,13 @@ async def search_library(
         axis=axis,
         profile=profile,
         serial=serial,
-        since=_zoned(since),
-        until=_zoned(until),
+        since=in_utc(since),
+        until=in_utc(until),
         deleted=deleted,
         limit=limit,
         offset=offset,
     )
     return await bench.records.store.call(_page, bench, recordings, query)
-
-
-def _zoned(moment: datetime | None) -> datetime | None:
-    return moment.replace(tzinfo=UTC) if moment is not None and moment.tzinfo is None else moment
 
 
 @router.get("/tags")

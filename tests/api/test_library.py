@@ -206,6 +206,9 @@ async def test_library_lists_tags_and_versions(http: httpx.AsyncClient) -> None:
     assert first.headers["content-disposition"].startswith("attachment;")
     assert (await http.get(f"/library/{entry}/content?version=3")).status_code == 404
     assert (await http.get("/library/999")).status_code == 404
+    for address in ("/library", "/audit"):
+        answer = await http.get(address, params={"since": "0001-01-01T00:00:00+14:00"})
+        assert answer.status_code == 422, "that is in the year 0 of UTC"
     assert (await http.get("/library/tags")).json() == [{"tag": "golden", "count": 1}]
     assert (await http.delete(f"/library/{entry}")).status_code == 204
     assert (await http.get("/library")).json()["total"] == 0

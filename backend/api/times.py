@@ -1,0 +1,25 @@
+"""Moments that a request gives."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+from drivers.errors import OutOfRange
+
+
+def in_utc(moment: datetime | None) -> datetime | None:
+    """The moment in UTC; one without a zone is taken as UTC.
+
+    Raises:
+        OutOfRange: there is no such time in UTC (at the ends of the calendar).
+    """
+    if moment is None:
+        return None
+    if moment.tzinfo is None:
+        return moment.replace(tzinfo=UTC)
+    try:
+        return moment.astimezone(UTC)
+    except OverflowError as error:
+        raise OutOfRange(
+            f"{moment} is no time in UTC", value=str(moment), remedy="choose a later or earlier day"
+        ) from error
