@@ -40,17 +40,30 @@ export function TerminalTable({
   const stateOf = useStates(drive, states)
   const write = useAction()
   const [asked, setAsked] = useState<{ terminal: TerminalInfo; code: number } | null>(null)
-  const put = (key: string, raw: number) =>
+  const put = (key: string, raw: number) => write.run(() => store(key, raw))
+  const store = async (key: string, raw: number) => {
+    const value: ParameterValue = await ask(
+      api.PUT('/api/v1/drives/{drive_id}/parameters/{key}', {
+        params: { path: { drive_id: drive, key } },
+        body: { raw, value: null },
+      }),
+    )
+    setReadings(drive, [value])
+    // Until the terminals are read anew, no second one can be given the same function unseen.
+    await onChanged()
+  }
+  /** One bit of a shared parameter: the others as the drive has them now, not as last seen. */
+  const putBit = (key: string, bit: number, set: boolean) =>
     write.run(async () => {
-      const value: ParameterValue = await ask(
-        api.PUT('/api/v1/drives/{drive_id}/parameters/{key}', {
+      const { raw } = await ask(
+        api.GET('/api/v1/drives/{drive_id}/parameters/{key}', {
           params: { path: { drive_id: drive, key } },
-          body: { raw, value: null },
         }),
       )
-      setReadings(drive, [value])
-      // Until the terminals are read anew, no second one can be given the same function unseen.
-      await onChanged()
+      if (typeof raw !== 'number') return
+      const now = Math.floor(raw / 2 ** bit) % 2 === 1
+      if (now !== set) await store(key, raw + (set ? 1 : -1) * 2 ** bit)
+      else await onChanged()
     })
   const choose = (terminal: TerminalInfo, code: number) => {
     if (terminal.function_key === null) return
@@ -86,7 +99,13 @@ export function TerminalTable({
                     data={choices(terminal)}
                   />
                 )}
-                <Polarity drive={drive} terminal={terminal} busy={write.busy} put={put} />
+                <Polarity
+                  drive={drive}
+                  terminal={terminal}
+                  busy={write.busy}
+                  put={put}
+                  putBit={putBit}
+                />
               </div>
               {terminal.same_function.length > 0 && (
                 <p className={terminal.direction === 'in' ? 'note warn' : 'dim'}>
@@ -146,11 +165,13 @@ function Polarity({
   terminal,
   busy,
   put,
+  putBit,
 }: {
   drive: string
   terminal: TerminalInfo
   busy: boolean
   put: (key: string, raw: number) => Promise<boolean>
+  putBit: (key: string, bit: number, set: boolean) => Promise<boolean>
 }) {
   const t = useT()
   const key = terminal.polarity_key
@@ -178,9 +199,7 @@ function Polarity({
       disabled={busy}
       title={named ?? ''}
       value={set ? '1' : '0'}
-      onChange={(event) =>
-        void put(key, raw + (Number(event.currentTarget.value) - (set ? 1 : 0)) * 2 ** bit)
-      }
+      onChange={(event) => void putBit(key, bit, event.currentTarget.value === '1')}
       data={[
         { value: '0', label: polarityName(named, 0) ?? t('io.positive') },
         { value: '1', label: polarityName(named, 1) ?? t('io.inverted') },
