@@ -75,7 +75,7 @@ def spectrum(page: Page, station: Station, axis: str) -> None:
     page.get_by_text("Spectrum", exact=True).click()
     add_channel(page, "607A")
     signal = {"mode": "CSP", "shape": "sine", "amplitude": 0.05, "frequency_hz": 12.0}
-    generate(station, axis, duration_s=8, **signal)
+    job = generate(station, axis, duration_s=8, **signal)
 
     def whole() -> bool:
         """One line and next to nothing beside it: neither a gap nor a fade is in sight."""
@@ -89,6 +89,7 @@ def spectrum(page: Page, station: Station, axis: str) -> None:
 
     until(whole, 90, "the line alone")
     page.get_by_role("button", name="Pause").click()
+    station.job(station.http.get(f"/jobs/{job['id']}"), 90)
     page.locator(".scope-tabs").scroll_into_view_if_needed()
     page.get_by_role("table", name="Highest peaks").scroll_into_view_if_needed()
     page.wait_for_timeout(1000)
