@@ -148,8 +148,8 @@ async def test_dying_in_the_middle_of_a_segmented_upload_does_not_hang(rig: Rig)
             slowest = max(slowest, time.monotonic() - before)
         with pytest.raises(LinkTimeout):
             await reading
-        assert time.monotonic() - started < 2.0
-        assert slowest < 0.3
+        assert time.monotonic() - started < 4.0
+        assert slowest < 0.8, "not the time-out of the neighbour"
         rig.do("die_in_transfer", slave=0, after_segments=None)
         rig.do("mute", slave=0, on=False)
         assert await bus.link.read(1, STATUS) == b"\x50\x02"
