@@ -87,6 +87,7 @@ export function Rights(props: {
   const t = useT()
   return (
     <Checkbox.Group
+      className="people-rights"
       label={props.label}
       value={props.chosen}
       onChange={(next) => props.onChange(next)}

@@ -52,7 +52,7 @@ function Here() {
               {each.me && <span className="dim">{t('people.me')}</span>}
               <small className="dim">
                 {t(`role.${each.role}`)} · {t('people.since', { time: clock(each.since) })}
-                {each.page && (
+                {each.page && !each.me && (
                   <>
                     {' · '}
                     <a href={`#${each.page}`}>{t('people.sameView')}</a>
