@@ -22,8 +22,6 @@ from tests.browser.test_frame import SIDEWAYS, TOO_SMALL
 from tests.browser.tuning import ANTIRESONANCE_HZ, RESONANCE_HZ, row
 from tests.support.station import Station
 
-LIMITS = {"travel_limit": 3, "speed_limit": 1200, "torque_limit": 80}
-
 
 @pytest.fixture(scope="module")
 def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
@@ -35,10 +33,8 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
 def axis(station: Station) -> str:
     """Measured once, past the page: the mechanics and the speed loop."""
     drive = station.add(1, tuning.URL, name="Spindle")
-    seconds = tuning.MEASURED_MS / 1e3
     for kind in ("mechanics", "speed_loop"):
-        body = LIMITS | {"kind": kind, "realisations": 1}
-        station.done(station.http.post(f"/drives/{drive}/jobs/sweep", json=body), seconds)
+        tuning.sweep(station, drive, kind=kind, realisations=1)
     return drive
 
 
