@@ -19,7 +19,7 @@ from drivers.ethercat.coe import EntryDescription
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Address
 from drivers.virtual.wires.netns import Namespace, child_environment
-from tests.wire.ethercat_host.conftest import Rig, until
+from tests.wire.ethercat_host.conftest import Rig, repeated, until
 
 STATUS = Address(0x6041, 0, "UINT16")
 RECORD = [
@@ -111,6 +111,7 @@ async def test_slow_states_and_slow_answers_are_waited_for(rig: Rig) -> None:
         assert [f.state for f in found] == ["PREOP", "PREOP"]
 
 
+@repeated
 async def test_an_answer_that_comes_too_late_is_not_taken_for_another(rig: Rig) -> None:
     async with rig.link() as bus:
         rig.do("timing", slave=0, sdo_s=1.3)
@@ -135,6 +136,7 @@ async def test_a_mute_mailbox_times_out_and_comes_back(rig: Rig) -> None:
         assert await bus.link.read(1, RECORD[3]) == b"\x77\x66\x55\x44"
 
 
+@repeated
 async def test_dying_in_the_middle_of_a_segmented_upload_does_not_hang(rig: Rig) -> None:
     async with rig.link() as bus:
         await bus.link.write(1, LONG, bytes(1400))
@@ -182,6 +184,7 @@ async def test_a_power_cycle_is_told_and_the_drive_is_taken_up_again(rig: Rig) -
         assert await bus.link.read(2, STATUS) == b"\x50\x02"
 
 
+@repeated
 async def test_lost_late_and_damaged_frames_cost_time_but_no_value(rig: Rig) -> None:
     async with rig.link() as bus:
         for trouble in (
@@ -198,6 +201,7 @@ async def test_lost_late_and_damaged_frames_cost_time_but_no_value(rig: Rig) -> 
             rig.do("peace")
 
 
+@repeated
 async def test_a_heap_of_late_frames_is_never_taken_for_answers(rig: Rig) -> None:
     """SOEM's index has four bits: 16 frames too late would answer for ever."""
     async with rig.link() as bus:
@@ -234,6 +238,7 @@ async def test_an_emergency_is_told_once(rig: Rig) -> None:
         assert sum("0x8611" in t for t in bus.texts) == 1
 
 
+@repeated
 async def test_the_alias_is_written_with_its_checksum(rig: Rig) -> None:
     async with rig.link() as bus:
         await bus.link.set_alias(2, 1234)
