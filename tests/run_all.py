@@ -24,9 +24,9 @@ PYTEST = [sys.executable, "-m", "pytest", "-q"]
 #: cycle for 30 ms must brake the axis, and then the test does not see what it wants to see.
 REAL_TIME = [
     "tests/api/test_ethercat.py", "tests/api/test_ethercat_faults.py",
-    "tests/api/test_ethercat_segment.py", "tests/api/test_scope_streams.py",
-    "tests/api/test_scope_soak.py",
+    "tests/api/test_ethercat_segment.py", "tests/api/test_every_family.py",
     "tests/wire/ethercat_host", "tests/virtual/tools",
+    "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
 ]  # fmt: skip
 
 CHECKS: list[tuple[str, list[str], Path]] = [
