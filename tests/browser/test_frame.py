@@ -5,6 +5,7 @@ from __future__ import annotations
 from playwright.sync_api import Page, expect
 
 from tests.browser.driving import Bench, open_axis
+from tests.support.station import until
 
 PAGES = ["overview", "parameters", "motion", "io", "alarms"]
 #: Visible things to press that are smaller than a gloved finger needs. Boxes count with their
@@ -80,10 +81,12 @@ def test_scope_draws_and_measures(laptop: Page, bench: Bench) -> None:
     expect(velocity).not_to_have_text("—")
     page.get_by_role("button", name="Cursors").click()
     expect(page.get_by_text("Between the cursors")).to_be_visible()
-    with page.expect_download() as download:
-        page.get_by_role("button", name="CSV").click()
-    text = download.value.path().read_text("utf-8")
-    lines = text.splitlines()
+
+    def export() -> list[str]:
+        with page.expect_download() as download:
+            page.get_by_role("button", name="CSV").click()
+        return download.value.path().read_text("utf-8").splitlines()
+
+    lines = until(lambda: found if len(found := export()) > 20 else None, 15, "twenty samples")
     assert lines[0].startswith('"time_s","X Velocity actual value')
-    assert len(lines) > 20
     assert all(line.count(",") == 3 for line in lines[1:])
