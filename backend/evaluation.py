@@ -12,7 +12,7 @@ from backend.axis import Envelope
 from backend.measurements import BadMeasurement, Measurement
 from backend.tools import inertia as inertia_tool
 from backend.tools import step_response as step_tool
-from backend.tools import sweep as sweep_tool
+from backend.tools import sweep_evaluation
 from backend.tools.recording import Recording
 
 #: Numbers nearer than this share are the same: another computer sums in another order.
@@ -58,7 +58,7 @@ def recompute(measurement: Measurement) -> dict[str, object]:
     try:
         match meta.get("tool"):
             case "sweep":
-                return sweep_tool.as_json(sweep_tool.reevaluate(arrays, meta))
+                return sweep_evaluation.as_json(sweep_evaluation.reevaluate(arrays, meta))
             case "inertia":
                 return inertia_tool.as_json(inertia_tool.reevaluate(arrays, meta))
             case "step":

@@ -12,7 +12,8 @@ import asyncio
 
 from backend.jobs import Progress
 from backend.tools.inertia import InertiaSettings, Scheme, inertia
-from backend.tools.sweep import Loop, SweepSettings, sweep
+from backend.tools.sweep import sweep
+from backend.tools.sweep_evaluation import Loop, SweepSettings
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.virtual.mechanics import MechanicsSpec

@@ -41,7 +41,7 @@ from backend.api.routes_measurements import change_log, measurement_head
 from backend.bench import Bench, Member
 from backend.measurements import BadMeasurement, unpack
 from backend.report.changes import Change
-from backend.tools import autotune, gains, notch, sweep
+from backend.tools import autotune, gains, notch, sweep_evaluation
 from backend.tools.axis_facts import read_facts
 from backend.tools.temporary import put_back, write_settings
 from drivers.errors import NotAllowed, OutOfRange
@@ -172,18 +172,18 @@ async def undo_tuning(bench: TheBench, member: Controlled, request: Undo) -> Und
 
 
 @lru_cache(maxsize=4)
-def _evaluated(file: Path, _changed_ns: int) -> sweep.SweepResult:
+def _evaluated(file: Path, _changed_ns: int) -> sweep_evaluation.SweepResult:
     """A stored response; a person who drags a notch asks for the same one many times a second."""
     measurement = unpack(file.read_bytes(), file.name)
     if measurement.meta.get("tool") != "sweep":
         raise BadMeasurement(f"{file.name} is not a frequency response", value=file.name)
     try:
-        return sweep.reevaluate(measurement.arrays, measurement.meta)
+        return sweep_evaluation.reevaluate(measurement.arrays, measurement.meta)
     except ValueError as error:
         raise BadMeasurement(f"{file.name}: {error}", value=file.name) from error
 
 
-async def _plant(bench: Bench, name: str) -> tuple[MeasuredPlant, sweep.SweepResult]:
+async def _plant(bench: Bench, name: str) -> tuple[MeasuredPlant, sweep_evaluation.SweepResult]:
     await asyncio.to_thread(measurement_head, bench, name)
     file = bench.measurements.path(name)
     found = await asyncio.to_thread(_evaluated, file, file.stat().st_mtime_ns)
@@ -239,5 +239,5 @@ async def predict(bench: TheBench, member: TheMember, request: PredictRequest) -
         sensitivity_db=magnitude_db(sensitivity(opened)).tolist(),
         step_time_s=time[thin].tolist(),
         step=value[thin].tolist(),
-        margins=sweep.margins_of(f, opened),
+        margins=sweep_evaluation.margins_of(f, opened),
     )

@@ -29,7 +29,7 @@ from backend.cyclic import CyclicSession
 from backend.jobs import JobResult, Progress
 from backend.measurements import MeasurementStore
 from backend.report.changes import Change
-from backend.tools import autotune, inertia, step_response, sweep
+from backend.tools import autotune, inertia, step_response, sweep, sweep_evaluation
 from backend.tools.sweep_preview import preview
 from drivers.errors import DriveError
 
@@ -105,8 +105,8 @@ def _envelope(request: TuneLimits) -> Envelope:
     )
 
 
-def _sweep_settings(request: SweepRequest) -> sweep.SweepSettings:
-    return sweep.SweepSettings(
+def _sweep_settings(request: SweepRequest) -> sweep_evaluation.SweepSettings:
+    return sweep_evaluation.SweepSettings(
         _envelope(request), request.kind, request.loop, request.f_min_hz, request.f_max_hz,
         request.share, request.realisations, request.base_motion, request.rated_torque_nm,
     )  # fmt: skip
@@ -130,7 +130,9 @@ async def start_sweep(bench: TheBench, member: Controlled, request: SweepRequest
     settings = _sweep_settings(request)
 
     async def tool(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
-        return sweep.as_json(await sweep.sweep(member.axis, session, settings, progress, keep))
+        return sweep_evaluation.as_json(
+            await sweep.sweep(member.axis, session, settings, progress, keep)
+        )
 
     return await _start(bench, member, request, "sweep", "Frequency response", tool)
 

@@ -21,6 +21,7 @@ from backend.files import write_atomically
 from backend.jobs import Progress
 from backend.tools import inertia as inertia_tool
 from backend.tools import sweep as sweep_tool
+from backend.tools import sweep_evaluation
 from drivers.errors import DriveError, LinkLost, NotAllowed
 
 Url = Annotated[str | None, typer.Argument(metavar="[BUS_URL]")]
@@ -91,12 +92,14 @@ def sweep(
     }  # fmt: skip
 
     async def here() -> dict[str, object]:
-        settings = sweep_tool.SweepSettings(
+        settings = sweep_evaluation.SweepSettings(
             Envelope(travel_rev, speed_rpm, torque_percent, 60.0), kind.value, loop.value,
             f_min_hz, f_max_hz, share, realisations, rated_torque_nm=rated_torque_nm,
         )  # fmt: skip
         async with _session(url, station, profile, cycle_ms) as (found, session):
-            return sweep_tool.as_json(await sweep_tool.sweep(found, session, settings, _progress()))
+            return sweep_evaluation.as_json(
+                await sweep_tool.sweep(found, session, settings, _progress())
+            )
 
     _measure(out, here, "sweep", server, axis, cycle_ms, limits | more)
 

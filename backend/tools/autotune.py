@@ -35,6 +35,7 @@ from backend.tools import inertia as inertia_tool
 from backend.tools import notch as notch_tool
 from backend.tools import step_response as step_tool
 from backend.tools import sweep as sweep_tool
+from backend.tools import sweep_evaluation
 from backend.tools.axis_facts import AxisFacts, read_facts
 from backend.tools.probe import holding_torque
 from backend.tools.recording import cycle_s
@@ -62,7 +63,7 @@ class AutotuneSettings:
     envelope: Envelope
     mark: Mark = "balanced"
     load: LoadClass | None = None
-    loop: sweep_tool.Loop = "auto"
+    loop: sweep_evaluation.Loop = "auto"
     scheme: inertia_tool.Scheme = "free"
     ends_rev: tuple[float, float] | None = None
     apply: bool = True
@@ -74,7 +75,7 @@ class AutotuneSettings:
 class Verified:
     """The speed loop as measured after applying, beside what was predicted."""
 
-    sweep: sweep_tool.SweepResult
+    sweep: sweep_evaluation.SweepResult
     predicted_bandwidth_hz: float | None
     measured_bandwidth_hz: float | None
     kept: bool
@@ -89,7 +90,7 @@ class AutotuneResult:
     """
 
     inertia: inertia_tool.InertiaOutcome
-    mechanics: sweep_tool.SweepResult
+    mechanics: sweep_evaluation.SweepResult
     load: LoadClass
     candidates: tuple[Candidate, ...]
     applied: Candidate | None
@@ -129,7 +130,7 @@ async def autotune(
             axis, session, _sweep_settings(settings, outcome),
             _part(progress, 0.3, 0.6, "3 of 6: frequency response"), keep,
         )  # fmt: skip
-    facts = sweep_tool.completed(facts, mechanics)
+    facts = sweep_evaluation.completed(facts, mechanics)
     progress(0.6, "4 of 6: notches and gains")
     load, candidates = await _candidates(axis, session, settings, facts, outcome, mechanics)
     nothing = AutotuneResult(outcome, mechanics, load, candidates, None, None, None, {}, ())
@@ -191,17 +192,17 @@ def _require_inertia(axis: Axis, outcome: inertia_tool.InertiaOutcome) -> None:
 
 def _sweep_settings(
     settings: AutotuneSettings, outcome: inertia_tool.InertiaOutcome
-) -> sweep_tool.SweepSettings:
+) -> sweep_evaluation.SweepSettings:
     loop = settings.loop
     if loop == "auto" and settings.scheme != "free":
         loop = "speed"
-    return sweep_tool.SweepSettings(
+    return sweep_evaluation.SweepSettings(
         settings.envelope, loop=loop, rated_torque_nm=settings.rated_torque_nm,
         inertia_kgm2=outcome.result.inertia_kgm2.value,
     )  # fmt: skip
 
 
-def load_class(mechanics: sweep_tool.SweepResult) -> LoadClass:
+def load_class(mechanics: sweep_evaluation.SweepResult) -> LoadClass:
     """Stiff, medium or compliant, by where the first antiresonance lies."""
     low = [r.frequency_hz for r in mechanics.resonances if r.kind == "antiresonance"]
     first = min(low, default=np.inf)
@@ -210,7 +211,7 @@ def load_class(mechanics: sweep_tool.SweepResult) -> LoadClass:
 
 async def _candidates(
     axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
-    outcome: inertia_tool.InertiaOutcome, mechanics: sweep_tool.SweepResult,
+    outcome: inertia_tool.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
 ) -> tuple[LoadClass, tuple[Candidate, ...]]:  # fmt: skip
     """The table, from the measured response."""
     if mechanics.model is None:
@@ -340,7 +341,7 @@ async def _verify(
     await holding_torque(axis, session, facts)
     swept = await sweep_tool.sweep(
         axis, session,
-        sweep_tool.SweepSettings(
+        sweep_evaluation.SweepSettings(
             settings.envelope, kind="speed_loop", realisations=1, inertia_kgm2=inertia, hold=hold,
             rated_torque_nm=settings.rated_torque_nm,
         ),
@@ -399,14 +400,14 @@ def as_json(result: AutotuneResult) -> dict[str, object]:
     verified = result.verified
     return {
         "inertia": inertia_tool.as_json(result.inertia),
-        "mechanics": sweep_tool.as_json(result.mechanics),
+        "mechanics": sweep_evaluation.as_json(result.mechanics),
         "load": result.load,
         "candidates": [candidate_json(c) for c in result.candidates],
         "applied": candidate_json(result.applied) if result.applied else None,
         "verified": None
         if verified is None
         else {
-            "sweep": sweep_tool.as_json(verified.sweep),
+            "sweep": sweep_evaluation.as_json(verified.sweep),
             "predicted_bandwidth_hz": verified.predicted_bandwidth_hz,
             "measured_bandwidth_hz": verified.measured_bandwidth_hz,
         },

@@ -16,7 +16,7 @@ from backend.analysis.excitation import crest_factor
 from backend.axis import Axis
 from backend.tools import excite
 from backend.tools.axis_facts import read_facts
-from backend.tools.sweep import SweepSettings
+from backend.tools.sweep_evaluation import SweepSettings
 from drivers.errors import OutOfRange
 
 _TURN = 2 * np.pi

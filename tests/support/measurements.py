@@ -18,7 +18,7 @@ from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.inertia import InertiaSettings
 from backend.tools.step_response import StepSettings, _demand
-from backend.tools.sweep import SweepSettings
+from backend.tools.sweep_evaluation import SweepSettings
 
 RATE_HZ = 1000.0
 #: Corner of the loop: its −3 dB bandwidth, and a rise time of ln 9 / (2π · 60 Hz).

@@ -7,7 +7,7 @@ import pytest
 
 from backend.axis import Envelope
 from backend.tools import excite
-from backend.tools.sweep import Kind, Loop, SweepSettings
+from backend.tools.sweep_evaluation import Kind, Loop, SweepSettings
 from backend.tools.sweep_preview import _extremes, _seen, _sequences
 
 RATE_HZ, INERTIA = 1000.0, 2e-4

@@ -11,7 +11,8 @@ from backend.evaluation import recompute
 from backend.measurements import pack, unpack
 from backend.tools.autotune import AutotuneSettings, autotune
 from backend.tools.inertia import InertiaSettings, inertia
-from backend.tools.sweep import SweepSettings, as_json, sweep
+from backend.tools.sweep import sweep
+from backend.tools.sweep_evaluation import SweepSettings, as_json
 from backend.tools.temporary import put_back
 from drivers.virtual.wires.netns import Namespace
 from tests.virtual.tools.rig import WIDE, bench, errors, mechanics, silent

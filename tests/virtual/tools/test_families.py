@@ -14,7 +14,8 @@ from backend.axis import Envelope
 from backend.jobs import Progress
 from backend.tools.autotune import AutotuneSettings, autotune
 from backend.tools.inertia import InertiaSettings, inertia
-from backend.tools.sweep import SweepSettings, sweep
+from backend.tools.sweep import sweep
+from backend.tools.sweep_evaluation import SweepSettings
 from backend.tools.temporary import put_back
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed

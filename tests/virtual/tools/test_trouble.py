@@ -11,7 +11,8 @@ from backend.axis import Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.tools.inertia import InertiaSettings, inertia
-from backend.tools.sweep import SweepSettings, sweep
+from backend.tools.sweep import sweep
+from backend.tools.sweep_evaluation import SweepSettings
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.virtual.wires.netns import Namespace

@@ -1,0 +1,385 @@
+"""From recordings of a sweep to its answer, and to the files that keep it. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis import excitation as signals
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.fit import Resonance
+from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
+from backend.analysis.identify import Identification, identify_mechanics
+from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
+from backend.analysis.mechanical_model import MechanicalModel
+from backend.analysis.sampling import STEP_LEAD_S, Hold, SignalPath, fit_path, sampled_command
+from backend.axis import Envelope
+from backend.tools import excite
+from backend.tools.axis_facts import AxisFacts
+from backend.tools.recording import Recording
+
+Kind = Literal["mechanics", "speed_loop", "position_loop"]
+Loop = Literal["auto", "none", "speed", "position"]
+
+#: Weak modes below this are artefacts of friction more often than mechanics.
+_LOWEST_MODE_HZ = 15.0
+_WEAK_DB, _LEAST_DB, _LEAST_SHARE = 3.0, 1.0, 0.2
+#: Share of the distance of two lines that a mode's half width must have.
+_NARROWEST = 0.15
+
+
+@dataclass(frozen=True, slots=True)
+class SweepSettings:
+    """What to measure and within which limits.
+
+    ``loop`` is the loop that is closed while mechanics are measured; *auto* takes none on an
+    axis that turns freely and the speed loop otherwise. ``share`` is the excitation's share of
+    the envelope's torque. ``rated_torque_nm`` overrides what the drive says.
+    """
+
+    envelope: Envelope
+    kind: Kind = "mechanics"
+    loop: Loop = "auto"
+    f_min_hz: float = 5.0
+    f_max_hz: float | None = None
+    share: float = 0.35
+    realisations: int = 2
+    base_motion: bool = True
+    rated_torque_nm: float | None = None
+    inertia_kgm2: float | None = None
+    notches_off: bool = True
+    hold: Hold | None = None
+    """How the drive holds set-points between cycles; None asks the drive, or the recording."""
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """The answer: ``frf`` is the best estimate, ``direct`` the one without any model.
+
+    ``unit`` of the magnitude. ``model`` is None for closed loops and where no model fits
+    (``trusted`` False); ``warnings`` are sentences. ``saturated_share`` of the samples had the
+    torque at its limit.
+    """
+
+    kind: Kind
+    loop: Loop
+    frf: Frf
+    direct: Frf
+    model: MechanicalModel | None
+    trusted: bool
+    unit: str
+    resonances: tuple[Resonance, ...]
+    margins: dict[str, float | bool | None]
+    delay_s: float
+    motion_s: float
+    saturated_share: float
+    warnings: tuple[str, ...] = field(default_factory=tuple)
+    current_bandwidth_hz: float | None = None
+    speed_filter_hz: float | None = None
+    hold: Hold | None = None
+    """What the drive tells of its loops, or what the recording showed of them."""
+
+
+def evaluate(
+    records: tuple[tuple[excite.Sequence, Recording], ...],
+    rate: float,
+    facts: AxisFacts,
+    settings: SweepSettings,
+    loop: Literal["none", "speed", "position"],
+    dc: bool,
+) -> SweepResult:
+    """From recordings to the answer; also works on recordings that were kept.
+
+    Raises:
+        ValueError: nothing can be concluded from them.
+    """
+    hold: Hold = settings.hold or ("linear" if facts.interpolates else "zero")
+    path = SignalPath(
+        sample_rate_hz=rate,
+        hold=hold,
+        current_bandwidth_hz=facts.current_bandwidth_hz,
+        command_delay_s=max((1.0 / rate if dc else 0.0) - (hold == "linear") * STEP_LEAD_S, 0.0),
+        response_bandwidth_hz=facts.speed_filter_hz,
+    )
+    if settings.kind != "mechanics":
+        return _evaluate_loop(records, path, settings, loop)
+    taken = tuple(
+        Record(s.excitation, r.velocity_rad_s, r.torque_nm, r.valid, r.position_rad)
+        for s, r in records
+    )
+    quantity: Quantity = "torque_mode" if loop == "none" else "torque_injection"
+    path = _found_path(taken, path, quantity == "torque_injection")
+    found = identify_mechanics(taken, path, quantity)
+    limit = settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm
+    saturated = _saturated(taken, path, quantity, limit)
+    warnings = _warnings(found, saturated, facts)
+    return SweepResult(
+        kind="mechanics",
+        loop=loop,
+        frf=found.corrected,
+        direct=found.direct,
+        model=found.fit.model if found.trusted else None,
+        trusted=found.trusted,
+        unit="(rad/s)/Nm" if facts.torque_known else "(rad/s)/rated torque",
+        resonances=resonance_table(
+            found.fit.model, found.corrected.frequency_hz, found.corrected.valid_band_hz[1]
+        )
+        if found.trusted
+        else (),
+        margins=_injection_margins(found) if quantity == "torque_injection" else {},
+        delay_s=path.command_delay_s + found.fit.delay_s,
+        motion_s=_motion_s(records),
+        saturated_share=saturated,
+        warnings=warnings,
+        current_bandwidth_hz=path.current_bandwidth_hz,
+        speed_filter_hz=found.fit.path.response_bandwidth_hz,
+        hold=path.hold,
+    )
+
+
+def completed(facts: AxisFacts, result: SweepResult) -> AxisFacts:
+    """Facts with what the mechanics' measurement found where the drive tells nothing."""
+    return replace(
+        facts,
+        current_bandwidth_hz=facts.current_bandwidth_hz or result.current_bandwidth_hz,
+        speed_filter_hz=facts.speed_filter_hz or result.speed_filter_hz,
+    )
+
+
+def _found_path(records: tuple[Record, ...], path: SignalPath, closed: bool) -> SignalPath:
+    """Delay between a set-point and its torque, from the last period of the reported torque."""
+    commands, torques, lines = [], [], []
+    for r in records:
+        e = r.excitation
+        if r.torque is None:
+            continue
+        last = e.first_sample + (e.periods - 1) * e.period_samples
+        cut = slice(last, last + e.period_samples)
+        if r.valid is not None and not np.all(r.valid[cut]):
+            continue
+        commands.append(e.samples[cut])
+        torques.append(r.torque[cut])
+        lines.append(e.lines)
+    if not commands:
+        return path
+    return fit_path(
+        tuple(commands), tuple(torques), tuple(lines), path, loop_closed=closed,
+        hold_known=path.hold == "linear",
+    )  # fmt: skip
+
+
+def _saturated(
+    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, limit_nm: float
+) -> float:
+    """Share of samples whose torque is at the envelope's limit, or not what was commanded."""
+    shares = []
+    for r in records:
+        if r.torque is None:
+            continue
+        at_limit = np.abs(r.torque) >= 0.98 * limit_nm
+        if quantity == "torque_mode":
+            asked = sampled_command(r.excitation.samples, path)
+            size = float(np.max(np.abs(asked)))
+            at_limit |= np.abs(asked) - np.abs(r.torque) > 0.1 * size
+        shares.append(float(np.mean(at_limit)))
+    return max(shares, default=0.0)
+
+
+def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tuple[str, ...]:
+    words = []
+    if not found.trusted:
+        words.append(
+            "no mechanical model explains the recording: only the part of the plot below a tenth "
+            "of the sample rate is shown, and nothing is designed from it"
+        )
+    if saturated > 0.02:
+        words.append(
+            f"the torque was at its limit, or not what was commanded, for {saturated:.0%} of the "
+            "time: lower the excitation or raise the limit"
+        )
+    coherent = found.direct.coherence[found.direct.in_band]
+    if float(np.median(coherent)) < 0.9:
+        words.append("coherence is low: raise the excitation, or look for backlash and friction")
+    if found.direct.periods_dropped:
+        words.append(f"{found.direct.periods_dropped} periods had lost samples and were left out")
+    if not facts.torque_known:
+        words.append("the drive does not tell its rated torque: magnitudes are per rated torque")
+    return tuple(words)
+
+
+def resonance_table(
+    model: MechanicalModel, lines_hz: FloatArray, highest_hz: float
+) -> tuple[Resonance, ...]:
+    """Resonances and antiresonances that the lines show, ascending; heights are local, in dB.
+
+    A mode that hardly rises, or that is narrower than what lies between two lines, explains noise.
+    """
+    rows: list[Resonance] = []
+    for mode in model.modes:
+        height = model.height_db(mode)
+        place = int(np.clip(np.searchsorted(lines_hz, mode.frequency_hz), 1, lines_hz.size - 1))
+        gap_hz = float(lines_hz[place] - lines_hz[place - 1])
+        low = mode.frequency_hz < _LOWEST_MODE_HZ
+        shown = height > _WEAK_DB if low else model.prominence(mode) > _LEAST_SHARE
+        wide = mode.damping * mode.frequency_hz > _NARROWEST * gap_hz
+        inside = lines_hz[0] < mode.frequency_hz <= highest_hz
+        if shown and wide and inside and mode.damping < 1.0:
+            rows.append(Resonance("resonance", mode.frequency_hz, mode.damping, height))
+    kept = [row.frequency_hz for row in rows]
+    for frequency, damping in model.antiresonances():
+        # An antiresonance belongs to a resonance above it, which may lie beyond the band.
+        above = any(f > frequency for f in kept) or frequency > 0.25 * highest_hz
+        if not above or not lines_hz[0] < frequency <= highest_hz:
+            continue
+        around = np.array([frequency * 0.5, frequency, frequency * 2.0])
+        db = 20 * np.log10(np.abs(model.response(around)))
+        depth = float(db[1] - (db[0] + db[2]) / 2)
+        if depth < -_LEAST_DB:
+            rows.append(Resonance("antiresonance", frequency, damping, depth))
+    return tuple(sorted(rows, key=lambda row: row.frequency_hz))
+
+
+def _injection_margins(found: Identification) -> dict[str, float | bool | None]:
+    """Margins of the loop that was closed meanwhile, from its own torque."""
+    frf, fit = found.corrected, found.fit
+    use = frf.in_band
+    f = frf.frequency_hz[use]
+    controller = fit.loop.response(f) / (1.0 + 1j * f / (fit.path.current_bandwidth_hz or np.inf))
+    open_loop = controller * frf.response[use]
+    return margins_of(f, open_loop)
+
+
+def margins_of(f: FloatArray, open_loop: ComplexArray) -> dict[str, float | bool | None]:
+    """Margins and bandwidths of an open loop, for files and pages."""
+    closed = closed_from_open(open_loop)
+    width = bandwidth(f, closed)
+    return {
+        **asdict(margins(f, open_loop)),
+        "bandwidth_hz": width.minus_3db_hz,
+        "bandwidth_90deg_hz": width.minus_90deg_hz,
+    }
+
+
+def _evaluate_loop(
+    records: tuple[tuple[excite.Sequence, Recording], ...],
+    path: SignalPath,
+    settings: SweepSettings,
+    loop: Literal["none", "speed", "position"],
+) -> SweepResult:
+    """Closed loop from its reference to the motion."""
+    position = settings.kind == "position_loop"
+    taken = []
+    for sequence, r in records:
+        response = r.position_rad - r.position_rad[0] if position else r.velocity_rad_s
+        taken.append(Record(sequence.excitation, response, r.torque_nm, r.valid))
+    frf = estimate_periodic(tuple(taken), path, "closed_loop")
+    use = frf.in_band & (frf.coherence > 0.8)
+    found: dict[str, float | bool | None] = {}
+    if np.count_nonzero(use) > 12:
+        f = frf.frequency_hz[use]
+        found = margins_of(f, open_from_closed(frf.response[use]))
+        width = bandwidth(f, frf.response[use])
+        found["bandwidth_hz"] = width.minus_3db_hz
+        found["bandwidth_90deg_hz"] = width.minus_90deg_hz
+    return SweepResult(
+        kind=settings.kind, loop=loop, frf=frf, direct=frf, model=None, trusted=True, unit="1",
+        resonances=(), margins=found, delay_s=path.command_delay_s, motion_s=_motion_s(records),
+        saturated_share=0.0,
+    )  # fmt: skip
+
+
+def _motion_s(records: tuple[tuple[excite.Sequence, Recording], ...]) -> float:
+    return float(sum(s.excitation.duration_s for s, _ in records))
+
+
+def reevaluate(arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, object]) -> SweepResult:
+    """The answer again, from kept raw data.
+
+    Raises:
+        ValueError: not the raw data of a sweep.
+    """
+    try:
+        return _reevaluate(arrays, meta)
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"not the raw data of a sweep: {error!r}") from error
+
+
+def _reevaluate(arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, object]) -> SweepResult:
+    rate = float(str(meta["sample_rate_hz"]))
+    given, told, structure = meta["settings"], meta["facts"], meta["excitation"]
+    if not isinstance(given, dict) or not isinstance(told, dict) or not isinstance(structure, list):
+        raise TypeError("settings, facts or excitation")
+    settings = SweepSettings(**{**given, "envelope": Envelope(**given["envelope"])})
+    records = []
+    for number, part in enumerate(structure):
+        excitation = signals.Excitation(
+            samples=np.asarray(arrays[f"{number}/excitation"], np.float64),
+            sample_rate_hz=rate,
+            lines=np.asarray(arrays[f"{number}/lines"], np.int64),
+            **part,
+        )
+        columns = {
+            name: np.asarray(arrays[f"{number}/{name}"], np.float64)
+            for name in ("position_rad", "velocity_rad_s", "torque_nm", "sent", "offset")
+        }
+        valid = np.asarray(arrays[f"{number}/valid"], np.bool_)
+        records.append((excite.Sequence(excitation), Recording(rate, **columns, valid=valid)))
+    loop = str(meta["loop"])
+    closed: Literal["none", "speed", "position"] = (
+        "none" if loop == "none" else "position" if loop == "position" else "speed"
+    )
+    return evaluate(tuple(records), rate, AxisFacts(**told), settings, closed, bool(meta["dc"]))
+
+
+def as_json(result: SweepResult) -> dict[str, object]:
+    """The form that ``servodeck sweep --out`` writes (architecture.md)."""
+    frf = result.frf
+    return {
+        "kind": result.kind,
+        "loop": result.loop,
+        "sample_rate_hz": frf.sample_rate_hz,
+        "valid_band_hz": list(frf.valid_band_hz),
+        "frequency_hz": frf.frequency_hz.tolist(),
+        "magnitude_db": frf.magnitude_db.tolist(),
+        "phase_deg": frf.phase_deg.tolist(),
+        "coherence": frf.coherence.tolist(),
+        "std_db": _numbers(frf.std_db),
+        "std_deg": _numbers(frf.std_deg),
+        "resonances": [
+            {
+                "kind": r.kind, "frequency_hz": r.frequency_hz, "damping": r.damping,
+                "height_db": r.height_db,
+            }
+            for r in result.resonances
+        ],
+        "margins": result.margins,
+        "unit": result.unit,
+        "trusted": result.trusted,
+        "delay_s": result.delay_s,
+        "motion_s": result.motion_s,
+        "saturated_share": result.saturated_share,
+        "current_bandwidth_hz": result.current_bandwidth_hz,
+        "speed_filter_hz": result.speed_filter_hz,
+        "coulomb_nm": frf.coulomb_nm,
+        "noise": _numbers(frf.noise),
+        "distortion": _numbers(frf.distortion),
+        "periods_used": frf.periods_used,
+        "periods_dropped": frf.periods_dropped,
+        "direct": {
+            "valid_band_hz": list(result.direct.valid_band_hz),
+            "magnitude_db": result.direct.magnitude_db.tolist(),
+            "phase_deg": result.direct.phase_deg.tolist(),
+            "std_db": _numbers(result.direct.std_db),
+            "std_deg": _numbers(result.direct.std_deg),
+        },
+        "model": asdict(result.model) if result.model is not None else None,
+        "warnings": list(result.warnings),
+    }  # fmt: skip
+
+
+def _numbers(values: FloatArray) -> list[float | None]:
+    """JSON knows no NaN."""
+    return [float(v) if np.isfinite(v) else None for v in values]
