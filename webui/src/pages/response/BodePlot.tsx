@@ -300,8 +300,12 @@ function listen(
         away: Math.abs(plot.valToPos(marker.frequency, 'x') - x),
       }))
       .toSorted((a, b) => a.away - b.away)
+    // Where a cursor lies on a notch, the notch is what is meant.
+    const within = near.filter((each) => each.away <= GRAB_PX)
     const grabbed =
-      near.find((each) => each.away <= GRAB_PX) ?? near.find((each) => each.id.startsWith('cursor'))
+      within.find((each) => each.id.startsWith('notch')) ??
+      within[0] ??
+      near.find((each) => each.id.startsWith('cursor'))
     if (!grabbed) return
     dragged = grabbed.id
     plot.over.setPointerCapture(event.pointerId)
