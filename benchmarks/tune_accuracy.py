@@ -1,6 +1,6 @@
 """Errors of frequency response and inertia over EtherCAT frames, for a set of mechanics.
 
-    python -m benchmarks.tune_accuracy [--khz 1 4] [--only NAME ...] [--real-time]
+    python -m benchmarks.tune_accuracy [--khz 1 4] [--drive mms7] [--only NAME ...] [--real-time]
 
 Against the analytic response of the chain; the limits are those of the design (tuning.md).
 """
@@ -43,12 +43,14 @@ async def _ready(b: Bench) -> None:
         await b.axis.reset_fault()
 
 
-async def _one(namespace: Namespace, name: str, khz: float, lockstep: bool) -> str:
+async def _one(namespace: Namespace, name: str, khz: float, lockstep: bool, drive: str) -> str:
     spec = AXES[name]
     vertical = spec.friction.gravity_nm != 0
     limited = spec.travel.max_rev < 100
-    brake = {"2108:01": 1} if vertical else None
-    async with bench(namespace, spec, 1e-3 / khz, lockstep=lockstep, settings=brake) as b:
+    brake = {"2108:01": 1} if vertical and drive == "mms7" else None
+    async with bench(
+        namespace, spec, 1e-3 / khz, lockstep=lockstep, settings=brake, drive=drive
+    ) as b:
         await _ready(b)
         loop: Loop = "speed" if vertical or limited else "auto"
         envelope = WIDE if not limited else type(WIDE)(1.2, 1500.0, 100.0, 60.0)
@@ -81,21 +83,22 @@ async def _one(namespace: Namespace, name: str, khz: float, lockstep: bool) -> s
         )
 
 
-async def _all(names: list[str], rates: list[float], lockstep: bool) -> None:
+async def _all(names: list[str], rates: list[float], lockstep: bool, drive: str) -> None:
     with Namespace.create() as namespace:
         for khz in rates:
             for name in names:
-                print(await _one(namespace, name, khz, lockstep), flush=True)
+                print(await _one(namespace, name, khz, lockstep, drive), flush=True)
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--khz", type=float, nargs="+", default=[1.0, 4.0])
+    parser.add_argument("--drive", default="mms7", choices=["mms7", "m6l", "r6l"])
     parser.add_argument("--only", nargs="+", default=list(AXES), choices=list(AXES))
     parser.add_argument("--real-time", action="store_true", help="not in lockstep with the frames")
     options = parser.parse_args()
-    asyncio.run(_all(options.only, options.khz, not options.real_time))
+    asyncio.run(_all(options.only, options.khz, not options.real_time, options.drive))
 
 
 if __name__ == "__main__":
