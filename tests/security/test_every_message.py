@@ -158,7 +158,8 @@ def test_a_flood_ends_the_connection(cast: Cast) -> None:
     with cast.operator.live() as page, pytest.raises(ConnectionClosed) as closed:
         flood(page)
     assert closed.value.rcvd is not None
-    assert closed.value.rcvd.code == 4429
+    # Too many in, or too many answers that nobody takes: whichever is noticed first.
+    assert closed.value.rcvd.code in (4429, 1013)
 
 
 #: A frame that closes (RFC 6455 clause 5.5.1), with its code.
