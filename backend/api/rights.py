@@ -253,7 +253,7 @@ class Policy:
     def needs(self, method: str, path: str) -> list[Matched]:
         """Everything that this request must meet; nothing where no route is declared."""
         method = "GET" if method == "HEAD" else method
-        if any(part in (".", "..") for part in path.split("/")) or "\0" in path:
+        if not _plain(path):
             return []
         return [
             Matched(need, found.groupdict().get("drive_id"))
@@ -263,4 +263,11 @@ class Policy:
 
     def methods(self, path: str) -> list[str]:
         """HTTP methods that are declared for a path."""
+        if not _plain(path):
+            return []
         return sorted({m for m, pattern, _ in self._patterns if m != "WS" and pattern.match(path)})
+
+
+def _plain(path: str) -> bool:
+    """Whether the path names a thing below the root and nothing else."""
+    return not any(part in (".", "..") for part in path.split("/")) and "\0" not in path
