@@ -19,13 +19,13 @@ BIN = Path(sys.executable).parent
 #: Without a system npm, the one of a Python package (see hatch_build.py).
 NPM = ["npm"] if shutil.which("npm") else [sys.executable, str(ROOT / "hatch_build.py")]
 
-PYTEST = [sys.executable, "-m", "pytest", "-q"]
+PYTEST = [sys.executable, "-m", "pytest", "-q", "--durations=12"]
 #: Suites with a bus in real time have the machine to themselves: a master that is kept from its
 #: cycle for 30 ms must brake the axis, and then the test does not see what it wants to see.
 REAL_TIME = [
     "tests/api/test_ethercat.py", "tests/api/test_ethercat_faults.py",
     "tests/api/test_ethercat_segment.py", "tests/api/test_every_family.py",
-    "tests/wire/ethercat_host", "tests/virtual/tools",
+    "tests/wire/ethercat_host",
     "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
 ]  # fmt: skip
 

@@ -72,9 +72,13 @@ def traces(blocks: list[bytes]) -> tuple[np.ndarray, np.ndarray, int]:
         _magic, _sub, _seq, lost, rows, count, flags, t0, dt = struct.unpack_from(
             "<IIIIHHIdd", block
         )
-        assert flags == 0, "synchronous blocks need no times of their own"
+        assert not flags & 1, "synchronous blocks need no times of their own"
         times.append(t0 + dt * np.arange(rows))
-        rows_.append(np.frombuffer(block, "<f4", rows * count, 40).reshape(rows, count))
+        # Bit 1: large positions come as a base in float64 and the distance from it.
+        based = bool(flags & 2)
+        bases = np.frombuffer(block, "<f8", count, 40) if based else np.zeros(count)
+        samples = np.frombuffer(block, "<f4", rows * count, 40 + 8 * count * based)
+        rows_.append(samples.reshape(rows, count) + bases)
         dropped += lost
     return np.concatenate(times), np.concatenate(rows_), dropped
 

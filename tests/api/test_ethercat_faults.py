@@ -280,7 +280,8 @@ def test_single_lost_frames_are_counted_and_many_brake(running: Segment) -> None
         running.trouble("lose", count=300, cyclic=True)
         with page.holding(running.b):
             ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
-        assert "no valid process data" in reason(ended)
+        # For so long without any frame, the stations may be given up before the data are.
+        assert LOST.search(reason(ended)), ended
     running.responsive()
     until(lambda: running.view()["exchange"]["lost_frames"] >= 30, 5)
     running.trouble("peace")
