@@ -53,12 +53,12 @@ def page(browser: Browser, cable: Cable, axis: str) -> Iterator[Page]:
 
 
 def notches_of(station: Station, axis: str) -> list[float]:
-    slots = station.ok(station.http.get(f"/drives/{axis}/notches"))
+    slots = tuning.answered(station, f"/drives/{axis}/notches")
     return [slot["notch"]["center_hz"] for slot in slots if slot["enabled"]]
 
 
 def gains_of(station: Station, axis: str) -> tuple[float, float]:
-    gains = station.ok(station.http.get(f"/drives/{axis}/gains"))
+    gains = tuning.answered(station, f"/drives/{axis}/gains")
     return gains["speed_hz"], gains["inertia_kgm2"]
 
 
@@ -118,6 +118,7 @@ def test_step_before(page: Page, axis: str, station: Station) -> None:
 
 def test_design_and_apply(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "tune")
+    tuning.reload_until(page, page.get_by_role("button", name="Compute designs"))
     page.get_by_role("button", name="Compute designs").click()
     table = page.get_by_role("table", name="Designs").last
     table.wait_for(timeout=MEASURED_MS)
@@ -178,6 +179,7 @@ def test_report(page: Page, axis: str) -> None:
 def test_take_everything_back(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "tune")
     assert notches_of(station, axis) != []
+    tuning.reload_until(page, page.get_by_role("button", name="Take it back").first)
     back = page.get_by_role("button", name="Take it back")
     for left in (1, 0):
         back.first.click()

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
@@ -115,6 +116,27 @@ def sweep(station: Station, axis: str, **settings: object) -> None:
         assert any(words in str(job["problem"]) for words in BUSY), job
         until(lambda: _without_fault(station, axis), 60, "the drive answers without a fault")
     raise AssertionError(job)
+
+
+def answered(station: Station, path: str) -> Any:
+    """What the interface says of a drive, asked again where the computer was too busy."""
+    for _ in range(_TRIES):
+        answer = station.http.get(path)
+        if answer.status_code not in (503, 504):
+            return station.ok(answer)
+    raise AssertionError(answer.text)
+
+
+def reload_until(page: Page, shown: Locator) -> None:
+    """Load the page anew where the computer was too busy to read the drive for it."""
+    for _ in range(_TRIES):
+        try:
+            expect(shown).to_be_visible(timeout=10_000)
+        except AssertionError:
+            page.reload()
+        else:
+            return
+    expect(shown).to_be_visible()
 
 
 def _without_fault(station: Station, axis: str) -> bool:
