@@ -21,8 +21,6 @@ BIN = Path(sys.executable).parent
 NPM = ["npm"] if shutil.which("npm") else [sys.executable, str(ROOT / "hatch_build.py")]
 
 PYTEST = [sys.executable, "-m", "pytest", "-q", "--durations=12"]
-#: How often a failed file may be tried again.
-REPEATS = 2
 #: Suites with a bus in real time have the machine to themselves: a master that is kept from its
 #: cycle for 30 ms must brake the axis, and then the test does not see what it wants to see.
 REAL_TIME = [
@@ -70,9 +68,7 @@ def main() -> int:
         print(f"== {name}", flush=True)
         began = time.monotonic()
         done = subprocess.run(command, cwd=folder, env=environment, check=False)
-        for _ in range(REPEATS if command[: len(PYTEST)] == PYTEST else 0):
-            if done.returncode != 1:
-                break
+        if done.returncode == 1 and command[: len(PYTEST)] == PYTEST:
             # Once more, alone, and said aloud: a busy machine is no defect, a defect stays one.
             # Whole files, as the tests of some follow one another.
             files = last_failed()
