@@ -414,6 +414,25 @@ def test_a_limit_switch_stops_and_lets_back(name: str, warning: int | None) -> N
         assert not d.status & 1 << 7
 
 
+def test_the_negative_limit_switch_of_the_m6l_has_a_warning_of_its_own() -> None:
+    """AL.040, 603Fh FF28h, with P10.04 at its default (taken as 1): it holds, and the way forward ends it (000:3981)."""
+    d = drive(
+        "m6l", travel=TravelSpec(min_rev=-4, max_rev=4),
+        switches=SwitchSpec(negative_limit_rev=-2, positive_limit_rev=2),
+    )  # fmt: skip
+    d.turn(-3.0, seconds=0.3)
+    d.until(lambda: abs(d.speed_rev_s) < 0.05, 2.0)
+    d.run(0.2)
+    assert -2.3 < d.angle_rev < -2.0
+    assert not in_fault(d)
+    assert d.status & 1 << 7
+    assert d.get("603F:00") == 0xFF28
+    d.set("60FF:00", 2 * d.speed_per_rev_s)
+    d.run(0.5)
+    assert d.angle_rev > -1.9
+    assert not d.status & 1 << 7
+
+
 def test_m6l_over_travel_as_a_fault() -> None:
     """P10.04 = 0: Er.039 forward, Er.040 backward (000:3474, 000:3922)."""
     for sign, code in ((1, "Er.039"), (-1, "Er.040")):
