@@ -415,7 +415,10 @@ def test_a_limit_switch_stops_and_lets_back(name: str, warning: int | None) -> N
 
 
 def test_the_negative_limit_switch_of_the_m6l_has_a_warning_of_its_own() -> None:
-    """AL.040, 603Fh FF28h, with P10.04 at its default (taken as 1): it holds, and the way forward ends it (000:3981)."""
+    """AL.040, 603Fh FF28h: it holds, and the way forward ends it (000:3981).
+
+    P10.04 is at its default, whose meaning is not printed and which is taken as 1.
+    """
     d = drive(
         "m6l", travel=TravelSpec(min_rev=-4, max_rev=4),
         switches=SwitchSpec(negative_limit_rev=-2, positive_limit_rev=2),
