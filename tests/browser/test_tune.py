@@ -47,6 +47,7 @@ def page(browser: Browser, cable: Cable, axis: str) -> Iterator[Page]:
     """One page for the whole path: what it remembers of changes is part of it."""
     opened = _open(browser, cable.url, **LAPTOP)
     found = next(opened)
+    found.set_default_timeout(45_000)
     tuning.keep_exchanging(found, axis)
     yield found
     next(opened, None)
@@ -118,7 +119,7 @@ def test_step_before(page: Page, axis: str, station: Station) -> None:
 
 def test_design_and_apply(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "tune")
-    tuning.reload_until(page, page.get_by_role("button", name="Compute designs"))
+    expect(page.get_by_role("button", name="Compute designs")).to_be_visible()
     page.get_by_role("button", name="Compute designs").click()
     table = page.get_by_role("table", name="Designs").last
     table.wait_for(timeout=MEASURED_MS)
@@ -179,7 +180,7 @@ def test_report(page: Page, axis: str) -> None:
 def test_take_everything_back(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "tune")
     assert notches_of(station, axis) != []
-    tuning.reload_until(page, page.get_by_role("button", name="Take it back").first)
+    expect(page.get_by_role("button", name="Take it back").first).to_be_visible()
     back = page.get_by_role("button", name="Take it back")
     for left in (1, 0):
         back.first.click()

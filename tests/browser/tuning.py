@@ -127,18 +127,6 @@ def answered(station: Station, path: str) -> Any:
     raise AssertionError(answer.text)
 
 
-def reload_until(page: Page, shown: Locator) -> None:
-    """Load the page anew where the computer was too busy to read the drive for it."""
-    for _ in range(_TRIES):
-        try:
-            expect(shown).to_be_visible(timeout=10_000)
-        except AssertionError:
-            page.reload()
-        else:
-            return
-    expect(shown).to_be_visible()
-
-
 def _without_fault(station: Station, axis: str) -> bool:
     state = station.state(axis)
     if state["state"] == "Fault":

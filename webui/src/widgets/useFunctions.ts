@@ -47,7 +47,14 @@ export function useRecord(drive: string): AxisRecordInfo | null {
   return record
 }
 
-/** Something read from the drive on opening a page, and again on request. */
+/** Answers that mean "not now": the link is gone, or the drive did not answer in time. */
+const NOT_NOW = new Set([503, 504])
+const AGAIN_MS = 2000
+
+/**
+ * Something read from the drive on opening a page, and again on request. Where the drive did not
+ * answer it is asked again every two seconds, so that a page heals by itself.
+ */
 export function useFetched<T>(fetch: () => Promise<T>, dependencies: unknown[]) {
   const { open } = useLink()
   const [data, setData] = useState<T | null>(null)
@@ -63,5 +70,10 @@ export function useFetched<T>(fetch: () => Promise<T>, dependencies: unknown[]) 
   useEffect(() => {
     if (open) void read()
   }, [read, open])
+  useEffect(() => {
+    if (!open || !problem || !NOT_NOW.has(problem.status)) return
+    const timer = setTimeout(() => void read(), AGAIN_MS)
+    return () => clearTimeout(timer)
+  }, [read, open, problem])
   return { data, problem, read, setData }
 }

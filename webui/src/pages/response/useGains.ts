@@ -1,28 +1,15 @@
-import { useCallback, useEffect, useState } from 'react'
-import { api, ask, problemOf } from '../../api/client'
-import type { GainInfo, GainValues, Problem } from '../../api/schema'
+import { api, ask } from '../../api/client'
+import type { GainInfo, GainValues } from '../../api/schema'
+import { useFetched } from '../../widgets/useFunctions'
 
 /** Loop gains of a drive, read from it. */
 export function useGains(drive: string) {
-  const [gains, setGains] = useState<GainInfo | null>(null)
-  const [problem, setProblem] = useState<Problem | null>(null)
-  const read = useCallback(async () => {
-    try {
-      setGains(
-        await ask(
-          api.GET('/api/v1/drives/{drive_id}/gains', { params: { path: { drive_id: drive } } }),
-        ),
-      )
-      setProblem(null)
-    } catch (error) {
-      setGains(null)
-      setProblem(problemOf(error))
-    }
-  }, [drive])
-  useEffect(() => {
-    void read()
-  }, [read])
-  return { gains, problem, read }
+  const { data, problem, read } = useFetched<GainInfo>(
+    () =>
+      ask(api.GET('/api/v1/drives/{drive_id}/gains', { params: { path: { drive_id: drive } } })),
+    [drive],
+  )
+  return { gains: problem ? null : data, problem, read }
 }
 
 /** Gains that a loop can be predicted with, or null where one has no known meaning. */

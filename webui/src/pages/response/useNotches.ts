@@ -1,6 +1,7 @@
-import { useCallback, useEffect, useState } from 'react'
+import { useEffect, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
 import type { NotchPreviewInfo, NotchSlotInfo, Problem } from '../../api/schema'
+import { useFetched } from '../../widgets/useFunctions'
 import type { NotchShape } from './results'
 
 const SETTLE_MS = 250
@@ -19,28 +20,17 @@ export const legible = (notch: NotchShape): NotchShape => ({
 
 /** Notches of a drive as they are, as they are wanted, and what the drive would make of that. */
 export function useNotches(drive: string, frequency: number[]) {
-  const [now, setNow] = useState<NotchSlotInfo[] | null>(null)
   const [wanted, setWanted] = useState<(NotchShape | null)[]>([])
-  const [problem, setProblem] = useState<Problem | null>(null)
   const [preview, setPreview] = useState<NotchPreviewInfo | null>(null)
   const [refused, setRefused] = useState<Problem | null>(null)
   const path = { params: { path: { drive_id: drive } } }
-  const read = useCallback(async () => {
-    try {
-      const slots = await ask(
-        api.GET('/api/v1/drives/{drive_id}/notches', { params: { path: { drive_id: drive } } }),
-      )
-      setNow(slots)
-      setWanted(slots.map(inForce))
-      setProblem(null)
-    } catch (error) {
-      setNow(null)
-      setProblem(problemOf(error))
-    }
+  const slots = useFetched<NotchSlotInfo[]>(async () => {
+    const found = await ask(api.GET('/api/v1/drives/{drive_id}/notches', path))
+    setWanted(found.map(inForce))
+    return found
   }, [drive])
-  useEffect(() => {
-    void read()
-  }, [read])
+  const { problem, read } = slots
+  const now = problem ? null : slots.data
   const asked = JSON.stringify(wanted)
   useEffect(() => {
     if (!now) return
