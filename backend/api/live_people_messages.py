@@ -13,6 +13,10 @@ from backend.people.rights import Right, Role
 Name = Annotated[str, Field(max_length=100)]
 #: A place on a page, 0 at the left and top, 1 at the right and bottom of its content.
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+#: Plots on which cursors are shared. A closed list: others keep one place for each of them.
+PlotName = Literal[
+    "scope", "spectrum", "response", "prediction", "step", "predicted_step", "excitation"
+]
 
 # --- page to server -----------------------------------------------------------------
 
@@ -67,10 +71,14 @@ class Pointer(Message):
 
 
 class PlotCursor(Message):
-    """Where on a plot's axis this person points, in its unit; null when they do not."""
+    """Where on a plot this person points, in what its axis shows; null when they do not.
+
+    On the scope that is the time of the samples (``t0_s``), which is the same on every page
+    whatever each of them counts as zero; elsewhere the frequency in Hz or the time in s.
+    """
 
     type: Literal["plot_cursor"] = "plot_cursor"
-    plot: Name
+    plot: PlotName
     x: float | None = Field(allow_inf_nan=False)
 
 
@@ -193,7 +201,7 @@ class CursorMoved(Message):
     type: Literal["cursor_moved"] = "cursor_moved"
     connection: str
     person: str
-    plot: str
+    plot: PlotName
     x: float | None
 
 

@@ -3184,8 +3184,11 @@ export interface components {
             connection: string;
             /** Person */
             person: string;
-            /** Plot */
-            plot: string;
+            /**
+             * Plot
+             * @enum {string}
+             */
+            plot: "scope" | "spectrum" | "response" | "prediction" | "step" | "predicted_step" | "excitation";
             /**
              * Type
              * @default cursor_moved
@@ -5579,11 +5582,17 @@ export interface components {
         };
         /**
          * PlotCursor
-         * @description Where on a plot's axis this person points, in its unit; null when they do not.
+         * @description Where on a plot this person points, in what its axis shows; null when they do not.
+         *
+         *     On the scope that is the time of the samples (``t0_s``), which is the same on every page
+         *     whatever each of them counts as zero; elsewhere the frequency in Hz or the time in s.
          */
         PlotCursor: {
-            /** Plot */
-            plot: string;
+            /**
+             * Plot
+             * @enum {string}
+             */
+            plot: "scope" | "spectrum" | "response" | "prediction" | "step" | "predicted_step" | "excitation";
             /**
              * Type
              * @default plot_cursor
@@ -6416,6 +6425,18 @@ export interface components {
             unit: string;
         };
         /**
+         * ScopeRange
+         * @description A fixed y scale for the traces of one unit; without one they fill the plot.
+         */
+        ScopeRange: {
+            /** High */
+            high: number;
+            /** Low */
+            low: number;
+            /** Unit */
+            unit: string;
+        };
+        /**
          * ScopeSetup
          * @description Everything that is set on the Scope page.
          */
@@ -6430,6 +6451,11 @@ export interface components {
              * @default 0
              */
             persistence: number;
+            /**
+             * Ranges
+             * @default []
+             */
+            ranges: components["schemas"]["ScopeRange"][];
             /**
              * Traces
              * @default []
@@ -7678,6 +7704,7 @@ export type ScopeChannel = components['schemas']['ScopeChannel'];
 export type ScopeChannelInfo = components['schemas']['ScopeChannelInfo'];
 export type ScopeInfo = components['schemas']['ScopeInfo'];
 export type ScopeMath = components['schemas']['ScopeMath'];
+export type ScopeRange = components['schemas']['ScopeRange'];
 export type ScopeSetup = components['schemas']['ScopeSetup'];
 export type ScopeStart = components['schemas']['ScopeStart'];
 export type ScopeStop = components['schemas']['ScopeStop'];

@@ -2,6 +2,7 @@ import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { figure } from '../widgets/format'
+import { sharedCursor } from './shared-cursor'
 
 /** A curve over a quantity other than time, with the value beneath the pointer. */
 export function LinesPlot({
@@ -72,6 +73,7 @@ function options(
   return {
     ...size,
     cursor: { drag: { x: true, y: false }, points: { show: true } },
+    plugins: [sharedCursor('spectrum')],
     legend: { show: true, live: true },
     scales: {
       // eslint-disable-next-line @typescript-eslint/no-unsafe-enum-assignment -- uPlot.Scale.Distr.Logarithmic, an ambient const enum that cannot be imported

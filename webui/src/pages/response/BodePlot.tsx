@@ -1,6 +1,8 @@
 import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
+import type { PlotName } from '../../live/cursors'
+import { sharedCursor } from '../../plots/shared-cursor'
 import { figure } from '../../widgets/format'
 import { type Curve, gridOf, hertz, logTicks, onGrid, type Part, partOf, rangeOf } from './bode'
 
@@ -33,6 +35,7 @@ export function BodePlot({
   unit,
   label,
   dark,
+  shared = 'response',
   onMarker,
 }: {
   curves: Curve[]
@@ -44,6 +47,8 @@ export function BodePlot({
   unit: string
   label: string
   dark: boolean
+  /** Name by which people share their cursors on it. */
+  shared?: PlotName
   onMarker: (id: string, frequency: number) => void
 }) {
   const coherent = curves.some((curve) => curve.coherence)
@@ -66,6 +71,7 @@ export function BodePlot({
           }
           frame={{ curves, markers, band, shown }}
           dark={dark}
+          shared={shared}
           onMarker={onMarker}
         />
       ))}
@@ -79,6 +85,7 @@ function BodePart({
   unit,
   frame,
   dark,
+  shared,
   onMarker,
 }: {
   part: Part
@@ -86,6 +93,7 @@ function BodePart({
   unit: string
   frame: Frame
   dark: boolean
+  shared: PlotName
   onMarker: (id: string, frequency: number) => void
 }) {
   const box = useRef<HTMLDivElement>(null)
@@ -110,7 +118,10 @@ function BodePart({
       height: HEIGHTS[part] + (last ? 26 : 0),
     })
     const plot = new uPlot(
-      options(drawn, part, last, unit, size(), () => now.current),
+      {
+        ...options(drawn, part, last, unit, size(), () => now.current),
+        plugins: [sharedCursor(shared)],
+      },
       data(drawn, part),
       element,
     )

@@ -72,6 +72,7 @@ export function ExcitationPreview({
   return (
     <div className="preview-plot">
       <StepPlot
+        shared="excitation"
         traces={traces}
         unit={found.unit === '% of rated torque' ? t('step.torqueUnit') : found.unit}
         label={t('excite.title')}

@@ -75,6 +75,7 @@ export function PredictionPanel({
           <Legend of={both} />
           {view === 'step' ? (
             <StepPlot
+              shared="predicted_step"
               traces={traces}
               unit=""
               label={t('predict.step')}
@@ -83,6 +84,7 @@ export function PredictionPanel({
             />
           ) : (
             <BodePlot
+              shared="prediction"
               curves={curves}
               markers={[]}
               band={null}

@@ -1,6 +1,8 @@
 import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
+import type { PlotName } from '../../live/cursors'
+import { sharedCursor } from '../../plots/shared-cursor'
 import { figure } from '../../widgets/format'
 
 export interface Trace {
@@ -19,6 +21,7 @@ export function StepPlot({
   timeLabel,
   dark,
   height = 260,
+  shared = 'step',
 }: {
   traces: Trace[]
   unit: string
@@ -26,6 +29,8 @@ export function StepPlot({
   timeLabel: string
   dark: boolean
   height?: number
+  /** Name by which people share their cursors on it. */
+  shared?: PlotName
 }) {
   const box = useRef<HTMLDivElement>(null)
   const plotted = useRef<uPlot | null>(null)
@@ -34,7 +39,11 @@ export function StepPlot({
     const element = box.current
     if (!element) return
     const size = () => ({ width: Math.max(200, element.clientWidth), height })
-    const plot = new uPlot(options(traces, unit, timeLabel, size()), data(traces), element)
+    const plot = new uPlot(
+      { ...options(traces, unit, timeLabel, size()), plugins: [sharedCursor(shared)] },
+      data(traces),
+      element,
+    )
     plotted.current = plot
     const observer = new ResizeObserver(() => plot.setSize(size()))
     observer.observe(element)

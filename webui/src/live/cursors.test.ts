@@ -1,0 +1,93 @@
+import { describe, expect, it } from 'vitest'
+import type { CursorMoved, InvitationView, PeopleHere, PersonHere, PlotCursor } from '../api/schema'
+import { cursorsOn, heldInside, isShared, Pointing } from './cursors'
+
+function here(state: InvitationView['state'], pages: Record<string, string>): PeopleHere {
+  return {
+    type: 'people',
+    people: Object.entries(pages).map(([connection, page]) => ({
+      connection,
+      page,
+    })) as PersonHere[],
+    invitations: [{ state } as InvitationView],
+    rights: [],
+  }
+}
+
+const cursor = (connection: string, x: number | null, plot: CursorMoved['plot'] = 'response') =>
+  ({ type: 'cursor_moved', connection, person: `P ${connection}`, plot, x }) satisfies CursorMoved
+
+describe('cursors of others', () => {
+  const pages = { c1: '/axis/x/response', c2: '/axis/y/response' }
+  const all = [cursor('c1', 120), cursor('c2', 90), cursor('gone', 80)]
+  it('are those of the same plot on the same page', () => {
+    const found = cursorsOn('response', '/axis/x/response', here('joined', pages), all)
+    expect(found).toEqual([{ connection: 'c1', person: 'P c1', x: 120 }])
+    expect(cursorsOn('step', '/axis/x/response', here('joined', pages), all)).toEqual([])
+  })
+  it('are not there without a guest', () => {
+    for (const state of ['open', 'ended'] as const) {
+      expect(isShared(here(state, pages))).toBe(false)
+      expect(cursorsOn('response', '/axis/x/response', here(state, pages), all)).toEqual([])
+    }
+    expect(isShared(null)).toBe(false)
+  })
+  it('are held at the edge where their place is out of sight', () => {
+    expect(heldInside(-3, 400)).toEqual({ left: 0, beyond: -1 })
+    expect(heldInside(200, 400)).toEqual({ left: 200, beyond: 0 })
+    expect(heldInside(401, 400)).toEqual({ left: 400, beyond: 1 })
+  })
+})
+
+describe('pointing', () => {
+  function make() {
+    const sent: PlotCursor[] = []
+    return { sent, pointing: new Pointing((message) => sent.push(message)) }
+  }
+  const told = (plot: PlotCursor['plot'], x: number | null) => ({ type: 'plot_cursor', plot, x })
+
+  it('tells a place once, and again when the picture has moved beneath the pointer', () => {
+    const { sent, pointing } = make()
+    let x = 1.5
+    pointing.enter('scope', () => x)
+    pointing.tick(true)
+    pointing.tick(true)
+    x = 1.6
+    pointing.tick(true)
+    expect(sent).toEqual([told('scope', 1.5), told('scope', 1.6)])
+  })
+  it('says nothing while nobody is told, and takes back what it said', () => {
+    const { sent, pointing } = make()
+    pointing.enter('scope', () => 1)
+    pointing.tick(false)
+    expect(sent).toEqual([])
+    pointing.tick(true)
+    pointing.tick(false)
+    pointing.tick(false)
+    expect(sent).toEqual([told('scope', 1), told('scope', null)])
+  })
+  it('takes back the old plot before it tells of the new one', () => {
+    const { sent, pointing } = make()
+    const first = () => 5
+    pointing.enter('response', first)
+    pointing.tick(true)
+    pointing.enter('step', () => 0.2)
+    pointing.leave(first) // the leave of the first may come after the enter of the second
+    pointing.tick(true)
+    expect(sent).toEqual([told('response', 5), told('response', null), told('step', 0.2)])
+  })
+  it('is over when the pointer leaves, or when the plot has no place for it', () => {
+    const { sent, pointing } = make()
+    let x: number | null = 7
+    const read = () => x
+    pointing.enter('response', read)
+    pointing.tick(true)
+    x = null
+    pointing.tick(true)
+    x = 8
+    pointing.tick(true)
+    pointing.leave(read)
+    pointing.tick(true)
+    expect(sent.map((each) => each.x)).toEqual([7, null, 8, null])
+  })
+})

@@ -1,0 +1,64 @@
+import type { CursorMoved, PeopleHere, PlotCursor } from '../api/schema'
+
+export type PlotName = PlotCursor['plot']
+
+/** A guest is here, so that pointing has somebody to point for. */
+export const isShared = (here: PeopleHere | null): boolean =>
+  here?.invitations.some((each) => each.state === 'joined') ?? false
+
+/** Where the others point on a plot, of those who look at the same page. */
+export function cursorsOn(
+  plot: PlotName,
+  page: string,
+  here: PeopleHere | null,
+  cursors: Iterable<CursorMoved>,
+): { connection: string; person: string; x: number }[] {
+  if (!isShared(here)) return []
+  const together = new Set(
+    here?.people.filter((each) => each.page === page).map((each) => each.connection),
+  )
+  return [...cursors].flatMap(({ connection, person, plot: on, x }) =>
+    on === plot && x !== null && together.has(connection) ? [{ connection, person, x }] : [],
+  )
+}
+
+/** Where on the width of a plot a place in its data lies; beyond an end it is held there. */
+export function heldInside(place: number, width: number): { left: number; beyond: -1 | 0 | 1 } {
+  if (place < 0) return { left: 0, beyond: -1 }
+  if (place > width) return { left: width, beyond: 1 }
+  return { left: place, beyond: 0 }
+}
+
+/**
+ * What this page tells the others about its own pointer. There is one pointer, so the last plot
+ * that it entered counts; a picture that runs on beneath a resting pointer moves it as well.
+ */
+export class Pointing {
+  private now: { plot: PlotName; read: () => number | null } | null = null
+  private told: { plot: PlotName; x: number | null } | null = null
+
+  constructor(private readonly send: (message: PlotCursor) => void) {}
+
+  /** `read` gives the place in the plot's data, or null where there is none. */
+  enter(plot: PlotName, read: () => number | null): void {
+    this.now = { plot, read }
+  }
+
+  /** Leaving what another plot has taken over already changes nothing. */
+  leave(read: () => number | null): void {
+    if (this.now?.read === read) this.now = null
+  }
+
+  /** Called at the rate at which the others are told; `shared` is whether they are told at all. */
+  tick(shared: boolean): void {
+    const x = shared ? (this.now?.read() ?? null) : null
+    const plot = x === null ? null : (this.now?.plot ?? null)
+    if (this.told !== null && this.told.plot !== plot) {
+      this.send({ type: 'plot_cursor', plot: this.told.plot, x: null })
+      this.told = null
+    }
+    if (plot === null || x === this.told?.x) return
+    this.told = { plot, x }
+    this.send({ type: 'plot_cursor', plot, x })
+  }
+}
