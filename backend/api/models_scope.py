@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from backend.api.models import Finite, Message, Positive
 
@@ -53,6 +53,20 @@ class ScopeTrigger(Message):
     before: float = Field(default=0.2, ge=0, le=1)
 
 
+class ScopeRange(Message):
+    """A fixed y scale for the traces of one unit; without one they fill the plot."""
+
+    unit: str = Field(max_length=40)
+    low: Finite
+    high: Finite
+
+    @model_validator(mode="after")
+    def _of_some_height(self) -> Self:
+        if not self.low < self.high:
+            raise ValueError(f"the scale of {self.unit or 'no unit'} must go upwards")
+        return self
+
+
 class ScopeSetup(Message):
     """Everything that is set on the Scope page."""
 
@@ -61,6 +75,7 @@ class ScopeSetup(Message):
     trigger: ScopeTrigger = ScopeTrigger()
     window_s: Positive = 5.0
     persistence: int = Field(default=0, ge=0, le=50)
+    ranges: list[ScopeRange] = Field(default=[], max_length=32)
 
 
 class NamedSetup(Message):

@@ -3,6 +3,9 @@ import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import type { Columns } from '../live/decimate'
 import { figure } from '../widgets/format'
+import { listen, type PlotEvents } from './gestures'
+import { Extent, type Span, withAir } from './yscale'
+import { sharedCursor } from './shared-cursor'
 
 export interface PlotSeries {
   label: string
@@ -31,12 +34,16 @@ export interface PlotFrame {
   level: { unit: string; value: number; color: string } | null
   cursors: number[]
   overlays?: PlotOverlay[]
+  /** Fixed scales by unit; the other units follow what is in sight. */
+  ranges: ReadonlyMap<string, Span>
 }
 
 /** Where frames are handed in, so that thirty a second do not pass through React. */
 export interface PlotHandle {
   draw(frame: PlotFrame): void
   width(): number
+  /** What the scale of a unit shows now. */
+  range(unit: string): Span | null
 }
 
 /** Scale of the traces that have no unit. */
@@ -44,15 +51,16 @@ const NO_UNIT = '–'
 /** uPlot.Axis.Side, which as an ambient const enum cannot be imported. */
 const LEFT = 3
 const RIGHT = 1
-const GRAB_PX = 14
 const SHORTEST_S = 1e-5
 /** Narrower than this the y axes make room for the traces. */
 const NARROW_PX = 500
-const WHEEL_ZOOM = 1.25
+/** Mark of a trace that leaves a fixed scale. */
+const BEYOND_PX = 7
 
 /**
  * Traces over time, one y scale per unit. Dragging zooms (or moves a cursor when there are any),
- * the wheel zooms about the pointer, two clicks follow again.
+ * the wheel zooms about the pointer, two clicks follow again; Shift and the wheel, or the wheel on
+ * an axis, zoom its scale. Two fingers zoom in the direction in which they lie.
  */
 export function TimePlot({
   series,
@@ -63,19 +71,22 @@ export function TimePlot({
   onStretch,
   onFollow,
   onCursor,
+  onRange,
 }: {
   series: PlotSeries[]
   dark: boolean
   label: string
   timeLabel: string
   handle: (handle: PlotHandle | null) => void
-  onStretch: (from: number, to: number) => void
-  onFollow: () => void
-  onCursor: (index: number, time: number) => void
-}) {
+} & PlotEvents) {
   const box = useRef<HTMLDivElement>(null)
-  const events = useRef({ onStretch, onFollow, onCursor })
-  events.current = { onStretch, onFollow, onCursor }
+  const events = useRef({ onStretch, onFollow, onCursor, onRange })
+  events.current = {
+    onStretch,
+    onFollow,
+    onCursor,
+    onRange: (scale, span) => onRange(scale === NO_UNIT ? '' : scale, span),
+  }
   const shape = JSON.stringify([series, dark, timeLabel])
   useEffect(() => {
     const element = box.current
@@ -115,6 +126,10 @@ export function TimePlot({
         })
       },
       width: () => plot.bbox.width / devicePixelRatio,
+      range: (unit) => {
+        const { min, max } = plot.scales[unit || NO_UNIT] ?? {}
+        return typeof min === 'number' && typeof max === 'number' ? { min, max } : null
+      },
     })
     return () => {
       handle(null)
@@ -129,40 +144,24 @@ export function TimePlot({
 
 const units = (series: PlotSeries[]) => [...new Set(series.map((each) => each.unit || NO_UNIT))]
 
-/** Range of a unit's scale over what is in sight, with some air, never of no height. */
-function yRange(
-  plot: uPlot,
-  series: PlotSeries[],
-  unit: string,
-  frame: PlotFrame,
-): { min: number; max: number } {
-  let min = Number.POSITIVE_INFINITY
-  let max = Number.NEGATIVE_INFINITY
+/** Range of a unit's scale: the fixed one, or over what is in sight. */
+function yRange(plot: uPlot, series: PlotSeries[], unit: string, frame: PlotFrame): Span {
+  const fixed = frame.ranges.get(unit === NO_UNIT ? '' : unit)
+  if (fixed) return fixed
+  const seen = new Extent()
   for (const [i, each] of series.entries()) {
     if ((each.unit || NO_UNIT) !== unit || plot.series[i + 1]?.show === false) continue
-    for (const value of frame.columns[i + 1] ?? []) {
-      if (typeof value !== 'number') continue
-      if (value < min) min = value
-      if (value > max) max = value
-    }
+    for (const value of frame.columns[i + 1] ?? []) if (typeof value === 'number') seen.see(value)
   }
   for (const overlay of frame.overlays ?? []) {
     if ((overlay.unit || NO_UNIT) !== unit) continue
     for (const [i, time] of overlay.times.entries()) {
       const at = time + frame.origin
-      if (at < frame.from || at > frame.to) continue
-      const value = overlay.values[i] as number
-      if (value < min) min = value
-      if (value > max) max = value
+      if (at >= frame.from && at <= frame.to) seen.see(overlay.values[i] as number)
     }
   }
-  if (frame.level && (frame.level.unit || NO_UNIT) === unit) {
-    min = Math.min(min, frame.level.value)
-    max = Math.max(max, frame.level.value)
-  }
-  if (min > max) return { min: -1, max: 1 }
-  const air = (max - min) * 0.08 || Math.abs(max) * 0.1 || 1
-  return { min: min - air, max: max + air }
+  if (frame.level && (frame.level.unit || NO_UNIT) === unit) seen.see(frame.level.value)
+  return withAir(seen.span)
 }
 
 function options(
@@ -190,6 +189,7 @@ function options(
     ...size,
     legend: { show: false },
     cursor: { drag: { x: true, y: false, setScale: false }, points: { show: false } },
+    plugins: [sharedCursor('scope', () => frame()?.origin ?? 0)],
     scales: {
       x: { time: false, auto: false },
       ...Object.fromEntries(names.map((name) => [name, { auto: false }])),
@@ -219,7 +219,7 @@ function options(
       })),
     ],
     hooks: {
-      draw: [(plot) => drawMarks(plot, frame(), text)],
+      draw: [(plot) => drawMarks(plot, frame(), text), (plot) => drawBeyond(plot, frame(), series)],
       setSelect: [
         (plot) => {
           const now = frame()
@@ -259,6 +259,31 @@ function drawMarks(plot: uPlot, frame: PlotFrame | null, color: string): void {
   ctx.restore()
 }
 
+/** A triangle at the edge of a fixed scale for each trace that goes beyond it. */
+function drawBeyond(plot: uPlot, frame: PlotFrame | null, series: PlotSeries[]): void {
+  if (!frame || frame.ranges.size === 0) return
+  const { ctx, bbox } = plot
+  const size = BEYOND_PX * devicePixelRatio
+  for (const [i, { unit, color }] of series.entries()) {
+    const range = frame.ranges.get(unit)
+    if (!range) continue
+    const seen = new Extent()
+    for (const value of frame.columns[i + 1] ?? []) if (typeof value === 'number') seen.see(value)
+    const x = bbox.left + bbox.width - (i + 1) * 2.4 * size
+    const mark = (tip: number, base: number) => {
+      ctx.fillStyle = color
+      ctx.beginPath()
+      ctx.moveTo(x, tip)
+      ctx.lineTo(x - size, base)
+      ctx.lineTo(x + size, base)
+      ctx.fill()
+    }
+    if (seen.span && seen.span.max > range.max) mark(bbox.top, bbox.top + 1.6 * size)
+    const foot = bbox.top + bbox.height
+    if (seen.span && seen.span.min < range.min) mark(foot, foot - 1.6 * size)
+  }
+}
+
 function drawOverlay(plot: uPlot, overlay: PlotOverlay): void {
   const { ctx, bbox } = plot
   const scale = overlay.unit || NO_UNIT
@@ -287,61 +312,4 @@ function line(ctx: CanvasRenderingContext2D, x0: number, y0: number, x1: number,
   ctx.moveTo(x0, y0)
   ctx.lineTo(x1, y1)
   ctx.stroke()
-}
-
-function listen(
-  plot: uPlot,
-  frame: () => PlotFrame | null,
-  events: {
-    current: {
-      onStretch: (from: number, to: number) => void
-      onFollow: () => void
-      onCursor: (index: number, time: number) => void
-    }
-  },
-): () => void {
-  let dragged: number | null = null
-  const timeAt = (event: MouseEvent) =>
-    plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, 'x') +
-    (frame()?.origin ?? 0)
-  const wheel = (event: WheelEvent) => {
-    const now = frame()
-    if (!now) return
-    event.preventDefault()
-    const centre = timeAt(event)
-    const factor = event.deltaY > 0 ? WHEEL_ZOOM : 1 / WHEEL_ZOOM
-    events.current.onStretch(
-      centre - (centre - now.from) * factor,
-      centre + (now.to - centre) * factor,
-    )
-  }
-  const down = (event: PointerEvent) => {
-    const now = frame()
-    if (!now || now.cursors.length === 0) return
-    const x = event.clientX - plot.over.getBoundingClientRect().left
-    const distances = now.cursors.map((time) => Math.abs(plot.valToPos(time - now.origin, 'x') - x))
-    const nearest = distances.indexOf(Math.min(...distances))
-    dragged = nearest
-    plot.over.setPointerCapture(event.pointerId)
-    if ((distances[nearest] ?? 0) > GRAB_PX) events.current.onCursor(nearest, timeAt(event))
-  }
-  const move = (event: PointerEvent) => {
-    if (dragged !== null) events.current.onCursor(dragged, timeAt(event))
-  }
-  const up = () => {
-    dragged = null
-  }
-  const twice = () => events.current.onFollow()
-  plot.over.addEventListener('wheel', wheel, { passive: false })
-  plot.over.addEventListener('pointerdown', down)
-  plot.over.addEventListener('pointermove', move)
-  plot.over.addEventListener('pointerup', up)
-  plot.over.addEventListener('dblclick', twice)
-  return () => {
-    plot.over.removeEventListener('wheel', wheel)
-    plot.over.removeEventListener('pointerdown', down)
-    plot.over.removeEventListener('pointermove', move)
-    plot.over.removeEventListener('pointerup', up)
-    plot.over.removeEventListener('dblclick', twice)
-  }
 }

@@ -7,6 +7,7 @@ import * as live from '../../live/live'
 import { contents, useDrives, useLink, useRows } from '../../live/store'
 import type { ScopeFrame, ScopeView } from '../../live/worker-messages'
 import { type PlotHandle, TimePlot } from '../../plots/TimePlot'
+import type { Span } from '../../plots/yscale'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { offerDownload } from '../files/sets'
 import { ChannelPicker } from './ChannelPicker'
@@ -16,9 +17,18 @@ import { KeepPanel } from './KeepPanel'
 import { MathsPanel } from './MathsPanel'
 import { Measurements } from './Measurements'
 import type { PanelProps } from './panels'
+import { RangePanel } from './RangePanel'
 import { type Reference, referenceOverlays, sweepOverlays } from './references'
 import './scope.css'
-import { needsDrive, needsLevel, type Shown, triggerOf, withChannels } from './setup'
+import {
+  needsDrive,
+  needsLevel,
+  rangesOf,
+  type Shown,
+  triggerOf,
+  withChannels,
+  withRange,
+} from './setup'
 import { SpectrogramPanel } from './SpectrogramPanel'
 import { SpectrumPanel } from './SpectrumPanel'
 import { Toolbar } from './Toolbar'
@@ -69,6 +79,9 @@ export function ScopePage() {
   const tableAt = useRef(0)
   const tabs = useRef<HTMLDivElement>(null)
   const trigger = triggerOf(setup)
+  const ranges = rangesOf(setup)
+  const rescale = (unit: string, span: Span | null) => change(withRange(setup, unit, span))
+  const fit = () => change({ ...setup, ranges: [] })
   useSampling(setup, infos)
   useTrigger(setup, arming)
 
@@ -103,6 +116,7 @@ export function ScopePage() {
         ...sweepOverlays(frame.overlays, shown, colors),
         ...referenceOverlays(references, palette),
       ],
+      ranges,
     })
     if (frame.measurements !== null || (tab !== 'measure' && tableDue(tableAt.current, false))) {
       tableAt.current = performance.now()
@@ -114,7 +128,17 @@ export function ScopePage() {
   useFrames(
     view,
     frozen ? FROZEN_MS : FRAME_MS,
-    JSON.stringify([shown, frozen, setup.window_s, trigger, cursors, dark, tab, references.length]),
+    JSON.stringify([
+      shown,
+      frozen,
+      setup.window_s,
+      trigger,
+      cursors,
+      dark,
+      tab,
+      references.length,
+      setup.ranges,
+    ]),
     draw,
   )
 
@@ -180,6 +204,7 @@ export function ScopePage() {
         window_s={setup.window_s}
         frozen={frozen !== null}
         cursors={cursors.length > 0}
+        fixed={setup.ranges.length > 0}
         onPick={() => setPicking(true)}
         onRun={() => {
           if (frozen) follow()
@@ -188,6 +213,7 @@ export function ScopePage() {
         onWindow={(window_s) => changeFromNow({ ...setup, window_s })}
         onMove={move}
         onCursors={toggleCursors}
+        onFit={fit}
         onCsv={() => void csv()}
       />
       {problems.map((problem) => (
@@ -206,6 +232,7 @@ export function ScopePage() {
           onStretch={toStretch}
           onFollow={follow}
           onCursor={(index, time) => setCursors((old) => old.with(index, time))}
+          onRange={rescale}
         />
       )}
       <Cursors
@@ -213,6 +240,15 @@ export function ScopePage() {
         origin={frozen?.origin ?? 0}
         onCursor={(index, time) => setCursors((old) => old.with(index, time))}
       />
+      {shown.length > 0 && (
+        <RangePanel
+          units={[...new Set(shown.map(({ unit }) => unit))]}
+          ranges={ranges}
+          now={(unit) => plot.current?.range(unit) ?? null}
+          onRange={rescale}
+          onFit={fit}
+        />
+      )}
       <TriggerPanel
         choice={setup.trigger}
         shown={shown}

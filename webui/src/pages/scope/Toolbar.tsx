@@ -9,23 +9,28 @@ export function Toolbar({
   window_s,
   frozen,
   cursors,
+  fixed,
   onPick,
   onRun,
   onWindow,
   onMove,
   onCursors,
+  onFit,
   onCsv,
 }: {
   count: number
   window_s: number
   frozen: boolean
   cursors: boolean
+  /** Some y scale does not follow its traces. */
+  fixed: boolean
   onPick: () => void
   onRun: () => void
   onWindow: (seconds: number) => void
   /** Shift by a part of the width, and make the width so many times as large. */
   onMove: (part: number, factor: number) => void
   onCursors: () => void
+  onFit: () => void
   onCsv: () => void
 }) {
   const t = useT()
@@ -58,6 +63,7 @@ export function Toolbar({
       <Button aria-label={t('scope.zoomOut')} onClick={() => onMove(0, 2)}>
         −
       </Button>
+      {fixed && <Button onClick={onFit}>{t('scale.fit')}</Button>}
       <Button aria-pressed={cursors} onClick={onCursors}>
         {t('scope.cursors')}
       </Button>

@@ -2,11 +2,14 @@ import type { ScopeChannelInfo, ScopeMath, ScopeSetup, ScopeTrace } from '../../
 import { ExpressionError, parse } from '../../live/expression'
 import type { TriggerSettings } from '../../live/trigger'
 import type { ScopeConfig, ScopeSource, ScopeTrigger } from '../../live/worker-messages'
+import { type Span, sound } from '../../plots/yscale'
 import { STATUS_WORD, VELOCITY_ACTUAL } from '../../widgets/objects'
 import type { Channel } from './channels'
 
 export const GREATEST_CHANNELS = 16
 export const GREATEST_MATHS = 8
+/** Fixed scales that a set-up keeps, also of units that are not shown now. */
+const MOST_RANGES = 32
 /** Bit of the status word that is set in both fault states (CiA 402-2, table 29). */
 const FAULT_BIT = 3
 const HIDDEN = 't1'
@@ -27,6 +30,7 @@ export const EMPTY: ScopeSetup = {
   },
   window_s: 5,
   persistence: 0,
+  ranges: [],
 }
 
 /** The set-up that this browser used last; null when there is none. */
@@ -34,11 +38,18 @@ export function storedSetup(): ScopeSetup | null {
   try {
     const found = JSON.parse(localStorage.getItem(STORED) ?? 'null') as Partial<ScopeSetup> | null
     if (!found || !Array.isArray(found.traces) || !Array.isArray(found.maths)) return null
-    return { ...EMPTY, ...found, trigger: { ...EMPTY.trigger, ...found.trigger } }
+    return complete(found)
   } catch {
     return null
   }
 }
+
+/** A set-up that an earlier version kept, with what it did not know yet. */
+const complete = (kept: Partial<ScopeSetup>): ScopeSetup => ({
+  ...EMPTY,
+  ...kept,
+  trigger: { ...EMPTY.trigger, ...kept.trigger },
+})
 
 export const storeSetup = (setup: ScopeSetup) => localStorage.setItem(STORED, JSON.stringify(setup))
 
@@ -135,6 +146,17 @@ export function configOf(setup: ScopeSetup, infos: Infos): ScopeConfig {
     period: 0,
   }
 }
+
+/** The set-up with this y scale for a unit; null lets it follow the traces. */
+export function withRange(setup: ScopeSetup, unit: string, span: Span | null): ScopeSetup {
+  const others = setup.ranges.filter((each) => each.unit !== unit).slice(1 - MOST_RANGES)
+  if (!span) return { ...setup, ranges: others }
+  const { min, max } = sound(span)
+  return { ...setup, ranges: [...others, { unit, low: min, high: max }] }
+}
+
+export const rangesOf = (setup: ScopeSetup): Map<string, Span> =>
+  new Map(setup.ranges.map(({ unit, low, high }) => [unit, { min: low, max: high }]))
 
 export const needsDrive = (kind: string) => kind === 'fault' || kind === 'motion'
 export const needsLevel = (kind: string) =>

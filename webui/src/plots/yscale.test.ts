@@ -1,0 +1,38 @@
+import { describe, expect, it } from 'vitest'
+import { Extent, moved, sound, wheelFactor, withAir, zoomed } from './yscale'
+
+describe('y scales', () => {
+  it('show all that was seen with air, and are never of no height', () => {
+    const seen = new Extent()
+    expect(withAir(seen.span)).toEqual({ min: -1, max: 1 })
+    seen.see(0)
+    seen.see(100)
+    expect(withAir(seen.span)).toEqual({ min: -8, max: 108 })
+    const flat = new Extent()
+    flat.see(5)
+    expect(withAir(flat.span)).toEqual({ min: 4.5, max: 5.5 })
+  })
+
+  it('zoom about the pointer, which stays where it is', () => {
+    expect(zoomed({ min: 0, max: 100 }, 25, 0.5)).toEqual({ min: 12.5, max: 62.5 })
+    const near = zoomed({ min: -1, max: 1 }, 0.5, wheelFactor({ deltaX: 0, deltaY: -3 }))
+    expect((0.5 - near.min) / (near.max - near.min)).toBeCloseTo(0.75, 3)
+  })
+
+  it('turn the same way with Shift, where the wheel goes sideways', () => {
+    expect(wheelFactor({ deltaX: 120, deltaY: 0 })).toBe(wheelFactor({ deltaX: 0, deltaY: 120 }))
+  })
+
+  it('have round ends, at least a thousandth of their height fine', () => {
+    expect(sound({ min: -3.14159265, max: 2.71828182 })).toEqual({ min: -3.142, max: 2.718 })
+    expect(sound({ min: 123456.78, max: 123457.89 })).toEqual({ min: 123456.78, max: 123457.89 })
+    expect(moved({ min: 1, max: 2 }, -3)).toEqual({ min: -2, max: -1 })
+  })
+
+  it('keep some height however far they are zoomed', () => {
+    for (const at of [0, 1e6, -2e9]) {
+      const { min, max } = sound({ min: at, max: at })
+      expect(max).toBeGreaterThan(min)
+    }
+  })
+})
