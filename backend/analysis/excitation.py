@@ -65,7 +65,9 @@ class Excitation:
 
     @property
     def line_hz(self) -> FloatArray:
-        """Frequencies of the excited lines in Hz."""
+        """Frequencies of the excited lines, or of the tones, in Hz."""
+        if self.segments:
+            return np.array([segment.frequency_hz for segment in self.segments])
         if self.period_samples == 0:
             return np.empty(0)
         return self.lines * (self.sample_rate_hz / self.period_samples)
@@ -259,28 +261,82 @@ def multisine(
     if weights.shape != lines.shape or np.any(weights < 0) or not np.any(weights > 0):
         raise ValueError("one amplitude of at least 0 is needed for each line")
     period = _low_crest_period(period_samples, lines, weights, realisation, iterations)
+    return repeated(
+        period, kind="multisine", sample_rate_hz=sample_rate_hz, lines=lines, periods=periods,
+        transient_periods=transient_periods, realisation=realisation, base=base,
+        ramp_samples=ramp_samples, integrations=integrations, invert=invert,
+    )  # fmt: skip
+
+
+def repeated(
+    period: FloatArray,
+    *,
+    kind: Kind,
+    sample_rate_hz: float,
+    lines: IntArray,
+    periods: int = 3,
+    transient_periods: int = 1,
+    realisation: int = 0,
+    base: BaseMotion | None = None,
+    ramp_samples: int | None = None,
+    integrations: int = 0,
+    invert: bool = False,
+) -> Excitation:
+    """Any period, played again and again; ``lines`` are its bins that are evaluated.
+
+    Base motion, ramps and ``invert`` as for :func:`multisine`.
+    """
+    n = period.size
     if invert:
         period = -period
     base_line = 0
     if base is not None and base.amplitude > 0:
-        base_line = max(1, round(base.frequency_hz * period_samples / sample_rate_hz))
+        base_line = max(1, round(base.frequency_hz * n / sample_rate_hz))
         if base_line in lines:
             raise ValueError("the base motion lies on an excited line")
-        turn = 2 * np.pi * base_line * np.arange(period_samples) / period_samples
+        turn = 2 * np.pi * base_line * np.arange(n) / n
         period = period + base.amplitude * np.sin(turn)
-    ramp = period_samples // 2 if ramp_samples is None else ramp_samples
+    ramp = n // 2 if ramp_samples is None else ramp_samples
     return Excitation(
-        kind="multisine",
+        kind=kind,
         samples=_play_periodic(period, periods, ramp, integrations),
         sample_rate_hz=sample_rate_hz,
         first_sample=ramp,
-        period_samples=period_samples,
+        period_samples=n,
         periods=periods,
         transient_periods=transient_periods,
         lines=lines,
         base_line=base_line,
         realisation=realisation,
     )
+
+
+def chirp_period(
+    sample_rate_hz: float, period_samples: int, f_min_hz: float, f_max_hz: float, realisation: int
+) -> FloatArray:
+    """One period of a logarithmic chirp that is repeated without a pause.
+
+    Realisations differ in direction (up, down) and in where the period begins.
+    """
+    t = np.arange(period_samples) / sample_rate_hz
+    rate = np.log(f_max_hz / f_min_hz) * sample_rate_hz / period_samples
+    signal = np.sin(2 * np.pi * f_min_hz / rate * np.expm1(rate * t))
+    if realisation % 2:
+        signal = signal[::-1]
+    return np.asarray(np.roll(signal, (realisation // 2) * period_samples // 3))
+
+
+def band_limited(period: FloatArray, lines: IntArray, amplitude: FloatArray) -> FloatArray:
+    """A period without its bins below the first and above the last line, peak 1.
+
+    ``amplitude`` [len(lines)] weighs the rest, interpolated between the lines.
+    """
+    spectrum = np.fft.rfft(period)
+    bins = np.arange(spectrum.size)
+    weight = np.interp(bins, lines, amplitude)
+    spectrum *= np.where((bins >= lines[0]) & (bins <= lines[-1]), weight, 0.0)
+    signal = np.fft.irfft(spectrum, period.size)
+    return np.asarray(signal / np.max(np.abs(signal)), dtype=np.float64)
 
 
 def chirp(
@@ -322,6 +378,24 @@ _PRBS_TAPS: dict[int, tuple[int, ...]] = {
 }  # fmt: skip
 
 
+def prbs_period(order: int, samples_per_bit: int = 1, realisation: int = 0) -> FloatArray:
+    """One period of a maximum-length binary sequence without its mean, peak 1."""
+    if order not in _PRBS_TAPS:
+        raise ValueError(f"PRBS order {order} is outside 7 to 15")
+    length = 2**order - 1
+    state = 1 + (realisation * 7919) % length
+    bits = np.empty(length)
+    for i in range(length):
+        bits[i] = 1.0 if state & 1 else -1.0
+        feedback = 0
+        for tap in _PRBS_TAPS[order]:
+            feedback ^= state >> (order - tap)
+        state = (state >> 1) | ((feedback & 1) << (order - 1))
+    period = np.repeat(bits, samples_per_bit)
+    period -= np.mean(period)
+    return np.asarray(period / np.max(np.abs(period)))
+
+
 def prbs(
     *,
     sample_rate_hz: float,
@@ -340,22 +414,9 @@ def prbs(
     ``realisation`` picks the starting state, that is a cyclic shift. Lines are the bins between
     ``f_min_hz`` and ``f_max_hz`` (default 0.4 of the bit rate, where the power is half).
     """
-    if order not in _PRBS_TAPS:
-        raise ValueError(f"PRBS order {order} is outside 7 to 15")
     if periods <= transient_periods:
         raise ValueError(f"{periods} periods leave none after {transient_periods} of settling")
-    length = 2**order - 1
-    state = 1 + (realisation * 7919) % length
-    bits = np.empty(length)
-    for i in range(length):
-        bits[i] = 1.0 if state & 1 else -1.0
-        feedback = 0
-        for tap in _PRBS_TAPS[order]:
-            feedback ^= state >> (order - tap)
-        state = (state >> 1) | ((feedback & 1) << (order - 1))
-    period = np.repeat(bits, samples_per_bit)
-    period -= np.mean(period)
-    period /= np.max(np.abs(period))
+    period = prbs_period(order, samples_per_bit, realisation)
     resolution = sample_rate_hz / period.size
     upper = 0.4 * sample_rate_hz / samples_per_bit if f_max_hz is None else f_max_hz
     ramp = period.size // 2 if ramp_samples is None else ramp_samples
@@ -378,29 +439,36 @@ def stepped_sine(
     frequency_hz: FloatArray,
     settle_cycles: int = 5,
     measure_cycles: int = 10,
+    measure_s: float = 0.0,
     settle_s: float = 0.05,
     ramp_s: float = 0.02,
+    amplitude: FloatArray | None = None,
 ) -> Excitation:
     """One tone after another, each ramped in and out, for a closer look at a peak.
 
-    Every frequency is moved slightly so that ``measure_cycles`` (or a little more) fill a whole
-    number of samples; ``segments`` say which samples to evaluate.
+    Every frequency is moved slightly so that its cycles fill a whole number of samples:
+    ``measure_cycles``, or more where these take less than ``measure_s``. ``segments`` say which
+    samples to evaluate. ``amplitude`` weighs the tones; None is 1 for all.
     """
+    weights = np.ones(len(frequency_hz)) if amplitude is None else amplitude
     parts: list[FloatArray] = []
     segments: list[Segment] = []
     position = 0
-    for wanted in np.asarray(frequency_hz, dtype=np.float64):
+    tones = np.asarray(frequency_hz, dtype=np.float64)
+    for wanted, weight in zip(tones, weights, strict=True):
         if not 0 < wanted < sample_rate_hz / 2:
             raise ValueError(f"{wanted} Hz cannot be played at {sample_rate_hz} Hz")
-        measured = max(1, round(measure_cycles * sample_rate_hz / wanted))
-        actual = measure_cycles * sample_rate_hz / measured
+        # Even, so that each half has whole cycles, too.
+        cycles = max(measure_cycles, 2 * int(np.ceil(measure_s * wanted / 2.0)))
+        measured = max(1, round(cycles * sample_rate_hz / wanted))
+        actual = cycles * sample_rate_hz / measured
         settle = round(max(settle_cycles / wanted, settle_s) * sample_rate_hz)
         ramp = max(2, min(round(max(ramp_s, 1.0 / wanted) * sample_rate_hz), settle))
         n = settle + measured + ramp
-        tone = np.sin(2 * np.pi * actual * np.arange(n) / sample_rate_hz)
+        tone = weight * np.sin(2 * np.pi * actual * np.arange(n) / sample_rate_hz)
         tone[:ramp] *= _cosine_ramp(ramp)
         tone[-ramp:] *= _cosine_ramp(ramp)[::-1]
-        segments.append(Segment(actual, position + settle, measured, measure_cycles))
+        segments.append(Segment(actual, position + settle, measured, cycles))
         parts.append(tone)
         position += n
     if not parts:
@@ -409,6 +477,7 @@ def stepped_sine(
         kind="stepped_sine",
         samples=np.concatenate(parts),
         sample_rate_hz=sample_rate_hz,
+        lines=np.arange(len(segments)),
         segments=tuple(segments),
     )
 

@@ -23,7 +23,7 @@ from backend.analysis.arrays import (
     magnitude_db,
     phase_deg,
 )
-from backend.analysis.excitation import Excitation
+from backend.analysis.excitation import Excitation, Segment
 from backend.analysis.sampling import (
     DIRECT_SHARE,
     MODEL_SHARE,
@@ -142,6 +142,8 @@ def _good_periods(record: Record) -> tuple[list[int], int]:
     A gap spoils its own period; the one after it is kept, since the axis itself saw nothing.
     """
     e = record.excitation
+    if e.segments:
+        return _good_halves(record)
     numbers = range(e.transient_periods, e.periods)
     if record.valid is None:
         return list(numbers), 0
@@ -153,12 +155,50 @@ def _good_periods(record: Record) -> tuple[list[int], int]:
     return good, len(numbers) - len(good)
 
 
+def _good_halves(record: Record) -> tuple[list[int], int]:
+    """The two halves of all tones of a stepped sine count as two periods.
+
+    A gap in one tone spoils its half for all of them: a spectrum needs every line.
+    """
+    if record.valid is None:
+        return [0, 1], 0
+    valid = record.valid
+    spoiled = {
+        half
+        for segment in record.excitation.segments
+        for half in (0, 1)
+        if not np.all(valid[_half_of(segment, half)])
+    }
+    return [half for half in (0, 1) if half not in spoiled], len(spoiled)
+
+
+def _half_of(segment: Segment, half: int) -> slice:
+    length = segment.samples // 2
+    return slice(segment.start + half * length, segment.start + (half + 1) * length)
+
+
+def _tone_amplitudes(signal: FloatArray, e: Excitation, halves: list[int]) -> ComplexArray:
+    """Amplitudes [halves, tones] of a stepped sine, least squares beside mean and drift."""
+    found = np.zeros((len(halves), len(e.segments)), dtype=np.complex128)
+    for i, segment in enumerate(e.segments):
+        for j, half in enumerate(halves):
+            cut = _half_of(segment, half)
+            n = np.arange(cut.start, cut.stop)
+            turn = 2 * np.pi * segment.frequency_hz * n / e.sample_rate_hz
+            basis = np.column_stack([np.cos(turn), -np.sin(turn), np.ones(n.size), n - n.mean()])
+            c = np.linalg.lstsq(basis, signal[n], rcond=None)[0]
+            found[j, i] = c[0] + 1j * c[1]
+    return found
+
+
 def _period_spectra(signal: FloatArray, e: Excitation, periods: list[int]) -> ComplexArray:
     """Spectra [periods, lines], with the drift between the periods taken out.
 
     A drift of s per sample would leak onto every line; the difference of the means of two
     periods is exactly s·N for a periodic signal plus drift, whatever the signal is.
     """
+    if e.segments:
+        return _tone_amplitudes(signal, e, periods)
     n = e.period_samples
     blocks = np.array([signal[e.first_sample + p * n :][:n] for p in periods])
     if len(periods) > 1:
@@ -178,6 +218,8 @@ def _velocity_from_position(
     """
     if record.position is None:
         raise ValueError("the recording has no position")
+    if e.segments:
+        return _tone_amplitudes(record.position, e, periods) * (2j * np.pi * e.line_hz)
     n = e.period_samples
     curvature = 0.0
     if len(periods) > 1:
@@ -193,8 +235,8 @@ def _collect(
     records: tuple[Record, ...], path: SignalPath, quantity: Quantity, *, position: bool = False
 ) -> _Spectra:
     first = records[0].excitation
-    if first.period_samples == 0:
-        raise ValueError("period-synchronous estimation needs a periodic excitation")
+    if first.period_samples == 0 and not first.segments:
+        raise ValueError("period-synchronous estimation needs a periodic excitation, or tones")
     sent, response, torque, direction = [], [], [], []
     realisation: list[int] = []
     used = dropped = 0
@@ -223,7 +265,7 @@ def _collect(
         raise ValueError("every period has a gap; nothing is left to evaluate")
     return _Spectra(
         first.line_hz, first.lines, tuple(sent), tuple(response), tuple(torque),
-        tuple(direction), tuple(realisation), first.period_samples, used, dropped,
+        tuple(direction), tuple(realisation), first.period_samples or 2, used, dropped,
     )  # fmt: skip
 
 
@@ -494,17 +536,7 @@ def estimate_stepped(record: Record, path: SignalPath, quantity: Quantity) -> Fr
     own = np.zeros_like(record.response)
     if quantity == "torque_injection":
         own = _own_torque(record, path)
-    amplitudes = np.zeros((3, 2, f.size), dtype=np.complex128)
-    for i, segment in enumerate(e.segments):
-        half = segment.samples // 2
-        for j in range(2):
-            n = np.arange(segment.start + j * half, segment.start + (j + 1) * half)
-            turn = 2 * np.pi * segment.frequency_hz * n / path.sample_rate_hz
-            basis = np.column_stack([np.cos(turn), -np.sin(turn), np.ones(half), n - n.mean()])
-            for k, signal in enumerate((e.samples, record.response, own)):
-                c = np.linalg.lstsq(basis, signal[n], rcond=None)[0]
-                amplitudes[k, j, i] = c[0] + 1j * c[1]
-    r, y, t = amplitudes
+    r, y, t = (_tone_amplitudes(x, e, [0, 1]) for x in (e.samples, record.response, own))
     spectra = _Spectra(f, np.arange(f.size), (r,), (y,), (t,), (), (0,), 2, 2, 0)
     u = _continuous_input(spectra, path, quantity)[0]
     g = np.asarray(y.sum(axis=0) / u.sum(axis=0))

@@ -36,6 +36,11 @@ class SweepRequest(TuneLimits):
     share: float = Field(default=0.35, gt=0, le=0.9, description="of the permitted torque")
     realisations: int = Field(default=2, ge=1, le=8)
     base_motion: bool = True
+    excitation: Literal["multisine", "chirp", "prbs", "stepped"] = Field(
+        default="multisine",
+        description="a stepped sine is one tone after another, beside a closed loop, in one pair "
+        "of realisations; the others excite the whole band at once",
+    )
 
 
 class ExcitationInfo(Message):

@@ -109,6 +109,7 @@ def _sweep_settings(request: SweepRequest) -> sweep_evaluation.SweepSettings:
     return sweep_evaluation.SweepSettings(
         _envelope(request), request.kind, request.loop, request.f_min_hz, request.f_max_hz,
         request.share, request.realisations, request.base_motion, request.rated_torque_nm,
+        excitation=request.excitation,
     )  # fmt: skip
 
 

@@ -54,6 +54,15 @@ class LoopName(StrEnum):
     position = "position"
 
 
+class WaveformName(StrEnum):
+    """What the axis is moved with."""
+
+    multisine = "multisine"
+    chirp = "chirp"
+    prbs = "prbs"
+    stepped = "stepped"
+
+
 class SchemeName(StrEnum):
     """How the axis may travel."""
 
@@ -79,6 +88,7 @@ def sweep(
     f_max_hz: Annotated[float | None, typer.Option(help="highest line")] = None,
     share: Annotated[float, typer.Option(help="excitation's share of the torque")] = 0.35,
     realisations: Annotated[int, typer.Option(help="pairs of realisations")] = 2,
+    excitation: Annotated[WaveformName, typer.Option(help="signal")] = WaveformName.multisine,
     rated_torque_nm: Rated = None,
 ) -> None:
     """Measure a frequency response and write it as JSON. The axis moves."""
@@ -89,12 +99,14 @@ def sweep(
     more: dict[str, object] = {
         "kind": kind.value, "loop": loop.value, "f_min_hz": f_min_hz, "f_max_hz": f_max_hz,
         "share": share, "realisations": realisations, "rated_torque_nm": rated_torque_nm,
+        "excitation": excitation.value,
     }  # fmt: skip
 
     async def here() -> dict[str, object]:
         settings = sweep_evaluation.SweepSettings(
             Envelope(travel_rev, speed_rpm, torque_percent, 60.0), kind.value, loop.value,
             f_min_hz, f_max_hz, share, realisations, rated_torque_nm=rated_torque_nm,
+            excitation=excitation.value,
         )  # fmt: skip
         async with _session(url, station, profile, cycle_ms) as (found, session):
             return sweep_evaluation.as_json(

@@ -7,12 +7,14 @@ reference then makes the slow base motion that defeats stiction.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.excitation import BaseMotion, Excitation, choose_lines, multisine, scaled
+from backend.analysis.excitation import BaseMotion, Excitation, scaled
+from backend.tools.waveform import Band, Waveform, grid, periodic, stepped, tones_hz
 
 FloatArray = npt.NDArray[np.float64]
 TURN = 2.0 * np.pi
@@ -48,15 +50,6 @@ class Room:
 
 
 @dataclass(frozen=True)
-class Band:
-    """Which lines: lowest and highest frequency, at most how many."""
-
-    f_min_hz: float
-    f_max_hz: float
-    count: int = 200
-
-
-@dataclass(frozen=True)
 class Sequence:
     """One realisation. ``base`` [n] is the loop's reference (rad/s or rad), None without one."""
 
@@ -68,10 +61,6 @@ def band_for(sample_rate_hz: float, f_min_hz: float, f_max_hz: float | None) -> 
     """Lines up to 0.4 of the sample rate, and never above 1200 Hz unless asked for."""
     top = min(0.4 * sample_rate_hz, 1200.0) if f_max_hz is None else f_max_hz
     return Band(f_min_hz, min(top, 0.4 * sample_rate_hz), 200 if sample_rate_hz < 2000 else 300)
-
-
-def _lines(band: Band, period: int, rate: float) -> npt.NDArray[np.int64]:
-    return choose_lines(band.f_min_hz, band.f_max_hz, rate / period, count=band.count)
 
 
 def _speed_of(samples: npt.NDArray[np.floating], rate: float, inertia: float) -> FloatArray:
@@ -98,6 +87,7 @@ def torque_mode(
     share: float,
     realisations: int,
     base: bool = True,
+    waveform: Waveform = "multisine",
 ) -> tuple[Sequence, ...]:
     """Pairs of opposite sign on a freely turning axis without any loop.
 
@@ -107,19 +97,16 @@ def torque_mode(
     Raises:
         ValueError: the room does not suffice; the message says what is too small.
     """
-    period = round(_PERIOD_S * rate)
-    lines = _lines(band, period, rate)
-    slow = TURN * rate / period
+    if waveform == "stepped":
+        raise ValueError("a stepped sine lasts too long for an axis that no loop holds")
+    of = grid(waveform, rate, band)
+    slow = TURN * of.slow_hz
 
     # Inertia takes the answer down as frequency rises, but friction needs its share below.
-    shape = np.minimum(np.hypot(1.0, lines * rate / period / _RISE_HZ), _RISE_MOST)
+    shape = np.minimum(np.hypot(1.0, of.line_hz / _RISE_HZ), _RISE_MOST)
 
     def one(number: int, motion: BaseMotion | None) -> Excitation:
-        return multisine(
-            sample_rate_hz=rate, period_samples=period, lines=lines, realisation=number // 2,
-            invert=bool(number % 2), integrations=2, iterations=80, base=motion, amplitude=shape,
-            ramp_samples=period // 4,
-        )  # fmt: skip
+        return periodic(of, shape, number, base=motion, integrations=2, ramp_samples=of.period // 4)
 
     unit_speed = _speed_of(one(0, None).one_period, rate, rigid.inertia_kgm2)
     own_rms, own_peak = float(np.std(unit_speed)), float(np.max(np.abs(unit_speed)))
@@ -147,7 +134,7 @@ def torque_mode(
         raise ValueError(
             f"{room.torque_nm:.3g} Nm are too little to keep the axis moving against friction"
         )
-    motion = BaseMotion(base_nm / peak_nm, rate / period) if base_nm > 0 else None
+    motion = BaseMotion(base_nm / peak_nm, of.slow_hz) if base_nm > 0 else None
     shapes = [one(i, motion) for i in range(2 * realisations)]
     # The ramps carry the axis into its steady motion and may ask for more than a period does.
     highest = max(float(np.max(np.abs(e.samples))) for e in shapes)
@@ -165,26 +152,45 @@ def beside_loop(
     realisations: int,
     position: bool,
     base: bool = True,
+    waveform: Waveform = "multisine",
 ) -> tuple[Sequence, ...]:
     """Torque offsets beside a closed speed or position loop, which makes the base motion.
 
     Raises:
         ValueError: the room does not suffice.
     """
-    period = round(_PERIOD_S * rate)
-    lines = _lines(band, period, rate)
-    f = lines * rate / period
-    shape = f / np.hypot(f, _LOOP_CORNER_HZ)
-    reference = _slow_reference(rate, period, room, position) if base else None
+
+    def size(f: FloatArray) -> FloatArray:
+        return np.asarray(f / np.hypot(f, _LOOP_CORNER_HZ))
+
     sequences = []
-    for i in range(2 * realisations):
-        e = multisine(
-            sample_rate_hz=rate, period_samples=period, lines=lines, realisation=i // 2,
-            invert=bool(i % 2), amplitude=shape, iterations=80, ramp_samples=period // 8,
-        )  # fmt: skip
-        e = scaled(e, share * room.torque_nm, step_nm)
-        sequences.append(Sequence(e, _stretched(reference, e, period, position)))
+    for e, reference in _referenced(rate, band, room, size, realisations, position, base, waveform,
+                                    integrations=0):  # fmt: skip
+        sequences.append(Sequence(scaled(e, share * room.torque_nm, step_nm), reference))
     return tuple(sequences)
+
+
+def _referenced(
+    rate: float, band: Band, room: Room, size: Callable[[FloatArray], FloatArray],
+    realisations: int, position: bool, base: bool, waveform: Waveform, *, integrations: int,
+) -> Iterator[tuple[Excitation, FloatArray]]:  # fmt: skip
+    """Excitations of peak 1 with amplitudes ``size``, each with the loop's base motion.
+
+    A stepped sine is one pair: it is long, and its tones need no other phases.
+    """
+    of = grid("multisine" if waveform == "stepped" else waveform, rate, band)
+    reference = _slow_reference(rate, of.period, room, position) if base else None
+    if waveform == "stepped":
+        tones = tones_hz(band)
+        for invert in (False, True):
+            e = stepped(rate, tones, size(tones), invert=invert)
+            yield e, _stretched(reference, e, of.period // 8, position)
+        return
+    for i in range(2 * realisations):
+        e = periodic(of, size(of.line_hz), i, integrations=integrations,
+                     ramp_samples=of.period // 8)  # fmt: skip
+        fade = e.samples.size - (e.first_sample + e.periods * e.period_samples)
+        yield e, _stretched(reference, e, fade, position)
 
 
 def _slow_reference(rate: float, period: int, room: Room, position: bool) -> FloatArray:
@@ -202,14 +208,13 @@ def _slow_reference(rate: float, period: int, room: Room, position: bool) -> Flo
 
 
 def _stretched(
-    period_values: FloatArray | None, e: Excitation, period: int, position: bool
+    period_values: FloatArray | None, e: Excitation, fade: int, position: bool
 ) -> FloatArray:
-    """The base motion over the whole excitation, faded out at the end."""
+    """The base motion over the whole excitation, faded out over its last ``fade`` samples."""
     n = e.samples.size
     if period_values is None:
         return np.zeros(n)
-    values = np.tile(period_values, n // period + 1)[:n]
-    fade = n - (e.first_sample + e.periods * period)
+    values = np.tile(period_values, n // period_values.size + 1)[:n]
     if fade > 1 and not position:
         values[-fade:] *= 0.5 + 0.5 * np.cos(np.pi * np.arange(fade) / (fade - 1))
     elif fade > 1:
@@ -229,30 +234,26 @@ def loop_reference(
     realisations: int,
     position: bool,
     base: bool = True,
+    waveform: Waveform = "multisine",
 ) -> tuple[Sequence, ...]:
-    """A multisine on the reference of the closed loop itself, ``amplitude`` in rad/s or rad.
+    """An excitation on the reference of the closed loop itself, ``amplitude`` in rad/s or rad.
 
     Amplitudes fall with frequency so that the torque they ask for does not grow without end.
 
     Raises:
         ValueError: the room does not suffice.
     """
-    period = round(_PERIOD_S * rate)
-    lines = _lines(band, period, rate)
-    f = lines * rate / period
-    shape = 1.0 / np.hypot(1.0, f / (20.0 if position else 40.0))
-    reference = _slow_reference(rate, period, room, position) if base else None
-    sequences = []
-    for i in range(2 * realisations):
-        e = multisine(
-            sample_rate_hz=rate, period_samples=period, lines=lines, realisation=i // 2,
-            invert=bool(i % 2), amplitude=shape, integrations=0 if position else 1,
-            iterations=80, ramp_samples=period // 8,
-        )  # fmt: skip
-        sequences.append(
-            Sequence(scaled(e, amplitude, step), _stretched(reference, e, period, position))
+
+    def size(f: FloatArray) -> FloatArray:
+        return np.asarray(1.0 / np.hypot(1.0, f / (20.0 if position else 40.0)))
+
+    return tuple(
+        Sequence(scaled(e, amplitude, step), reference)
+        for e, reference in _referenced(
+            rate, band, room, size, realisations, position, base, waveform,
+            integrations=0 if position else 1,
         )
-    return tuple(sequences)
+    )  # fmt: skip
 
 
 def probe(rate: float, peak_nm: float, duration_s: float, step_nm: float) -> FloatArray:

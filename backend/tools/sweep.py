@@ -82,6 +82,8 @@ async def sweep(
     _check(settings)
     closed = settings.kind != "mechanics"
     loop = {"speed_loop": "speed", "position_loop": "position"}.get(settings.kind, settings.loop)
+    if settings.excitation == "stepped" and loop == "auto":
+        loop = "speed"
     facts = await read_facts(axis, settings.rated_torque_nm)
     home = await axis.position_raw()
     filters = await _filters_off(axis, settings)
@@ -126,6 +128,9 @@ def _check(settings: SweepSettings) -> None:
     if not 1 <= settings.realisations <= 8:
         raise OutOfRange("1 to 8 realisations are possible", value=settings.realisations,
                          limit="1…8")  # fmt: skip
+    if settings.excitation == "stepped" and settings.loop == "none":
+        raise OutOfRange("a stepped sine lasts too long for an axis that no loop holds",
+                         remedy="measure it with the speed loop closed")  # fmt: skip
     if settings.f_min_hz < 3.0:
         raise OutOfRange("the lowest line must lie above the base motion, at 3 Hz or more",
                          value=settings.f_min_hz, limit="3 Hz")  # fmt: skip
@@ -224,17 +229,18 @@ def _sequences(setup: _Setup, settings: SweepSettings) -> tuple[excite.Sequence,
             return excite.loop_reference(
                 setup.rate, band, setup.room, step, amplitude=amplitude,
                 realisations=settings.realisations, position=position, base=settings.base_motion,
+                waveform=settings.excitation,
             )  # fmt: skip
         if setup.loop == "none":
             return excite.torque_mode(
                 setup.rate, band, setup.room, setup.rigid, setup.torque_step_nm,
                 share=settings.share, realisations=settings.realisations,
-                base=settings.base_motion,
+                base=settings.base_motion, waveform=settings.excitation,
             )  # fmt: skip
         return excite.beside_loop(
             setup.rate, band, setup.room, setup.torque_step_nm, share=settings.share,
             realisations=settings.realisations, position=setup.loop == "position",
-            base=settings.base_motion,
+            base=settings.base_motion, waveform=settings.excitation,
         )  # fmt: skip
     except ValueError as error:
         raise OutOfRange(
@@ -371,7 +377,7 @@ def _raw(
                 "kind": e.kind, "first_sample": e.first_sample,
                 "period_samples": e.period_samples, "periods": e.periods,
                 "transient_periods": e.transient_periods, "base_line": e.base_line,
-                "realisation": e.realisation,
+                "realisation": e.realisation, "segments": [asdict(tone) for tone in e.segments],
             }
         )  # fmt: skip
     return arrays, {

@@ -20,6 +20,7 @@ from backend.axis import Envelope
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.recording import Recording
+from backend.tools.waveform import Waveform
 
 Kind = Literal["mechanics", "speed_loop", "position_loop"]
 Loop = Literal["auto", "none", "speed", "position"]
@@ -36,8 +37,9 @@ class SweepSettings:
     """What to measure and within which limits.
 
     ``loop`` is the loop that is closed while mechanics are measured; *auto* takes none on an
-    axis that turns freely and the speed loop otherwise. ``share`` is the excitation's share of
-    the envelope's torque. ``rated_torque_nm`` overrides what the drive says.
+    axis that turns freely and the speed loop otherwise; a stepped sine always takes a loop, for
+    it lasts too long for an axis that drifts. ``share`` is the excitation's share of the
+    envelope's torque. ``rated_torque_nm`` overrides what the drive says.
     """
 
     envelope: Envelope
@@ -53,6 +55,7 @@ class SweepSettings:
     notches_off: bool = True
     hold: Hold | None = None
     """How the drive holds set-points between cycles; None asks the drive, or the recording."""
+    excitation: Waveform = "multisine"
 
 
 @dataclass(frozen=True)
@@ -157,12 +160,17 @@ def _found_path(records: tuple[Record, ...], path: SignalPath, closed: bool) -> 
         if r.torque is None:
             continue
         last = e.first_sample + (e.periods - 1) * e.period_samples
-        cut = slice(last, last + e.period_samples)
+        cut, bins = slice(last, last + e.period_samples), e.lines
+        if e.segments:
+            # From rest to rest: the whole of it is one period of a longer signal.
+            cut = slice(0, e.samples.size)
+            ends_hz = e.line_hz[[0, -1]] * (e.samples.size / e.sample_rate_hz)
+            bins = np.arange(round(ends_hz[0]), round(ends_hz[1]), dtype=np.int64)
         if r.valid is not None and not np.all(r.valid[cut]):
             continue
         commands.append(e.samples[cut])
         torques.append(r.torque[cut])
-        lines.append(e.lines)
+        lines.append(bins)
     if not commands:
         return path
     return fit_path(
@@ -230,9 +238,10 @@ def resonance_table(
             rows.append(Resonance("resonance", mode.frequency_hz, mode.damping, height))
     kept = [row.frequency_hz for row in rows]
     for frequency, damping in model.antiresonances():
-        # An antiresonance belongs to a resonance above it, which may lie beyond the band.
-        above = any(f > frequency for f in kept) or frequency > 0.25 * highest_hz
-        if not above or not lines_hz[0] < frequency <= highest_hz:
+        # An antiresonance belongs to the next mode above it, which may lie beyond the band.
+        above = min((m.frequency_hz for m in model.modes if m.frequency_hz > frequency), default=0)
+        known = above in kept or above > highest_hz or (not above and frequency > 0.25 * highest_hz)
+        if not known or not lines_hz[0] < frequency <= highest_hz:
             continue
         around = np.array([frequency * 0.5, frequency, frequency * 2.0])
         db = 20 * np.log10(np.abs(model.response(around)))
@@ -315,11 +324,14 @@ def _reevaluate(arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, obje
     settings = SweepSettings(**{**given, "envelope": Envelope(**given["envelope"])})
     records = []
     for number, part in enumerate(structure):
+        tones = tuple(signals.Segment(**tone) for tone in part.get("segments", ()))
+        plain = {name: value for name, value in part.items() if name != "segments"}
         excitation = signals.Excitation(
             samples=np.asarray(arrays[f"{number}/excitation"], np.float64),
             sample_rate_hz=rate,
             lines=np.asarray(arrays[f"{number}/lines"], np.int64),
-            **part,
+            segments=tones,
+            **plain,
         )
         columns = {
             name: np.asarray(arrays[f"{number}/{name}"], np.float64)

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.excitation import crest_factor
+from backend.analysis.excitation import Excitation, crest_factor
 from backend.axis import Axis
 from backend.tools import excite
 from backend.tools.axis_facts import read_facts
 from backend.tools.sweep_evaluation import SweepSettings
+from backend.tools.waveform import Band
 from drivers.errors import OutOfRange
 
 _TURN = 2 * np.pi
@@ -79,25 +80,27 @@ _SHOWN = {"speed_loop": ("rpm", 60.0 / _TURN), "position_loop": ("rev", 1.0 / _T
 
 
 def _sequences(
-    settings: SweepSettings, rate: float, band: excite.Band, room: excite.Room, inertia: float
+    settings: SweepSettings, rate: float, band: Band, room: excite.Room, inertia: float
 ) -> tuple[excite.Sequence, ...]:
     """As the tool makes them, with what is known before the axis was felt."""
-    if settings.kind == "mechanics" and settings.loop in ("auto", "none"):
+    waveform = settings.excitation
+    if settings.kind == "mechanics" and settings.loop in ("auto", "none") and waveform != "stepped":
         return excite.torque_mode(
             rate, band, room, excite.Rigid(inertia), 0.0, share=settings.share,
-            realisations=settings.realisations, base=settings.base_motion,
+            realisations=settings.realisations, base=settings.base_motion, waveform=waveform,
         )  # fmt: skip
     position = "position" in (settings.loop, settings.kind.removesuffix("_loop"))
     if settings.kind == "mechanics":
         return excite.beside_loop(
             rate, band, room, 0.0, share=settings.share, realisations=settings.realisations,
-            position=position, base=settings.base_motion,
+            position=position, base=settings.base_motion, waveform=waveform,
         )  # fmt: skip
     corner = _TURN * (20.0 if position else 40.0)
     speed = min(0.15 * room.speed_rad_s, room.torque_nm / 8.0 / inertia / corner, 8.0)
     return excite.loop_reference(
         rate, band, room, 0.0, amplitude=speed / corner if position else speed,
         realisations=settings.realisations, position=position, base=settings.base_motion,
+        waveform=waveform,
     )  # fmt: skip
 
 
@@ -108,19 +111,29 @@ def _seen(
     samples = np.asarray(e.samples * factor, np.float64)
     time = np.arange(samples.size) / e.sample_rate_hz
     chosen = _extremes(samples, _POINTS)
-    spectrum = 2.0 * np.abs(np.fft.rfft(e.one_period * factor)) / e.period_samples
+    if e.segments:
+        crest, amplitude = crest_factor(e.samples), _tone_peaks(samples, e)
+    else:
+        crest = crest_factor(e.one_period)
+        spectrum = 2.0 * np.abs(np.fft.rfft(e.one_period * factor)) / e.period_samples
+        amplitude = spectrum[e.lines]
     return Preview(
         unit=unit,
         time_s=time[chosen],
         value=samples[chosen],
-        frequency_hz=np.asarray(e.lines * e.sample_rate_hz / e.period_samples, np.float64),
-        amplitude=np.asarray(spectrum[e.lines]),
+        frequency_hz=np.asarray(e.line_hz, np.float64),
+        amplitude=np.asarray(amplitude),
         peak=float(np.max(np.abs(samples))),
-        crest=crest_factor(e.one_period),
+        crest=crest,
         duration_s=float(sum(s.excitation.duration_s for s in sequences)),
         realisations=len(sequences),
         inertia_kgm2=inertia,
     )
+
+
+def _tone_peaks(samples: npt.NDArray[np.float64], e: Excitation) -> npt.NDArray[np.float64]:
+    """Amplitude of each tone of a stepped sine."""
+    return np.array([np.max(np.abs(samples[s.start : s.start + s.samples])) for s in e.segments])
 
 
 def _extremes(samples: npt.NDArray[np.float64], points: int) -> npt.NDArray[np.int64]:

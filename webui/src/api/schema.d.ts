@@ -7095,6 +7095,13 @@ export interface components {
              * @default 1
              */
             cycle_ms: number;
+            /**
+             * Excitation
+             * @description a stepped sine is one tone after another, beside a closed loop, in one pair of realisations; the others excite the whole band at once
+             * @default multisine
+             * @enum {string}
+             */
+            excitation: "multisine" | "chirp" | "prbs" | "stepped";
             /** F Max Hz */
             f_max_hz?: number | null;
             /**

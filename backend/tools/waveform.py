@@ -1,0 +1,139 @@
+"""The four kinds of excitation as the tools play them: multisine, chirp, PRBS, stepped sine.
+
+The first three fill a period that is repeated, so that one way of evaluating serves them all
+(Pintelon & Schoukens, *System Identification*, 2012, section 5.3: periodic chirp, maximum-length
+sequences). The stepped sine plays one tone after the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis.excitation import (
+    BaseMotion,
+    Excitation,
+    band_limited,
+    chirp_period,
+    choose_lines,
+    multisine,
+    prbs_period,
+    repeated,
+    stepped_sine,
+)
+
+Waveform = Literal["multisine", "chirp", "prbs", "stepped"]
+FloatArray = npt.NDArray[np.float64]
+
+_PERIOD_S = 0.65
+#: Registers that `prbs_period` knows.
+_ORDERS = range(7, 16)
+#: A stepped sine has at most this many tones, and fewer where they would take longer than this.
+_MOST_TONES, _FEWEST_TONES, _STEPPED_S = 40, 14, 9.0
+_CYCLES, _SETTLE_CYCLES, _SETTLE_S, _MEASURE_S, _TONE_RAMP_S = 4, 2, 0.03, 0.08, 0.02
+
+
+@dataclass(frozen=True)
+class Band:
+    """Which lines: lowest and highest frequency, at most how many."""
+
+    f_min_hz: float
+    f_max_hz: float
+    count: int = 200
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Samples of one period and the bins that are evaluated."""
+
+    waveform: Waveform
+    rate_hz: float
+    period: int
+    lines: npt.NDArray[np.int64]
+
+    @property
+    def line_hz(self) -> FloatArray:
+        """Frequencies of the lines."""
+        return np.asarray(self.lines * (self.rate_hz / self.period))
+
+    @property
+    def slow_hz(self) -> float:
+        """Frequency of the base motion: one turn per period."""
+        return self.rate_hz / self.period
+
+
+def grid(waveform: Waveform, rate_hz: float, band: Band) -> Grid:
+    """Period and lines of a waveform; a PRBS has one bit per cycle of the bus.
+
+    Raises:
+        ValueError: no line lies in the band.
+    """
+    period = round(_PERIOD_S * rate_hz)
+    if waveform == "prbs":
+        order = int(np.clip(np.log2(period + 1), _ORDERS[0], _ORDERS[-1]))
+        period = 2**order - 1
+    lines = choose_lines(band.f_min_hz, band.f_max_hz, rate_hz / period, count=band.count)
+    # Its own bin carries the base motion.
+    return Grid(waveform, rate_hz, period, lines[lines > 1])
+
+
+def periodic(
+    of: Grid,
+    amplitude: FloatArray,
+    number: int,
+    *,
+    base: BaseMotion | None = None,
+    integrations: int = 0,
+    ramp_samples: int,
+) -> Excitation:
+    """Realisation ``number`` with these weights of the lines: pairs of opposite sign."""
+    realisation, invert = number // 2, bool(number % 2)
+    if of.waveform == "multisine":
+        return multisine(
+            sample_rate_hz=of.rate_hz, period_samples=of.period, lines=of.lines,
+            realisation=realisation, invert=invert, integrations=integrations, iterations=80,
+            base=base, amplitude=amplitude, ramp_samples=ramp_samples,
+        )  # fmt: skip
+    if of.waveform == "prbs":
+        order = int(np.log2(of.period + 1))
+        raw = prbs_period(order, 1, realisation)
+    else:
+        hz = of.line_hz
+        raw = chirp_period(of.rate_hz, of.period, float(hz[0]), float(hz[-1]), realisation)
+    return repeated(
+        band_limited(raw, of.lines, amplitude), kind="prbs" if of.waveform == "prbs" else "chirp",
+        sample_rate_hz=of.rate_hz, lines=of.lines, realisation=realisation, base=base,
+        ramp_samples=ramp_samples, integrations=integrations, invert=invert,
+    )  # fmt: skip
+
+
+def tones_hz(band: Band) -> FloatArray:
+    """Tones of a stepped sine: evenly spread over the octaves, as many as the time allows.
+
+    Raises:
+        ValueError: even the fewest take too long.
+    """
+    for count in range(_MOST_TONES, _FEWEST_TONES - 1, -1):
+        tones = np.geomspace(band.f_min_hz, band.f_max_hz, count)
+        settle = np.maximum(_SETTLE_CYCLES / tones, _SETTLE_S)
+        measure = np.maximum(_CYCLES / tones, _MEASURE_S)
+        if float(np.sum(settle + measure + np.maximum(_TONE_RAMP_S, 1.0 / tones))) <= _STEPPED_S:
+            return np.asarray(tones)
+    raise ValueError(
+        f"a stepped sine from {band.f_min_hz:g} Hz takes too long; begin at a higher frequency"
+    )
+
+
+def stepped(
+    rate_hz: float, tones: FloatArray, amplitude: FloatArray, *, invert: bool
+) -> Excitation:
+    """A stepped sine, or its mirror image; peak of the largest tone 1."""
+    sign = -1.0 if invert else 1.0
+    return stepped_sine(
+        sample_rate_hz=rate_hz, frequency_hz=tones, settle_cycles=_SETTLE_CYCLES,
+        measure_cycles=_CYCLES, measure_s=_MEASURE_S, settle_s=_SETTLE_S, ramp_s=_TONE_RAMP_S,
+        amplitude=np.asarray(sign * amplitude / np.max(np.abs(amplitude))),
+    )  # fmt: skip
