@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import sys
 import tempfile
 from collections.abc import Awaitable, Callable
@@ -25,7 +26,10 @@ from drivers.urls import parse_url
 from drivers.virtual.mechanics.spec import load_mechanics, standard_mechanics
 
 app = typer.Typer(
-    help="Servo-drive commissioning in a browser.", no_args_is_help=True, add_completion=False
+    help="Servo-drive commissioning in a browser.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
 )
 app.add_typer(params.app, name="params")
 app.add_typer(profile.app, name="profile")
@@ -208,5 +212,13 @@ def scan(
 
 
 def main() -> None:
-    """Entry point."""
-    app()
+    """Entry point. A defect of the program itself ends it with exit code 70, in one sentence."""
+    try:
+        app()
+    except Exception as error:
+        if os.environ.get("SERVODECK_TRACEBACK"):
+            raise
+        print(f"error: this is a defect of servodeck: {error!r}", file=sys.stderr)
+        print("try:   run it again with SERVODECK_TRACEBACK=1 and report what it prints",
+              file=sys.stderr)  # fmt: skip
+        raise SystemExit(70) from error

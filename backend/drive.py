@@ -389,10 +389,6 @@ class Drive:
             )
         if isinstance(raw, str):
             return raw
-        try:
-            encode(parameter.type, raw)
-        except OutOfRange as error:
-            raise self._named(error, parameter) from error
         low, high = parameter.raw_limits
         if (low is not None and raw < low) or (high is not None and raw > high):
             limits = f"{_shown(parameter, low)} to {_shown(parameter, high)}"
@@ -404,6 +400,10 @@ class Drive:
                 limit=limits,
                 remedy=f"choose a value from {limits}",
             )
+        try:
+            encode(parameter.type, raw)
+        except OutOfRange as error:
+            raise self._named(error, parameter) from error
         if parameter.enum and not parameter.bits and int(raw) not in parameter.enum:
             choices = ", ".join(f"{code} ({text})" for code, text in parameter.enum.items())
             raise OutOfRange(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import tempfile
@@ -42,6 +43,8 @@ def write_atomically(path: Path, data: bytes) -> None:
         StorageFailed: disk full, no permission; the old file stays.
     """
     try:
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         path.parent.mkdir(parents=True, exist_ok=True)
         handle = tempfile.NamedTemporaryFile(  # noqa: SIM115 - renamed, not deleted, at the end
             dir=path.parent, prefix=f".{path.name}.", delete=False
@@ -62,7 +65,7 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 def _failed(path: Path, error: OSError) -> StorageFailed:
     return StorageFailed(
-        f"{path.name} could not be written: {error.strerror or error}",
+        f"{path.name or path} could not be written: {error.strerror or error}",
         value=str(path),
         remedy="free some space or choose another folder; the old file is unharmed",
     )

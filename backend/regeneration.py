@@ -10,6 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from drivers.errors import OutOfRange
+
 
 @dataclass(frozen=True, slots=True)
 class BrakingCycle:
@@ -80,7 +82,19 @@ def braking(cycle: BrakingCycle, limits: BrakingLimits) -> BrakingResult:
     """Energy and power of a cycle against the limits of the drive.
 
     The greatest resistance still passes the peak power at the threshold voltage, V²/R ≥ P.
+
+    Raises:
+        OutOfRange: the stops take longer than the cycle in which they are said to happen.
     """
+    stopping_s = cycle.deceleration_s * cycle.stops_per_cycle
+    if not stopping_s <= cycle.cycle_s:
+        raise OutOfRange(
+            f"{cycle.stops_per_cycle:g} stops of {cycle.deceleration_s:g} s do not fit into a "
+            f"cycle of {cycle.cycle_s:g} s",
+            value=stopping_s,
+            limit=f"{cycle.cycle_s:g} s",
+            remedy="give the time of one stop, and of the whole cycle with its pauses",
+        )
     speed = cycle.speed_rpm * math.tau / 60.0
     kinetic = 0.5 * cycle.inertia_kgm2 * speed**2
     returned = kinetic * cycle.efficiency

@@ -19,6 +19,10 @@ def size_of(data_type: DataType) -> int | None:
     return struct.calcsize(form) if form else None
 
 
+#: The largest REAL32 (IEEE 754 binary32); integers have at most 64 bits.
+_LARGEST = 3.4028234663852886e38
+
+
 def encode(data_type: DataType, raw: Raw) -> bytes:
     """Raw value to bytes.
 
@@ -27,8 +31,10 @@ def encode(data_type: DataType, raw: Raw) -> bytes:
     """
     if data_type in ("STRING", "OCTETS"):
         return raw.encode("utf-8") if isinstance(raw, str) else bytes([int(raw)])
-    if isinstance(raw, (str, bool)) and data_type != "BOOL":
+    if isinstance(raw, str) or (isinstance(raw, bool) and data_type != "BOOL"):
         raise OutOfRange(f"{raw!r} is not a {data_type} number", value=raw)
+    if not abs(raw) <= _LARGEST:  # not so for nan either
+        raise OutOfRange(f"{raw} is no number of {data_type}", value=raw)
     if data_type == "REAL32":
         return struct.pack("<f", float(raw))
     if float(raw) != int(raw):

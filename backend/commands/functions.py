@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict
 from typing import Annotated, Literal
 
@@ -122,7 +123,9 @@ def gear_command(
     except ValidationError as error:
         first = error.errors()[0]
         raise OutOfRange(
-            f"{first['loc'][0]}: {first['msg']}", remedy="see servodeck gear --help"
+            f"{first['loc'][0]} is {first['input']}: {first['msg']}",
+            value=first["input"],
+            remedy="see servodeck gear --help",
         ) from error
     if station is None:
         _show(plan_gear(load_profile(drive), mechanics, None))
@@ -183,7 +186,10 @@ def braking(
         limits = BrakingLimits(
             row.capacitor_j or 0.0, built_in, row.min_external_ohm, row.max_external_w, voltage
         )
-    if min(inertia, speed, time, cycle, stops) <= 0:
-        raise OutOfRange("all quantities must be greater than 0", remedy="correct the numbers")
+    given = {"inertia": inertia, "speed": speed, "time": time, "cycle": cycle, "stops": stops}
+    for name, number in (given | ({} if voltage is None else {"voltage": voltage})).items():
+        if not 0 < number < math.inf:
+            raise OutOfRange(f"--{name} is {number:g}", value=number, limit="greater than 0",
+                             remedy="give a number greater than 0")  # fmt: skip
     result = braking_of(BrakingCycle(inertia, speed, time, cycle, stops), limits)
     print(json.dumps(asdict(result), indent=1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -228,16 +229,23 @@ def _assignment(drive: Drive, text: str) -> tuple[Parameter, Raw]:
     try:
         number: Raw = int(value, 0)
     except ValueError:
-        try:
-            number = float(value)
-        except ValueError as error:
-            raise NotAllowed(
-                f"{parameter.key} {parameter.name}: {value!r} is not a number",
-                parameter=parameter.key,
-                value=value,
-                remedy="give a number; hexadecimal with 0x",
-            ) from error
+        number = _finite(parameter, value)
     return parameter, number
+
+
+def _finite(parameter: Parameter, text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise NotAllowed(
+            f"{parameter.key} {parameter.name}: {text!r} is not a number",
+            parameter=parameter.key,
+            value=text,
+            remedy="give a number; hexadecimal with 0x",
+        )
+    return number
 
 
 def _line(parameter: Parameter, reading: Reading) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 import functools
 import sys
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from typing import ParamSpec, TypeVar
 
 import typer
@@ -17,41 +17,50 @@ from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link, NeedsProfile
 from drivers.urls import link_for
 from profiles import load_profile
+from profiles.loader import ProfileError
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 
+@contextmanager
+def reported() -> Iterator[None]:
+    """What a user can mend becomes one readable message and exit code 1."""
+    try:
+        yield
+    except DriveError as error:
+        raise _told(error.message, error.remedy) from error
+    except ProfileError as error:
+        raise _told(str(error), "see `servodeck profile check`") from error
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        raise _told(f"{place}{error.strerror or error}", None) from error
+
+
+def _told(message: str, remedy: str | None) -> typer.Exit:
+    print(f"error: {message}", file=sys.stderr)
+    if remedy:
+        print(f"try:   {remedy}", file=sys.stderr)
+    return typer.Exit(1)
+
+
 def run(work: Callable[[], Awaitable[T]]) -> T:
-    """Run a command; errors about drives become one readable message and exit code 1."""
+    """Run a command; see `reported`."""
 
     async def body() -> T:
         return await work()
 
-    try:
+    with reported():
         return asyncio.run(body())
-    except DriveError as error:
-        print(f"error: {error.message}", file=sys.stderr)
-        if error.remedy:
-            print(f"try:   {error.remedy}", file=sys.stderr)
-        raise typer.Exit(1) from error
 
 
 def told(command: Callable[P, T]) -> Callable[P, T]:
-    """A command whose errors become one readable message and exit code 1."""
+    """A command whose errors are `reported`."""
 
     @functools.wraps(command)
     def body(*arguments: P.args, **named: P.kwargs) -> T:
-        try:
+        with reported():
             return command(*arguments, **named)
-        except DriveError as error:
-            print(f"error: {error.message}", file=sys.stderr)
-            if error.remedy:
-                print(f"try:   {error.remedy}", file=sys.stderr)
-            raise typer.Exit(1) from error
-        except OSError as error:
-            print(f"error: {error.filename or ''}: {error.strerror}", file=sys.stderr)
-            raise typer.Exit(1) from error
 
     return body
 

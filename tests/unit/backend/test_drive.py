@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from backend.drive import Drive
@@ -35,7 +37,8 @@ async def test_write_in_engineering_units(drive: Drive, link: MemoryLink) -> Non
         ("2005:10", 2, OutOfRange, ["0 (manual), 1 (table)"]),
         ("2005:10", 1.5, OutOfRange, ["whole number"]),
         ("2005:10", "fast", OutOfRange, ["not a UINT16"]),
-        ("2100:00", 40000, OutOfRange, ["INT16"]),
+        ("2100:00", 40000, OutOfRange, ["40000 is outside -32768 to 32767"]),
+        ("2100:00", math.nan, OutOfRange, ["2100:00", "nan"]),
         ("PA_38", 1, NotAllowed, ["only over Modbus"]),
         ("9999:00", 1, NotAllowed, ["no parameter 9999:00"]),
     ],

@@ -35,3 +35,8 @@ def test_unwritable_folder_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(StorageFailed):
         write_atomically(tmp_path / "file" / "a", b"x")
+
+
+def test_a_folder_is_not_taken_for_a_file(tmp_path: Path) -> None:
+    with pytest.raises(StorageFailed, match="could not be written: Is a directory"):
+        write_atomically(tmp_path, b"x")

@@ -13,6 +13,7 @@ from backend.regeneration import (
     braking,
     capacitor_energy,
 )
+from drivers.errors import OutOfRange
 
 #: The manual's example: 500 g·cm², load nine times that, 3000 rpm, one cycle a second.
 EXAMPLE = BrakingCycle(inertia_kgm2=10 * 500e-7, speed_rpm=3000, deceleration_s=0.1, cycle_s=1)
@@ -83,3 +84,9 @@ def test_capacitor_energy() -> None:
     # 1000 µF from 311 V to 380 V.
     assert capacitor_energy(1e-3, 380, 311) == pytest.approx(0.5e-3 * (380**2 - 311**2))
     assert capacitor_energy(1e-3, 300, 311) == 0
+
+
+def test_stops_longer_than_their_cycle_are_refused() -> None:
+    absurd = BrakingCycle(EXAMPLE.inertia_kgm2, 3000, deceleration_s=2, cycle_s=1)
+    with pytest.raises(OutOfRange, match="2 stops of 2 s do not fit into a cycle of 1 s"):
+        braking(absurd, BrakingLimits())

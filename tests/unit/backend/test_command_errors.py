@@ -1,0 +1,87 @@
+"""What a command says when something is wrong: one sentence, one remedy, never a traceback."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from backend import cli
+from backend.commands import session
+from backend.commands.params import _assignment
+from backend.drive import Drive
+from drivers.errors import NotAllowed
+from tests.support.memory_link import MemoryLink
+
+
+@pytest.fixture
+def bus(monkeypatch: pytest.MonkeyPatch, link: MemoryLink) -> MemoryLink:
+    monkeypatch.setattr(session, "link_for", lambda _url: link)
+    return link
+
+
+def test_an_unknown_profile_is_told_with_those_that_there_are(bus: MemoryLink) -> None:
+    done = CliRunner().invoke(
+        cli.app, ["params", "get", "mlink:///x", "6041:00", "--profile", "mms8"]
+    )
+    assert done.exit_code == 1
+    assert "error: no profile named 'mms8'; there are: ds_c" in done.stderr
+    assert "try:" in done.stderr
+    assert isinstance(done.exception, SystemExit)
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "-inf", "1e400", "five"])
+def test_what_is_no_number_is_refused_before_the_bus(drive: Drive, text: str) -> None:
+    with pytest.raises(NotAllowed, match=f"2005:03 .*: '{text}' is not a number"):
+        _assignment(drive, f"2005:03={text}")
+
+
+def test_a_file_that_cannot_be_opened_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(typer.Exit) as ended, session.reported():
+        (tmp_path / "none" / "x").write_bytes(b"")
+    assert ended.value.exit_code == 1
+    assert capsys.readouterr().err == f"error: {tmp_path}/none/x: No such file or directory\n"
+
+
+def test_a_defect_of_the_program_is_one_sentence_and_its_own_exit_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken() -> None:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(cli, "app", broken)
+    monkeypatch.delenv("SERVODECK_TRACEBACK", raising=False)
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == 70
+    said = capsys.readouterr().err
+    assert "ZeroDivisionError('division by zero')" in said
+    assert "SERVODECK_TRACEBACK=1" in said
+    assert "Traceback" not in said
+    monkeypatch.setenv("SERVODECK_TRACEBACK", "1")
+    with pytest.raises(ZeroDivisionError):
+        cli.main()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--inertia", "nan", "--cycle", "1"], "--inertia is nan"),
+        (["--inertia", "1e-4", "--cycle", "-1"], "--cycle is -1"),
+        (["--inertia", "1e-4", "--cycle", "1", "--voltage", "0"], "--voltage is 0"),
+    ],
+)
+def test_braking_needs_numbers_of_a_machine(arguments: list[str], says: str) -> None:
+    done = CliRunner().invoke(cli.app, ["braking", "--speed", "3000", "--time", "0.1", *arguments])
+    assert (done.exit_code, done.stdout) == (1, "")
+    assert says in done.stderr
+
+
+def test_a_wrong_dimension_is_named_with_its_value() -> None:
+    done = CliRunner().invoke(cli.app, ["gear", "mms7", "--kind", "screw", "--lead", "-1"])
+    assert done.exit_code == 1
+    assert "lead_mm is -1.0: Input should be greater than" in done.stderr
