@@ -39,16 +39,19 @@ TRAILER = struct.Struct("<8sQ")
 TRAILER_MAGIC = b"SDRECEND"
 FRAME = struct.Struct("<4sB3xII")
 _MARKER = b"CHNK"
+#: What the CRC covers before the payload: kind and length.
+_CHECKED = struct.Struct("<B3xI")
 #: stream, rows, columns, flags, sequence, lost samples before this block, t0, dt
 BLOCK = struct.Struct("<HHIIIIdd")
 _TIMES, _VALID = 1, 2
+Part = bytes | memoryview
 #: No chunk is larger; a length beyond it is damage, not data.
 MAX_PAYLOAD = 1 << 28
 
 
 def frame(kind: int, payload: bytes) -> bytes:
     """A chunk."""
-    head = struct.pack("<B3xI", kind, len(payload))
+    head = _CHECKED.pack(kind, len(payload))
     return FRAME.pack(_MARKER, kind, len(payload), zlib.crc32(payload, zlib.crc32(head))) + payload
 
 
@@ -69,7 +72,7 @@ def frame_head(data: bytes) -> tuple[int, int, int] | None:
 
 def intact(kind: int, payload: bytes, crc: int) -> bool:
     """Whether a chunk's CRC agrees."""
-    head = struct.pack("<B3xI", kind, len(payload))
+    head = _CHECKED.pack(kind, len(payload))
     return zlib.crc32(payload, zlib.crc32(head)) == crc
 
 
@@ -87,22 +90,36 @@ class Samples:
 
 def samples_chunk(stream: int, block: ScopeBlock) -> bytes:
     """A block as a chunk; every value is kept as the 64-bit number that it is."""
+    return b"".join(samples_parts(stream, block))
+
+
+def samples_parts(stream: int, block: ScopeBlock) -> list[Part]:
+    """The same in pieces, without a copy of the samples: one after the other they are the chunk."""
     rows, columns = block.samples.shape
     flags = (_TIMES if block.times_s is not None else 0) | (
         _VALID if block.valid is not None else 0
     )
-    parts = [
+    parts: list[Part] = [
         BLOCK.pack(
             stream, flags, rows, columns, block.sequence & 0xFFFFFFFF, block.dropped,
             block.t0_s, block.dt_s,
         )
     ]  # fmt: skip
     if block.times_s is not None:
-        parts.append(np.ascontiguousarray(block.times_s, dtype="<f8").tobytes())
+        parts.append(_raw(np.ascontiguousarray(block.times_s, dtype="<f8")))
     if block.valid is not None:
-        parts.append(np.ascontiguousarray(block.valid, dtype="u1").tobytes())
-    parts.append(np.ascontiguousarray(block.samples, dtype="<f8").tobytes())
-    return frame(SAMPLES, b"".join(parts))
+        parts.append(_raw(np.ascontiguousarray(block.valid, dtype="u1")))
+    parts.append(_raw(np.ascontiguousarray(block.samples, dtype="<f8")))
+    length = sum(map(len, parts))
+    crc = zlib.crc32(_CHECKED.pack(SAMPLES, length))
+    for part in parts:
+        crc = zlib.crc32(part, crc)
+    return [FRAME.pack(_MARKER, SAMPLES, length, crc), *parts]
+
+
+def _raw(array: npt.NDArray[np.float64] | npt.NDArray[np.uint8]) -> memoryview:
+    """The bytes of a contiguous array."""
+    return array.reshape(-1).view(np.uint8).data
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import threading
@@ -20,8 +21,13 @@ from drivers.link import ScopeBlock
 MAX_QUEUED_BYTES = 64 * 1024 * 1024
 #: What was recorded is on the disk at least this often, so that also a power cut loses no more.
 SYNC_S = 0.5
+#: Chunks of one write: each is at most five pieces, and the system takes 1024 (IOV_MAX).
+_WRITE_ITEMS = 200
 #: A recording ends while this much is still free, so that the rest of the system lives on.
 RESERVE_BYTES = 200 * 1024 * 1024
+
+
+_Item = tuple[int, ScopeBlock] | bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +70,7 @@ class RecordingWriter:
         self._limit = max_queued_bytes
         self._reserve = reserve_bytes
         self._free = free
-        self._queue: deque[tuple[int, ScopeBlock] | bytes] = deque()
+        self._queue: deque[_Item] = deque()
         self._queued = 0
         self._wake = threading.Condition()
         self._closing: dict[str, object] | None = None
@@ -104,7 +110,7 @@ class RecordingWriter:
             raise self._error
         return self._written
 
-    def _add(self, item: tuple[int, ScopeBlock] | bytes, size: int) -> None:
+    def _add(self, item: _Item, size: int) -> None:
         with self._wake:
             if self._error is not None or self._closing is not None:
                 return
@@ -167,16 +173,22 @@ class RecordingWriter:
         finally:
             self._file.close()
 
-    def _append(self, items: list[tuple[int, ScopeBlock] | bytes]) -> None:
+    def _append(self, items: list[_Item]) -> None:
+        for start in range(0, len(items), _WRITE_ITEMS):
+            self._append_together(items[start : start + _WRITE_ITEMS])
+
+    def _append_together(self, items: list[_Item]) -> None:
+        """Whole chunks in one call: all of them are on the disk then, or none counts."""
         now = self._written
         samples, blocks, lost = now.samples, now.blocks, now.lost
-        first, last, data = now.first_s, now.last_s, []
+        first, last = now.first_s, now.last_s
+        parts: list[chunks.Part] = []
         for item in items:
             if isinstance(item, bytes):
-                data.append(item)
+                parts.append(item)
                 continue
             stream, block = item
-            data.append(chunks.samples_chunk(stream, block))
+            parts += chunks.samples_parts(stream, block)
             rows = len(block.samples)
             samples, blocks, lost = samples + rows, blocks + 1, lost + block.dropped
             if rows:
@@ -184,10 +196,7 @@ class RecordingWriter:
                 end = float(block.times_s[-1]) if block.times_s is not None else end
                 first = block.t0_s if first is None else min(first, block.t0_s)
                 last = end if last is None else max(last, end)
-        if data:
-            whole = b"".join(data)
-            _write(self._file, whole)
-            self._good += len(whole)
+        self._good += _write_parts(self._file, parts)
         self._written = Written(samples, blocks, self._good, lost, first, last)
 
     def _end(self, content: dict[str, object]) -> None:
@@ -207,8 +216,10 @@ class RecordingWriter:
             os.lseek(self._file.fileno(), self._good, os.SEEK_SET)
             self._end({"reason": "failed", "problem": error.message})
         except OSError:
-            # A full disk takes no end chunk either; the reader does without.
-            os.ftruncate(self._file.fileno(), self._good)
+            # A full disk takes no end chunk either, and one that is gone takes nothing: the
+            # reader does without, and finds the last whole chunk by itself.
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file.fileno(), self._good)
         self._failed(error)
 
     def _check_space(self) -> None:
@@ -238,6 +249,14 @@ def end_summary(written: Written) -> dict[str, object]:
         "first_s": written.first_s,
         "last_s": written.last_s,
     }
+
+
+def _write_parts(file: BinaryIO, parts: list[chunks.Part]) -> int:
+    """All of them; returns their bytes."""
+    size = sum(map(len, parts))
+    if parts and (done := os.writev(file.fileno(), parts)) < size:
+        _write(file, b"".join(parts)[done:])
+    return size
 
 
 def _write(file: BinaryIO, data: bytes) -> None:

@@ -20,6 +20,7 @@ SETUP: dict[str, Any] = {
                 "high": 2, "bit": 0, "before": 0.5},
     "window_s": 0.2,
     "persistence": 10,
+    "ranges": [{"unit": "mm/s", "low": -2.5, "high": 2.5}],
 }  # fmt: skip
 
 
@@ -57,6 +58,7 @@ def test_setups_are_kept_under_their_names(station: Station) -> None:
         ("/scope/setups/.hidden", SETUP),
         ("/scope/setups/a", SETUP | {"window_s": 0}),
         ("/scope/setups/a", SETUP | {"traces": [SETUP["traces"][0] | {"id": "z; drop"}]}),
+        ("/scope/setups/a", SETUP | {"ranges": [{"unit": "mm/s", "low": 1, "high": 1}]}),
         ("/scope/setups/a", SETUP | {"more": 1}),
         ("/scope/setups/a", SETUP | {"maths": SETUP["maths"] * 17}),
     ],

@@ -44,6 +44,9 @@ export function useTrigger(setup: ScopeSetup, arming: number): void {
   }, [JSON.stringify(trigger), arming])
 }
 
+/** Part of the period that a page rests after a picture, however long that took. */
+const LEAST_REST = 0.25
+
 /** Asks the worker for a picture every `period` ms, and at once when the view changes. */
 export function useFrames(
   view: () => ScopeView | null,
@@ -57,14 +60,17 @@ export function useFrames(
     let alive = true
     let timer: ReturnType<typeof setTimeout> | undefined
     const round = async () => {
+      const began = performance.now()
       const wanted = latest.current.view()
       if (wanted) {
         const frame = await live.askScope('view', wanted)
         if (!alive) return
         latest.current.onFrame(frame)
       }
-      // One picture at a time: a slow page asks less often instead of falling behind.
-      if (alive) timer = setTimeout(() => requestAnimationFrame(() => void round()), period)
+      // One picture at a time, with a rest between: a slow page asks less often instead of
+      // falling behind, and is always free to hear STOP.
+      const rest = Math.max(period * LEAST_REST, period - (performance.now() - began))
+      if (alive) timer = setTimeout(() => requestAnimationFrame(() => void round()), rest)
     }
     void round()
     return () => {
