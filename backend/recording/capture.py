@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import re
 import time
 from collections import deque
@@ -19,7 +20,8 @@ from backend.drive import Reading
 from backend.files import StorageFailed, checked_name
 from backend.monitor import Snapshot
 from backend.recording import facts
-from backend.recording.bundle import Evidence, Value, build
+from backend.recording.bundle import build_apart
+from backend.recording.evidence import Evidence, Value
 from backend.recording.recorder import describe_streams
 from backend.recording.writer import RESERVE_BYTES, free_bytes
 from backend.scope import Subscription
@@ -36,6 +38,8 @@ LOG_ENTRIES = 500
 #: A fault that comes and goes makes one bundle in this time.
 PAUSE_S = 30.0
 KEEP_BUNDLES = 50
+#: How often a bundle that the disk did not take is tried again.
+AGAIN_S = 20.0
 #: A drive with a fault may answer slowly; then the values known before are taken.
 READ_TIMEOUT_S = 10.0
 
@@ -70,6 +74,7 @@ class FaultCapture:
         self._pending: list[str] = []
         self._told: dict[tuple[str, str], float] = {}
         self._task: asyncio.Task[None] | None = None
+        self._held: asyncio.Task[None] | None = None
         bench.on_snapshot.append(self._snapshot)
         bench.on_readings.append(self._readings)
         bench.on_drives.append(self._drives)
@@ -81,6 +86,8 @@ class FaultCapture:
         self._bench.on_drives.remove(self._drives)
         if self._task is not None:
             await asyncio.wait([self._task], timeout=READ_TIMEOUT_S)
+        if self._held is not None:
+            self._held.cancel()
         for drive in list(self._taps):
             self._untap(drive)
 
@@ -168,12 +175,35 @@ class FaultCapture:
             when = time.time()
 
     async def _keep(self, reason: str, when: float) -> None:
+        evidence = await self._evidence(reason, when)
         try:
-            name = await self.bundle(reason, when=when)
+            name = await self._write(evidence)
         except (DriveError, OSError) as error:
             self._bench.journal.add(f"no support bundle for {reason}: {error}", level="error")
+            self._hold(evidence)
             return
         self._bench.journal.add(f"{reason}: the last seconds are kept in {name}", level="warning")
+
+    def _hold(self, evidence: Evidence) -> None:
+        """Keep what could not be written until it can be. The first cause stays, later ones go:
+        they are in the log, and memory is not for all of them.
+        """
+        if self._held is not None and not self._held.done():
+            return
+        self._bench.journal.add(
+            f"{evidence.reason}: the last seconds are held in memory until the disk takes them",
+            level="warning",
+        )
+        self._held = asyncio.create_task(self._until_written(evidence), name="fault-held")
+
+    async def _until_written(self, evidence: Evidence) -> None:
+        while True:
+            await asyncio.sleep(AGAIN_S)
+            with contextlib.suppress(DriveError, OSError):
+                name = await self._write(evidence)
+                text = f"{evidence.reason}: what was held in memory is kept in {name}"
+                self._bench.journal.add(text, level="warning")
+                return
 
     # --- bundles ----------------------------------------------------------------------
 
@@ -183,7 +213,9 @@ class FaultCapture:
         Raises:
             StorageFailed: no space.
         """
-        when = time.time() if when is None else when
+        return await self._write(await self._evidence(reason, when or time.time()))
+
+    async def _write(self, evidence: Evidence) -> str:
         self.folder.mkdir(parents=True, exist_ok=True)
         free = free_bytes(self.folder)
         if free < RESERVE_BYTES:
@@ -191,9 +223,8 @@ class FaultCapture:
                 f"the disk is nearly full, {free >> 20} MiB are left", value=free,
                 limit=f"{RESERVE_BYTES >> 20} MiB stay free", remedy="delete old recordings",
             )  # fmt: skip
-        evidence = await self._evidence(reason, when)
-        path = self._path_for(reason, when)
-        await asyncio.to_thread(build, evidence, path)
+        path = self._path_for(evidence.reason, evidence.time)
+        await build_apart(evidence, path)
         for old in self.names()[KEEP_BUNDLES:]:
             self.path(old).unlink(missing_ok=True)
         return path.name
@@ -222,7 +253,18 @@ class FaultCapture:
             streams=describe_streams(self._bench, [(True, tap.channels) for tap in taps]),
             blocks=[(taps.index(tap), block) for tap, block in blocks if tap in taps],
             clock=clock,
+            names=self._names(values),
         )
+
+    def _names(self, values: list[Value]) -> dict[tuple[str, str], str]:
+        """What the values are, for those who read the page without the station."""
+        names = {}
+        for drive_id, key in {(v.drive, v.key) for v in values}:
+            if (member := self._bench.members.get(drive_id)) is not None:
+                parameter = member.drive.parameter(key)
+                unit = f" [{parameter.unit}]" if parameter.unit else ""
+                names[drive_id, key] = f"{member.drive.name} {parameter.name}{unit}"
+        return names
 
     def _known(self, tap: _Tap) -> bool:
         return all(drive in self._bench.members for drive, _ in tap.channels)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import os
 import sys
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -21,6 +22,8 @@ import numpy as np
 from backend.recording.reader import Channel, RecordingReader
 from backend.recording.table import merged
 
+#: The process writes text for seconds; the bus and the pages go first.
+NICE = 10
 Progress = Callable[[float], None]
 
 
@@ -155,6 +158,7 @@ def to_rrd(reader: RecordingReader, path: Path, progress: Progress) -> None:
 
 def main() -> int:
     """The process."""
+    os.nice(NICE)
     source, target, kind = sys.argv[1:4]
     last = -1.0
 

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from backend.journal import Entry
-from backend.recording.bundle import PLOT_HEIGHT, Evidence, Value, build, curve
+from backend.journal import Entry, Journal
+from backend.recording import capture
+from backend.recording.bundle import build_apart
+from backend.recording.bundle_page import PLOT_HEIGHT, curve
+from backend.recording.evidence import Evidence, Value
 from backend.recording.reader import RecordingReader
 from backend.recording.recorder import Trigger, fires
 from tests.unit.recording.support import block, header
@@ -71,12 +77,17 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
         axes=[axis],
         links=[{"drive": "x0", "timeouts": 3}],
         log=[Entry(1_700_000_000.0, "error", "x0", "", "it broke")],
-        history=[Value(1_700_000_000.0, "x0", "6041:00", 0x218)],
+        history=[
+            Value(1_700_000_000.0, "x0", "6041:00", 0x218),
+            *(Value(1_700_000_000.0 + n, "x0", "6079:00", 310.0 + n) for n in range(3)),
+            *(Value(1_700_000_000.0 + n, "x0", "2001:00", 7) for n in range(3)),
+        ],
         streams=head["streams"],
         blocks=[(0, block(n)) for n in range(3)],
         clock=head["clock"],
+        names={("x0", "6079:00"): "X0 DC voltage [V]"},
     )
-    build(evidence, tmp_path / "b.zip")
+    asyncio.run(build_apart(evidence, tmp_path / "b.zip"))
     assert [p.name for p in tmp_path.iterdir()] == ["b.zip"], "no leftovers"
     with zipfile.ZipFile(tmp_path / "b.zip") as archive:
         archive.extract("samples.sdrec", tmp_path)
@@ -87,8 +98,41 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
             "2023-11-14T22:13:20.000+00:00,x0,6041:00,536" in archive.read("history.csv").decode()
         )
         assert "2002:01,Gain,20" in archive.read("parameters/x0.csv").decode()
-    assert page.count("<polyline") == 2
+    # Two channels of every cycle, and of what was read one by one that which changed.
+    assert page.count("<polyline") == 3
+    assert "<h3>X0 DC voltage [V]</h3>" in page
+    assert "310 … 312, 2.000 s" in page
     assert len(table) == 31
     with RecordingReader(tmp_path / "samples.sdrec") as reader:
         for n, each in enumerate(reader.blocks()):
             assert np.array_equal(each.values, block(n).samples)
+
+
+def test_what_a_full_disk_does_not_take_is_held_until_it_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = Journal()
+    bench: Any = SimpleNamespace(
+        journal=journal, members={}, on_snapshot=[], on_readings=[], on_drives=[]
+    )
+    free = [0]
+    monkeypatch.setattr(capture, "free_bytes", lambda _folder: free[0])
+    monkeypatch.setattr(capture, "AGAIN_S", 0.01)
+
+    async def play() -> None:
+        armed = capture.FaultCapture(bench, tmp_path / "bundles", lambda _drive, _text: None)
+        await armed._keep("X: 0x3210", 1_700_000_000.0)
+        await armed._keep("X: 0x7300", 1_700_000_001.0)
+        await asyncio.sleep(0.05)
+        assert armed.names() == []
+        free[0] = 1 << 40
+        async with asyncio.timeout(5):
+            while not armed.names():
+                await asyncio.sleep(0.01)  # noqa: ASYNC110 - a file has no event
+        await armed.close()
+        assert armed.names() == ["2023-11-14 22-13-20 X 0x3210.zip"], "the first cause"
+
+    asyncio.run(play())
+    told = [entry.text for entry in journal.entries()]
+    assert sum("no support bundle" in text for text in told) == 2
+    assert any("what was held in memory is kept in" in text for text in told)
