@@ -122,12 +122,18 @@ class FaultCapture:
             tap.subscription.leave()
 
     def _take(self, tap: _Tap, block: ScopeBlock) -> None:
-        now = time.monotonic()
-        self._blocks.append((now, tap, block))
+        self._blocks.append((time.monotonic(), tap, block))
         self._block_bytes += block.samples.nbytes
-        oldest = now - BEFORE_S - AFTER_S
+        self._forget_old()
+
+    def _forget_old(self) -> None:
+        """What an exchange brought that ended long ago is no evidence of anything new."""
+        oldest = time.monotonic() - BEFORE_S - AFTER_S
         while self._blocks and (self._blocks[0][0] < oldest or self._block_bytes > MAX_BLOCK_BYTES):
             self._block_bytes -= self._blocks.popleft()[2].samples.nbytes
+        oldest = time.time() - BEFORE_S - AFTER_S
+        while self._values and self._values[0].time < oldest:
+            self._values.popleft()
 
     def _readings(self, drive: str, readings: list[Reading]) -> None:
         now = time.time()
@@ -137,8 +143,7 @@ class FaultCapture:
                 continue
             value = reading.value.hex() if isinstance(reading.value, bytes) else reading.value
             self._values.append(Value(reading.time, drive, reading.key, value))
-        while self._values and self._values[0].time < now - BEFORE_S - AFTER_S:
-            self._values.popleft()
+        self._forget_old()
 
     # --- faults -----------------------------------------------------------------------
 
@@ -231,6 +236,7 @@ class FaultCapture:
 
     async def _evidence(self, reason: str, when: float) -> Evidence:
         # The rings go on; what matters is taken before the slow reading of parameters.
+        self._forget_old()
         blocks, values = [(tap, b) for _, tap, b in self._blocks], list(self._values)
         members = list(self._bench.members.values())
         states = [facts.state(member) for member in members]

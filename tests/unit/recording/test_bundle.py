@@ -108,6 +108,26 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
             assert np.array_equal(each.values, block(n).samples)
 
 
+def test_what_came_long_ago_is_no_evidence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench: Any = SimpleNamespace(
+        journal=Journal(), members={}, on_snapshot=[], on_readings=[], on_drives=[]
+    )
+    reading: Any = SimpleNamespace(time=1000.0, key="6079:00", value=310.0)
+    clock = SimpleNamespace(time=lambda: 1000.5, monotonic=lambda: 50.0)
+    monkeypatch.setattr(capture, "time", clock)
+
+    async def play() -> list[int]:
+        armed = capture.FaultCapture(bench, tmp_path, lambda _drive, _text: None)
+        armed._readings("x", [reading])
+        seen = []
+        for after_s in (0.0, 11.0, 13.0):
+            clock.time = lambda after_s=after_s: 1000.5 + after_s
+            seen.append(len((await armed._evidence("why", 1000.0)).history))
+        return seen
+
+    assert asyncio.run(play()) == [1, 1, 0]
+
+
 def test_what_a_full_disk_does_not_take_is_held_until_it_does(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -127,8 +147,8 @@ def test_what_a_full_disk_does_not_take_is_held_until_it_does(
         assert armed.names() == []
         free[0] = 1 << 40
         async with asyncio.timeout(5):
-            while not armed.names():
-                await asyncio.sleep(0.01)  # noqa: ASYNC110 - a file has no event
+            while not armed.names():  # noqa: ASYNC110 - a file has no event
+                await asyncio.sleep(0.01)
         await armed.close()
         assert armed.names() == ["2023-11-14 22-13-20 X 0x3210.zip"], "the first cause"
 
