@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 
@@ -45,7 +46,7 @@ async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException
     """Restore; what failed before is told as well, it may be an inner restore."""
     name = drive.name
     try:
-        await shielded(lambda: _restore(drive, before), CLEANUP_TIMEOUT_S, name)
+        await _to_its_end(lambda: _restore(drive, before), CLEANUP_TIMEOUT_S, name)
     except DriveError as error:
         if not isinstance(error, RestoreFailed):
             values = ", ".join(f"{key} (was {raw})" for key, raw in before.items())
@@ -54,9 +55,7 @@ async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException
                 drive=name,
                 remedy="compare these values before the next motion",
             )
-        if isinstance(earlier, DriveError):
-            error.message = f"{earlier.message}; {error.message}"
-            error.args = (error.message,)
+        _tell_first(earlier, error)
         raise error from earlier
 
 
@@ -81,12 +80,34 @@ async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
         )
 
 
+def _tell_first(earlier: BaseException | None, late: DriveError) -> None:
+    """A cleanup that fails must not hide why it was due: that comes first in its words."""
+    if not isinstance(earlier, DriveError) or earlier is late:
+        return
+    late.message = f"{earlier.message}; {late.message}"
+    late.args = (late.message,)
+    late.remedy = "; ".join(dict.fromkeys(r for r in (earlier.remedy, late.remedy) if r)) or None
+
+
 async def shielded(cleanup: Callable[[], Awaitable[None]], timeout_s: float, drive: str) -> None:
     """Run a cleanup to its end even when the surrounding task is cancelled again.
 
+    Where it is run because something failed (from ``finally`` or ``except``), an error of its own
+    tells of that first.
+
     Raises:
         LinkTimeout: the cleanup itself took longer than ``timeout_s``.
+        DriveError: the cleanup failed.
     """
+    earlier = sys.exception()
+    try:
+        await _to_its_end(cleanup, timeout_s, drive)
+    except DriveError as late:
+        _tell_first(earlier, late)
+        raise
+
+
+async def _to_its_end(cleanup: Callable[[], Awaitable[None]], timeout_s: float, drive: str) -> None:
 
     async def bounded() -> None:
         try:

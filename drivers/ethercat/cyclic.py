@@ -215,11 +215,8 @@ class CyclicLoop:
             if not ready:
                 # Tells SOEM to give the frame up; it returns at once.
                 self._master.receive_processdata(0)
-                self._segment.gave_up()
                 return -1
         wkc: int = self._master.receive_processdata(_RECEIVE_US)
-        if wkc >= 0:
-            self._segment.came_back()
         return wkc
 
     def _count_invalid(self, wkc: int) -> None:

@@ -1,8 +1,8 @@
-"""Runs transactions step by step: one frame at a time, stations in turn.
+"""Runs transactions step by step: one frame at a time, with the next step of every station.
 
 Every station has a lane for its mailbox and one for its registers. A lane runs one transaction
 at a time, different lanes interleave, so that a slow drive does not hold up a fast one, and
-process data go out between any two frames.
+process data go out between any two frames. What several lanes have to ask goes in one frame.
 
 Within a lane a write goes before reads that wait, and between two objects of a batch. A stop goes
 before everything: what is under way is suspended in the middle, after at most `GRACE_S`, and
@@ -13,14 +13,15 @@ from __future__ import annotations
 
 import struct
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, Literal, Protocol
 
 from drivers.errors import DriveError, LinkLost, ProtocolError
 from drivers.ethercat.coe import stopped_first
-from drivers.ethercat.mailbox import Gap, Pause, Read, Steps
+from drivers.ethercat.frames import ROOM_BYTES, Request, bytes_of
+from drivers.ethercat.mailbox import Gap, Pause, Read, Step, Steps, Write
 
 GRACE_S = 0.01
 """How long a stop lets the answer under way come: most drives need 1 to 5 ms."""
@@ -31,15 +32,10 @@ Done = Callable[[Any, DriveError | None], None]
 
 
 class Wire(Protocol):
-    """One frame each, station counted from 1."""
+    """One frame for several accesses."""
 
-    def read(
-        self, station: int, register: int, size: int, *, may_be_empty: bool = False
-    ) -> bytes | None:
-        """Bytes; None when nobody answered, or when the frame was lost if it ``may_be_empty``."""
-
-    def write(self, station: int, register: int, data: bytes) -> bool:
-        """Whether somebody took it."""
+    def exchange(self, requests: Sequence[Request]) -> list[bytes | None]:
+        """As `drivers.ethercat.frames.answers`; all None for a lost frame."""
 
 
 class Urgency(IntEnum):
@@ -69,6 +65,8 @@ class _Lane:
     """The most urgent first, each kind in its order."""
     running: list[_Job] = field(default_factory=list)
     """The last one runs; those before it are suspended."""
+    widest: int = 0
+    """Most bytes that one access took of a frame."""
 
     def choose(self, now: float) -> _Job | None:
         """What runs now: what waits may go before what runs."""
@@ -146,16 +144,38 @@ class Lanes:
         return min(due, default=None)
 
     def step(self) -> bool:
-        """Do one frame of the next lane that is due. False when none is."""
+        """Do the next access of every lane that is due, in one frame. False when none is.
+
+        A lane that may not fit any more is the first of the next frame.
+        """
         now = self._clock()
-        # Twice round: a lane that ends without a frame may have the next one waiting.
-        for _ in range(2 * len(self._order)):
+        frame: list[tuple[_Job, Request]] = []
+        room = ROOM_BYTES
+        for _ in range(len(self._order)):
             lane = self._order[0]
+            if frame and lane.widest > room:
+                break
             self._order.rotate(-1)
-            job = lane.choose(now)
-            if job is not None and job.wake_s <= now and self._advance(lane, job):
-                return True
-        return False
+            taken = self._next_access(lane, now)
+            if taken is None:
+                continue
+            size = bytes_of(taken[1][1])
+            lane.widest = max(lane.widest, size)
+            if size > room:
+                # Never kept for later: a stop might come in between.
+                self._send(frame)
+                frame, room = [], ROOM_BYTES
+            frame.append(taken)
+            room -= size
+        if frame:
+            self._send(frame)
+        return bool(frame)
+
+    def _send(self, frame: Sequence[tuple[_Job, Request]]) -> None:
+        self.frames += 1
+        replies = self._wire.exchange([request for _, request in frame])
+        for (job, _), reply in zip(frame, replies, strict=True):
+            job.reply = reply
 
     def drop(self, why: str) -> None:
         """End everything that runs or waits with an error."""
@@ -168,37 +188,36 @@ class Lanes:
             for job in jobs:
                 job.done(None, LinkLost(why, remedy="it is tried again by itself; or scan again"))
 
-    def _advance(self, lane: _Lane, job: _Job) -> bool:
-        """Run a transaction up to its next frame; True when a frame went out."""
+    def _next_access(self, lane: _Lane, now: float) -> tuple[_Job, Request] | None:
+        """Run a lane up to its next access; None where it has none now."""
+        while (job := lane.choose(now)) is not None and job.wake_s <= now:
+            step = self._advance(lane, job)
+            if isinstance(step, Read | Write):
+                return job, (lane.station, step)
+            if isinstance(step, Pause):
+                return None
+        return None
+
+    def _advance(self, lane: _Lane, job: _Job) -> Step | None:
+        """The next step of a transaction; None when it has ended."""
         try:
             step = job.steps.send(job.reply)
         except StopIteration as stop:
             lane.running.remove(job)
             job.done(stop.value, None)
-            return False
+            return None
         except DriveError as error:
             lane.running.remove(job)
             job.done(None, error)
-            return False
+            return None
         except (struct.error, ValueError, IndexError) as error:
             # Whatever a slave sends, the process that moves axes goes on.
             lane.running.remove(job)
             told = ProtocolError(f"the drive sent something that cannot be read ({error})")
             job.done(None, told)
-            return False
+            return None
         job.calm = isinstance(step, Gap)
         job.wake_s, job.reply = 0.0, b""
-        if isinstance(step, Gap):
-            return False
         if isinstance(step, Pause):
             job.wake_s = self._clock() + step.seconds
-            return False
-        self.frames += 1
-        if isinstance(step, Read):
-            job.reply = self._wire.read(
-                lane.station, step.register, step.size, may_be_empty=step.may_be_empty
-            )
-        else:
-            taken = self._wire.write(lane.station, step.register, step.data)
-            job.reply = b"" if taken else None
-        return True
+        return step

@@ -81,11 +81,14 @@ class Operations:
     def use_spare_time(self) -> None:
         """Mailbox frames between two cycles; now and then one although there is no time."""
         loop = self.loop
-        if loop is None or self.segment.pausing():
+        if loop is None:
             return
         done = 0
         while done < _MAX_STEPS_PER_CYCLE and loop.spare_ns() > 0 and self.lanes.step():
             done += 1
+            if self.segment.silent:
+                # Nothing comes back: process data must not wait for more of that.
+                break
         self._starved = 0 if done else self._starved + 1
         if self._starved >= _STARVED_CYCLES:
             self._starved = 0

@@ -8,7 +8,7 @@ calls stay in a global queue and are raised by later ones.
 
 And SOEM tells answers apart by an index of four bits alone: when 16 late frames lie in the
 socket, each request is at once answered by one that is 16 frames old, for ever. So late frames
-are thrown away before anything is sent, and with many of them still to come nothing is sent.
+are thrown away before anything is sent, and registers are read and written by frames of our own.
 """
 
 from __future__ import annotations
@@ -23,14 +23,15 @@ from pathlib import Path
 import pysoem
 
 from drivers.errors import Busy, LinkLost, NotAllowed, ProtocolError
-from drivers.ethercat import permissions
+from drivers.ethercat import frames, permissions
+from drivers.ethercat.mailbox import Read, Write
 
 IO_MAP_BYTES = 4096
 MAX_STATIONS = 199
 _NAME_LIMIT = 15
 _EMERGENCY = "an emergency or another unexpected mail came in between"
 _FRAME_TIMEOUT_US = 2000
-_MANY_MISSING, _STALL_S = 8, 0.1
+_STALL_S = 0.1
 _OTHER_FRAME, _TOO_MANY = -2, -4
 """What SOEM's search returns besides a number of slaves."""
 
@@ -52,11 +53,11 @@ class Segment:
         self.frame_timeout_us = _FRAME_TIMEOUT_US
         self.late_frames = 0
         """Frames that came back after they had been given up."""
-        self._missing = 0
-        self._missing_since = 0.0
-        self._stalled_since = 0.0
         self._ear: socket.socket | None = None
         self._scrap = bytearray(2048)
+        self._number = 0
+        self.silent = False
+        """The last frame of ours did not come back."""
 
     def open(self) -> None:
         """Open the interface for us alone.
@@ -84,11 +85,9 @@ class Segment:
                 remedy="; ".join(permissions.check(self.interface).commands)
                 or "check that the interface is a wired Ethernet one",
             ) from error
-        new = _sockets() - before
-        self.socket_fd = min(new) if new else None
+        self.socket_fd = min(_sockets() - before)
         self._index = socket.if_nametoindex(self.interface)
-        if self.socket_fd is not None:
-            self._ear = socket.socket(fileno=os.dup(self.socket_fd))
+        self._ear = socket.socket(fileno=os.dup(self.socket_fd))
         self._master = master
 
     def close(self) -> None:
@@ -155,89 +154,55 @@ class Segment:
         try:
             while self._ear.recv_into(self._scrap, 0, socket.MSG_DONTWAIT):
                 self.late_frames += 1
-                self._missing = max(self._missing - 1, 0)
         except BlockingIOError:
             return
         except OSError:
             # The interface went down: whoever sends next is told.
             return
 
-    def gave_up(self) -> None:
-        """A frame did not come back in time: it is lost, or may be taken for a later one's."""
-        self._missing += 1
-        self._missing_since = time.monotonic()
-        if self._missing == _MANY_MISSING:
-            self._stalled_since = self._missing_since
+    def exchange(self, requests: Sequence[frames.Request]) -> list[bytes | None]:
+        """Accesses to registers in one frame; see `frames.answers`, all None for a lost frame.
 
-    def came_back(self) -> None:
-        """A frame came back: a wire keeps their order, so all before it have come or never will."""
-        self._missing = 0
-
-    def stalled(self) -> bool:
-        """Whether so many frames may still come back that the next answer could be a wrong one.
-
-        What has not come within `_STALL_S` never will.
+        They must fit one frame. A frame that came back late is nobody's answer any more.
         """
-        if self._missing < _MANY_MISSING:
-            return False
-        if time.monotonic() - self._missing_since > _STALL_S:
-            self._missing = 0
-            return False
-        return True
-
-    def pausing(self) -> bool:
-        """Whether the segment stands still for a moment: worth waiting before anything is asked."""
-        return self.stalled() and time.monotonic() - self._stalled_since < _STALL_S
-
-    def _ready_to_send(self) -> bool:
-        """Late frames are gone. False when some are still to come and nobody may wait for them."""
         self.discard_late_frames()
-        waits = self.socket_fd is None or os.get_blocking(self.socket_fd)
-        while self.stalled():
-            if not waits or self._ear is None:
-                return False
-            select.select((self._ear,), (), (), _STALL_S)
-            self.discard_late_frames()
-        return True
+        self._number = (self._number + 1) % frames.INDICES
+        told = self._transmit(requests, frames.build(requests, frames.FIRST_INDEX + self._number))
+        self.silent = told is None
+        return [None] * len(requests) if told is None else told
 
-    def read(
-        self, station: int, register: int, size: int, *, may_be_empty: bool = False
-    ) -> bytes | None:
-        """Read a register of a slave, or None when it does not answer.
-
-        With ``may_be_empty`` None means a lost frame, and ``b""`` that nobody answered it.
-        """
-        if not self._ready_to_send():
+    def _transmit(
+        self, requests: Sequence[frames.Request], sent: bytes
+    ) -> list[bytes | None] | None:
+        ear = self._ear
+        if ear is None:
             return None
-        began = time.monotonic()
+        # Where the last one was lost, it is no busy computer's: nobody waits as long again.
+        patience_us = _FRAME_TIMEOUT_US if self.silent else self.frame_timeout_us
+        deadline = time.monotonic() + patience_us * 1e-6
+        scrap = memoryview(self._scrap)
         try:
-            data: bytes = self.slaves[station - 1]._fprd(register, size, self.frame_timeout_us)  # noqa: SLF001 - the only register access pysoem offers
-        except pysoem.WkcError:
-            return b"" if self._answered_by_nobody(began) and may_be_empty else None
-        self.came_back()
-        return data
+            ear.send(sent, socket.MSG_DONTWAIT)
+            while (left_s := deadline - time.monotonic()) > 0:
+                if not select.select((ear,), (), (), left_s)[0]:
+                    return None
+                size = ear.recv_into(scrap, 0, socket.MSG_DONTWAIT)
+                told = frames.answers(requests, sent, scrap[:size])
+                if told is not None:
+                    return told
+                self.late_frames += 1
+        except OSError:
+            # Nothing to read after all, a full queue, or the interface went down.
+            return None
+        return None
+
+    def read(self, station: int, register: int, size: int) -> bytes | None:
+        """Read a register of a slave, or None when it does not answer."""
+        return self.exchange([(station, Read(register, size))])[0]
 
     def write(self, station: int, register: int, data: bytes) -> bool:
         """Write a register of a slave; False when it does not answer."""
-        if not self._ready_to_send():
-            return False
-        began = time.monotonic()
-        try:
-            self.slaves[station - 1]._fpwr(register, data, self.frame_timeout_us)  # noqa: SLF001 - as above
-        except pysoem.WkcError:
-            self._answered_by_nobody(began)
-            return False
-        self.came_back()
-        return True
-
-    def _answered_by_nobody(self, began: float) -> bool:
-        """Whether a frame came back although nobody took it: SOEM waits its whole time else."""
-        back = time.monotonic() - began < self.frame_timeout_us * 1e-6
-        if back:
-            self.came_back()
-        else:
-            self.gave_up()
-        return back
+        return self.exchange([(station, Write(register, data))])[0] is not None
 
     def map(self, expected_bytes: int) -> None:
         """Build the IO map from what the drives have mapped. States stay as they are.

@@ -348,7 +348,7 @@ def _sizes_of_whole(station: Station, index: int, members: Sequence[Item]) -> di
     if not station.complete_access or index in station.single_only:
         return {}
     sizes = {sub: size for _, sub, size in members if sub and size is not None}
-    return sizes if len(sizes) >= 2 else {}
+    return sizes if len(members) >= 2 else {}
 
 
 def _read_whole(station: Station, index: int, sizes: dict[int, int]) -> Steps[dict[int, bytes]]:

@@ -9,7 +9,7 @@ import pytest
 from backend.access import Leases
 from backend.jobs import JobRunner, Progress
 from backend.restoring import shielded
-from drivers.errors import Busy, LinkTimeout, OutOfRange
+from drivers.errors import Busy, LinkLost, LinkTimeout, NotAllowed, OutOfRange
 
 
 async def forever(_progress: Progress) -> None:
@@ -69,6 +69,34 @@ async def test_cleanup_survives_a_second_cancel() -> None:
 async def test_cleanup_has_a_deadline() -> None:
     with pytest.raises(LinkTimeout, match="restoring took longer"):
         await shielded(asyncio.Event().wait, 0.01, "x")  # type: ignore[arg-type]
+
+
+async def test_a_cleanup_that_fails_does_not_hide_why_it_was_due() -> None:
+    async def lost() -> None:
+        raise LinkLost("the drive does not answer", remedy="check the cable")
+
+    async def braked() -> None:
+        raise NotAllowed("the axis was braked", remedy="see the Alarms page")
+
+    async def work(_progress: Progress) -> None:
+        try:
+            try:
+                await braked()
+            finally:
+                await shielded(asyncio.Event().wait, 0.01, "x")  # type: ignore[arg-type]
+        finally:
+            await shielded(lost, 1.0, "x")
+
+    runner = JobRunner()
+    job = runner.start("jog", "Jog", work)
+    await job.wait()
+    assert isinstance(job.error, LinkLost)
+    assert str(job.error) == (
+        "the axis was braked; x: restoring took longer than 0.01 s and was given up;"
+        " the drive does not answer"
+    )
+    assert job.error.remedy is not None
+    assert job.error.remedy.startswith("see the Alarms page; check the axis")
 
 
 def test_leases() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat import esc, permissions, protocol, sii
 from drivers.ethercat.al_status import al_status_text, state_name
 from drivers.ethercat.cyclic import percentile_us
+from drivers.ethercat.frames import Request
 from drivers.ethercat.lanes import Lanes
 from drivers.ethercat.mailbox import Mailbox, Pause, Read, Step, Steps, Write
 from drivers.ethercat.ring import RING_BYTES, SLOT, VALID, Ring
@@ -93,17 +95,11 @@ def test_every_error_survives_the_pipe(error: DriveError) -> None:
 
 class FakeWire:
     def __init__(self) -> None:
-        self.log: list[tuple[int, int]] = []
+        self.log: list[list[tuple[int, int]]] = []
 
-    def read(
-        self, station: int, register: int, size: int, *, may_be_empty: bool = False
-    ) -> bytes | None:
-        self.log.append((station, register))
-        return bytes(size)
-
-    def write(self, station: int, register: int, data: bytes) -> bool:
-        self.log.append((station, register))
-        return True
+    def exchange(self, requests: Sequence[Request]) -> list[bytes | None]:
+        self.log.append([(station, access.register) for station, access in requests])
+        return [bytes(access.size) if isinstance(access, Read) else b"" for _, access in requests]
 
 
 def test_lanes_interleave_stations_and_keep_order_within_one() -> None:
@@ -120,7 +116,7 @@ def test_lanes_interleave_stations_and_keep_order_within_one() -> None:
         lanes.submit(station, "mailbox", job(register), lambda r, e: finished.append((r, e)))
     while lanes.step():
         pass
-    assert wire.log == [(1, 0x10), (2, 0x30)], "a pause of one does not hold up the other"
+    assert wire.log == [[(1, 0x10), (2, 0x30)]], "a pause of one does not hold up the other"
     assert lanes.wake_s() == 1.0
     now[0] = 1.0
     while lanes.step():
@@ -128,7 +124,8 @@ def test_lanes_interleave_stations_and_keep_order_within_one() -> None:
     now[0] = 2.0
     while lanes.step():
         pass
-    assert wire.log == [(1, 0x10), (2, 0x30), (1, 0x11), (2, 0x31), (1, 0x20), (1, 0x21)]
+    frames = [[(1, 0x10), (2, 0x30)], [(1, 0x11), (2, 0x31)], [(1, 0x20)], [(1, 0x21)]]
+    assert wire.log == frames, "what several have to ask goes in one frame"
     assert [r for r, _ in finished] == [0x10, 0x30, 0x20]
     assert not lanes.pending()
 

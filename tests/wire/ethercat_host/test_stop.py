@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
@@ -13,6 +13,7 @@ import pytest
 from drivers import cia402
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
 from drivers.ethercat import coe
+from drivers.ethercat.frames import Request
 from drivers.ethercat.lanes import GRACE_S, Lanes, Urgency
 from drivers.ethercat.mailbox import Read, Write
 from drivers.ethercat.station import Station, read_items
@@ -37,16 +38,14 @@ class OneSlave:
         self.ended: list[tuple[str, Any, DriveError | None]] = []
         self.sent: list[tuple[float, bytes]] = []
 
-    def read(
-        self, station: int, register: int, size: int, *, may_be_empty: bool = False
-    ) -> bytes | None:
-        return self.slave._do(Read(register, size, may_be_empty))
+    def exchange(self, requests: Sequence[Request]) -> list[bytes | None]:
+        return [self._access(access) for _, access in requests]
 
-    def write(self, station: int, register: int, data: bytes) -> bool:
-        if register == OUT:
-            length = int.from_bytes(data[:2], "little")
-            self.sent.append((self.slave.now, data[6 : 6 + length]))
-        return self.slave._do(Write(register, data)) is not None
+    def _access(self, access: Read | Write) -> bytes | None:
+        if isinstance(access, Write) and access.register == OUT:
+            length = int.from_bytes(access.data[:2], "little")
+            self.sent.append((self.slave.now, access.data[6 : 6 + length]))
+        return self.slave._do(access)
 
     def submit(self, name: str, steps: Any, urgency: Urgency = Urgency.NORMAL) -> None:
         def done(result: Any, error: DriveError | None) -> None:
