@@ -20,6 +20,8 @@ import type {
 /** Rows kept per channel: at 4 kHz 80 s, and 16 channels of it take 82 MB. */
 const GREATEST_ROWS = 320_000
 const MOST_SWEEPS = 50
+/** Traces that lag by more than this are not waited for when a single picture is complete. */
+const LAG_S = 1
 /** With no trigger for so long the automatic mode shows what there is. */
 const AUTO_S = 0.5
 
@@ -57,6 +59,8 @@ export class ScopeStore {
   private sweeps: Sweep[] = []
   private sweepCount = 0
   private armedAt = 0
+  /** A single picture was caught whole: nothing more is taken, so that it stays however long. */
+  private held = false
   private count = 0
   private period = 0
 
@@ -95,6 +99,7 @@ export class ScopeStore {
   private subscribe(drive: string, keys: string[], period: number): void {
     const old = this.subscriptions.get(drive)
     if (old && old.keys.join() === keys.join() && period === this.period) return
+    this.held = false
     // A number of its own, so that blocks of the earlier choice are not taken for these.
     const number = ++this.count
     if (old) this.ports.stop(old.number)
@@ -179,6 +184,17 @@ export class ScopeStore {
     }
     for (const { channel } of this.maths) channel.advance()
     this.look()
+    this.held ||= this.caught()
+  }
+
+  /** Whether the one picture that was wanted is there, of all traces that bring anything. */
+  private caught(): boolean {
+    const [sweep] = this.sweeps
+    if (this.finder?.trigger.mode !== 'single' || !sweep) return false
+    if ((this.newest() ?? 0) > sweep.to + LAG_S) return true
+    return [...this.rings.values()].every(
+      ({ ring }) => ring.newest === null || ring.newest >= sweep.to,
+    )
   }
 
   private take(drive: string, subscription: Subscription, block: ScopeBlock): void {
@@ -191,6 +207,10 @@ export class ScopeStore {
     subscription.sequences.set(block.stream, block.sequence)
     this.losses.dropped += block.dropped
     const now = this.ports.now()
+    if (this.held) {
+      for (const key of subscription.keys) this.heard(named(drive, key), now)
+      return
+    }
     let away = 0
     for (const [k, ring] of subscription.rings.entries()) {
       const source = subscription.source[k]
@@ -203,13 +223,17 @@ export class ScopeStore {
       for (let row = 0; row < block.rows; row++) {
         ring.push(block.times[row] as number, block.samples[row * block.channels + k] as number)
       }
-      const place = this.rings.get(named(drive, subscription.keys[k] as string))
-      if (place) place.heard = now
+      this.heard(named(drive, subscription.keys[k] as string), now)
     }
     if (subscription.resumed && block.spacing !== null) {
       this.losses.away += away
       subscription.resumed = false
     }
+  }
+
+  private heard(name: string, now: number): void {
+    const place = this.rings.get(name)
+    if (place) place.heard = now
   }
 
   // --- trigger ------------------------------------------------------------------------
@@ -218,6 +242,7 @@ export class ScopeStore {
   setTrigger(trigger: ScopeTrigger | null): void {
     this.sweeps = []
     this.sweepCount = 0
+    this.held = false
     this.armedAt = this.newest() ?? 0
     this.finder = trigger && {
       trigger,

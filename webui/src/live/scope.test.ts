@@ -430,6 +430,32 @@ describe('scope store', () => {
       expect([found.from, found.to]).toEqual([at - 1, at + 1])
     }
   })
+  it('holds a single picture until it is armed again, with the traces that lag', () => {
+    const { store: scope, clock } = store()
+    scope.configure(config(source('c1', 'a'), source('c2', 'b', 'y')))
+    scope.setTrigger({ ...rising, mode: 'single' })
+    const slow = (t0: number, sequence: number) =>
+      scope.block(frame({ subscription: 2, times: [t0], rows: [[7]], sequence }))
+    slow(0.2, 1)
+    for (let i = 0; i < 6; i++) {
+      scope.block(frame({ t0: i / 2, dt: 0.5, rows: [[i < 2 ? 0 : 1]], sequence: i + 1 }))
+    }
+    // Complete up to 1.75 s: the second trace may still bring its part, and nothing else comes in.
+    slow(1.2, 2)
+    slow(1.8, 3)
+    clock.now = 100
+    for (let i = 6; i < 20; i++) {
+      scope.block(frame({ t0: i / 2, dt: 0.5, rows: [[0]], sequence: i + 1 }))
+    }
+    const whole = { ...view, show: { from: 0, to: 100 } }
+    const found = scope.answer('view', whole)
+    expect(found.newest).toBe(2.5)
+    expect(found.columns[2]?.filter((value) => value !== null)).toEqual([7, 7, 7])
+    expect(found.silent[0]).toBe(0)
+    scope.setTrigger({ ...rising, mode: 'single' })
+    scope.block(frame({ t0: 10, dt: 0.5, rows: [[0]], sequence: 21 }))
+    expect(scope.answer('view', whole).newest).toBe(10)
+  })
   it('shows what would lie before the trigger while it waits for one', () => {
     const { store: scope } = store()
     scope.configure(config(source('c1', 'a')))

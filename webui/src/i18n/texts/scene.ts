@@ -15,5 +15,24 @@ export const scene = {
   'scene.rack': ['a rack', '齿条'],
   'scene.rotary': ['a rotary table', '转台'],
   'scene.drives': ['drives {what}', '带动{what}'],
-  'scene.set': ['Set what it drives', '设置所带机构'],
+  'scene.what': ['It drives', '所带机构'],
+  'scene.keep': ['Keep', '保存'],
+  'scene.keepHelp': [
+    'Kept with the bench and shown here; nothing is written to the drive.',
+    '随台架保存并在此显示；不写入驱动器。',
+  ],
+  'scene.gear': ['Electronic gear of the drive', '驱动器的电子齿轮'],
+  'scene.limits': ['Limits and home, in the drive', '驱动器中的限位与原点'],
+  'scene.noLimits': [
+    'This drive has no software limits that can be reached over its port.',
+    '通过当前端口无法访问此驱动器的软件限位。',
+  ],
+  'scene.axis': ['The axis in 3D', '轴的三维视图'],
+  'scene.all': ['All axes', '全部轴'],
+  'scene.show': ['Show', '显示'],
+  'scene.hide': ['Hide', '隐藏'],
+  'scene.closed': [
+    'Shaft, load, limits and home, moving with the measured position.',
+    '轴、负载、限位与原点，随实测位置运动。',
+  ],
 } satisfies Texts

@@ -108,6 +108,7 @@ export const scope = {
   'keep.snapshotName': ['Name (or the time)', '名称（默认为时间）'],
   'keep.takeSnapshot': ['Take a snapshot', '保存快照'],
   'keep.show': ['Show as reference', '作为参考显示'],
+  'keep.itsSetup': ['Use its set-up', '使用其设置'],
   'keep.unusable': ['not usable', '不可用'],
   'keep.setups': ['Set-ups', '设置方案'],
   'keep.setupName': ['Name of this set-up', '此设置的名称'],

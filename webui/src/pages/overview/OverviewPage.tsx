@@ -10,6 +10,7 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { Procedures } from '../../widgets/Procedures'
 import { useAction } from '../../widgets/useAction'
 import { useRecord } from '../../widgets/useFunctions'
+import { SceneHere } from './SceneHere'
 import { StateMachine } from './StateMachine'
 import { travelOf } from './travel'
 import { WatchPanel } from './WatchPanel'
@@ -70,6 +71,7 @@ export function OverviewPage({ drive }: { drive: string }) {
             <Words state={state} />
           </Panel>
           <div className="later stack">
+            <SceneHere drive={drive} />
             <WatchPanel drive={drive} />
             <Procedures drive={drive} />
           </div>

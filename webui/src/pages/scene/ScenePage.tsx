@@ -1,16 +1,24 @@
-import { useEffect, useRef, useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { AxisRecordInfo, DriveSummary } from '../../api/schema'
-import { href } from '../../app/router'
-import { stopEverything } from '../../app/stop'
+import { useEffect } from 'react'
 import { useT } from '../../i18n'
-import { useDrives } from '../../live/store'
+import * as live from '../../live/live'
+import { contents, useDrives, useLink } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
+import './scene.css'
+import { SceneFrame } from './SceneFrame'
+import { WhatItDrives } from './WhatItDrives'
 
 /** All axes in 3D, moving with their live positions. */
 export function ScenePage() {
   const t = useT()
+  const { open } = useLink()
   const drives = useDrives() ?? []
+  const ids = drives.map((drive) => drive.id).join(' ')
+  useEffect(() => {
+    if (!open) return
+    for (const id of ids.split(' ')) {
+      if (id && !contents.rows.has(id)) void live.loadRows(id).catch(() => {})
+    }
+  }, [open, ids])
   return (
     <div className="page">
       <h1>{t('page.scene')}</h1>
@@ -22,53 +30,5 @@ export function ScenePage() {
         ))}
       </Panel>
     </div>
-  )
-}
-
-/** viser's page in a frame of our origin. */
-function SceneFrame() {
-  const t = useT()
-  const frame = useRef<HTMLIFrameElement>(null)
-  return (
-    <iframe
-      ref={frame}
-      className="viewer"
-      title={t('scene.frame')}
-      src="/viser/"
-      onLoad={() => {
-        // Keys pressed in the frame do not come to the page; Esc must stop from there too.
-        frame.current?.contentWindow?.addEventListener(
-          'keydown',
-          (event) => {
-            if (event.key === 'Escape' && !event.repeat) void stopEverything()
-          },
-          { capture: true },
-        )
-      }}
-    />
-  )
-}
-
-function WhatItDrives({ drive }: { drive: DriveSummary }) {
-  const t = useT()
-  const [record, setRecord] = useState<AxisRecordInfo | null>(null)
-  useEffect(() => {
-    let current = true
-    ask(
-      api.GET('/api/v1/drives/{drive_id}/record', { params: { path: { drive_id: drive.id } } }),
-    ).then(
-      (found) => current && setRecord(found),
-      () => current && setRecord(null),
-    )
-    return () => {
-      current = false
-    }
-  }, [drive.id])
-  const kind = record?.mechanics?.kind ?? 'shaft'
-  return (
-    <p className="row">
-      <strong>{drive.name}</strong> {t('scene.drives', { what: t(`scene.${kind}`) })}
-      <a href={href('motion', drive.id)}>{t('scene.set')}</a>
-    </p>
   )
 }

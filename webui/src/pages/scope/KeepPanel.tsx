@@ -168,6 +168,9 @@ export function KeepPanel({
                 <>
                   <Button onClick={() => void open(each.name)}>{t('keep.show')}</Button>
                   <Button onClick={() => void saveCsv(each.name)}>{t('scope.csv')}</Button>
+                  <Button onClick={() => each.header && onSetup(each.header.setup)}>
+                    {t('keep.itsSetup')}
+                  </Button>
                 </>
               )}
               <ActionIcon

@@ -18,7 +18,7 @@ import { MathsPanel } from './MathsPanel'
 import { Measurements } from './Measurements'
 import type { PanelProps } from './panels'
 import { RangePanel } from './RangePanel'
-import { type Reference, referenceOverlays, sweepOverlays } from './references'
+import { referenceOverlays, sweepOverlays, useReferences } from './references'
 import './scope.css'
 import {
   needsDrive,
@@ -72,7 +72,7 @@ export function ScopePage() {
   const [arming, setArming] = useState(0)
   const [frozen, setFrozen] = useState<Frozen | null>(null)
   const [cursors, setCursors] = useState<number[]>([])
-  const [references, setReferences] = useState<Reference[]>([])
+  const [references, setReferences] = useReferences()
   const [table, setTable] = useState<ScopeFrame | null>(null)
   const plot = useRef<PlotHandle | null>(null)
   const last = useRef<ScopeFrame | null>(null)

@@ -1,3 +1,4 @@
+import { useCallback, useState } from 'react'
 import { thinned } from '../../live/decimate'
 import type { Overlay } from '../../live/worker-messages'
 import type { PlotOverlay } from '../../plots/TimePlot'
@@ -12,6 +13,17 @@ export interface Reference {
 }
 
 const MOST_POINTS = 4000
+let kept: Reference[] = []
+
+/** References stay when another page is opened: the motion to compare is started there. */
+export function useReferences(): [Reference[], (references: Reference[]) => void] {
+  const [references, setReferences] = useState(kept)
+  const change = useCallback((next: Reference[]) => {
+    kept = next
+    setReferences(next)
+  }, [])
+  return [references, change]
+}
 
 /** References as the plot draws them; every raw sample stays in the reference itself. */
 export function referenceOverlays(references: Reference[], colors: string[]): PlotOverlay[] {

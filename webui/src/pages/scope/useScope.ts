@@ -21,27 +21,41 @@ export function useSetup(): [ScopeSetup, (setup: ScopeSetup) => void, boolean] {
 export const useScopeInfo = () => useStore('scopeInfo', () => contents.scopeInfo)
 export const useScopeChannels = () => useStore('scopeInfo', () => contents.scopeChannels)
 
-/** Samples what the set-up names for as long as the page shows. */
+/**
+ * Samples what the set-up names while the page shows, and beyond that while a trigger is armed:
+ * who starts a motion on another page comes back to what it caught.
+ */
 export function useSampling(setup: ScopeSetup, infos: Infos): void {
   const config = configOf(setup, infos)
+  const armed = useRef(false)
+  armed.current = setup.trigger.mode !== 'off'
   useEffect(() => {
     live.toScope({ kind: 'scope', config })
     // The text stands for the configuration.
   }, [JSON.stringify(config)])
   useEffect(
-    () => () => live.toScope({ kind: 'scope', config: { sources: [], maths: [], period: 0 } }),
+    () => () => {
+      if (!armed.current) {
+        live.toScope({ kind: 'scope', config: { sources: [], maths: [], period: 0 } })
+      }
+    },
     [],
   )
 }
 
-/** Arms the trigger; `arming` arms it again. */
+/** The trigger that the worker looks for, as text. */
+let sought = 'null'
+
+/** Arms the trigger; `arming` arms it again. One that was armed before the page was left stays. */
 export function useTrigger(setup: ScopeSetup, arming: number): void {
   const trigger = triggerOf(setup)
+  const text = JSON.stringify(trigger)
   useEffect(() => {
+    if (text === sought && arming === 0) return
+    sought = text
     live.toScope({ kind: 'trigger', trigger })
-    return () => live.toScope({ kind: 'trigger', trigger: null })
     // The text stands for the trigger.
-  }, [JSON.stringify(trigger), arming])
+  }, [text, arming])
 }
 
 /** Part of the period that a page rests after a picture, however long that took. */

@@ -4,13 +4,13 @@ import { api, ask } from '../../api/client'
 import type { GearPlanInfo, GearWritten } from '../../api/schema'
 import { known, useT } from '../../i18n'
 import { figure } from '../../widgets/format'
-import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProcedureButton } from '../../widgets/Procedures'
 import { useAction } from '../../widgets/useAction'
 import { setRecord, useRecord } from '../../widgets/useFunctions'
-import { complete, type Form, formOf, START, toMechanics } from './mechanics'
+import { complete, type Form, formOf, KINDS, START, toMechanics } from './mechanics'
+import { MechanicsFields } from './MechanicsFields'
 
 /** From screw, belt, rack or table to the gear of the drive, shown before it is written. */
 export function GearPanel({ drive }: { drive: string }) {
@@ -80,10 +80,7 @@ export function GearPanel({ drive }: { drive: string }) {
           fullWidth
           value={form.kind}
           onChange={(kind) => change({ kind: kind })}
-          data={(['screw', 'belt', 'rack', 'rotary'] as const).map((value) => ({
-            value,
-            label: t(`gear.kind.${value}`),
-          }))}
+          data={KINDS.map((value) => ({ value, label: t(`gear.kind.${value}`) }))}
         />
         <MechanicsFields form={form} change={change} />
         <div className="row wrap">
@@ -187,68 +184,6 @@ function Written({
       </div>
       <ProblemNote problem={undo.problem} onClose={undo.clear} />
     </div>
-  )
-}
-
-function MechanicsFields({ form, change }: { form: Form; change: (part: Partial<Form>) => void }) {
-  const t = useT()
-  const unit = form.kind === 'rotary' ? '°' : 'mm'
-  const number = (
-    name: 'lead_mm' | 'diameter_mm' | 'pitch_mm' | 'module_mm' | 'resolution',
-    label: string,
-    of = 'mm',
-  ) => (
-    <NumberField
-      label={label}
-      unit={of}
-      value={form[name]}
-      onChange={(value) => change({ [name]: value })}
-      above={0}
-    />
-  )
-  const count = (name: 'teeth' | 'motor_turns' | 'load_turns', label: string) => (
-    <NumberField
-      label={label}
-      value={form[name]}
-      onChange={(value) => change({ [name]: value })}
-      min={1}
-      max={100000}
-      integer
-    />
-  )
-  const ways = { belt: ['diameter', 'teeth'], rack: ['module', 'pitch'] } as const
-  const way = form.kind === 'belt' ? form.belt : form.rack
-  return (
-    <>
-      {(form.kind === 'belt' || form.kind === 'rack') && (
-        <SegmentedControl
-          value={way}
-          onChange={(next) =>
-            change(
-              form.kind === 'belt'
-                ? { belt: next as Form['belt'] }
-                : { rack: next as Form['rack'] },
-            )
-          }
-          data={ways[form.kind].map((value) => ({ value, label: t(`gear.by.${value}`) }))}
-        />
-      )}
-      <div className="fields">
-        {form.kind === 'screw' && number('lead_mm', t('gear.lead'))}
-        {form.kind === 'belt' &&
-          form.belt === 'diameter' &&
-          number('diameter_mm', t('gear.diameter'))}
-        {((form.kind === 'belt' && form.belt === 'teeth') ||
-          (form.kind === 'rack' && form.rack === 'pitch')) &&
-          number('pitch_mm', t('gear.pitch'))}
-        {form.kind === 'rack' && form.rack === 'module' && number('module_mm', t('gear.module'))}
-        {(form.kind === 'rack' || (form.kind === 'belt' && form.belt === 'teeth')) &&
-          count('teeth', t('gear.teeth'))}
-        {count('motor_turns', t('gear.motorTurns'))}
-        {count('load_turns', t('gear.loadTurns'))}
-        {number('resolution', t('gear.resolution'), unit)}
-      </div>
-    </>
   )
 }
 

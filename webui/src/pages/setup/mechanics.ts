@@ -15,6 +15,8 @@ export interface Form {
   resolution: number | null
 }
 
+export const KINDS = ['screw', 'belt', 'rack', 'rotary'] as const
+
 export const START: Form = {
   kind: 'screw',
   belt: 'diameter',

@@ -1,0 +1,41 @@
+import { Button } from '@mantine/core'
+import { useState } from 'react'
+import { href } from '../../app/router'
+import { useT } from '../../i18n'
+import { Panel } from '../../widgets/Panel'
+import '../scene/scene.css'
+import { SceneFrame } from '../scene/SceneFrame'
+
+const SHOWN = 'servodeck.overview.scene'
+
+/**
+ * The axis in 3D. It is drawn only where it was asked for, and stays so in this browser: a tablet
+ * without WebGL, or one on a slow line, is not made to carry it.
+ */
+export function SceneHere({ drive }: { drive: string }) {
+  const t = useT()
+  const [shown, setShown] = useState(() => localStorage.getItem(SHOWN) === '1')
+  const toggle = () => {
+    localStorage.setItem(SHOWN, shown ? '0' : '1')
+    setShown(!shown)
+  }
+  return (
+    <Panel
+      title={t('scene.axis')}
+      tools={
+        <>
+          <a href={href('scene', drive)}>{t('scene.all')}</a>
+          <Button aria-expanded={shown} onClick={toggle}>
+            {t(shown ? 'scene.hide' : 'scene.show')}
+          </Button>
+        </>
+      }
+    >
+      {shown ? (
+        <SceneFrame axis={drive} className="small" />
+      ) : (
+        <p className="dim">{t('scene.closed')}</p>
+      )}
+    </Panel>
+  )
+}

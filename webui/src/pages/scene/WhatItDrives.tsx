@@ -1,0 +1,115 @@
+import { Button, NativeSelect } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { DriveSummary, Mechanics } from '../../api/schema'
+import { href } from '../../app/router'
+import { useT } from '../../i18n'
+import { HOME_OFFSET, SOFTWARE_LIMITS } from '../../widgets/objects'
+import { ParameterFields, useReachable } from '../../widgets/ParameterFields'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
+import { setRecord, useRecord } from '../../widgets/useFunctions'
+import { complete, type Form, formOf, KINDS, START, toMechanics } from '../setup/mechanics'
+import { MechanicsFields } from '../setup/MechanicsFields'
+
+const LIMITS = [...SOFTWARE_LIMITS, HOME_OFFSET]
+
+/** What an axis drives, and where its limits and its home are: changed here, seen at once. */
+export function WhatItDrives({ drive }: { drive: DriveSummary }) {
+  const t = useT()
+  const [open, setOpen] = useState(false)
+  const kind = useRecord(drive.id)?.mechanics?.kind ?? 'shaft'
+  return (
+    <details className="what" onToggle={(event) => setOpen(event.currentTarget.open)}>
+      <summary>
+        <strong>{drive.name}</strong> {t('scene.drives', { what: t(`scene.${kind}`) })}
+      </summary>
+      {/* Only what is open reads from the drive. */}
+      {open && (
+        <div className="columns">
+          <MechanicsForm drive={drive.id} />
+          <Limits drive={drive.id} />
+        </div>
+      )}
+    </details>
+  )
+}
+
+function MechanicsForm({ drive }: { drive: string }) {
+  const t = useT()
+  const record = useRecord(drive)
+  const [form, setForm] = useState<Form>(START)
+  const [shaft, setShaft] = useState(true)
+  const act = useAction()
+  const kept = JSON.stringify(record?.mechanics ?? null)
+  useEffect(() => {
+    const known = record?.mechanics ?? null
+    setShaft(known === null)
+    setForm(known ? formOf(known) : START)
+  }, [drive, kept])
+  const wanted: Mechanics | null = shaft || !complete(form) ? null : toMechanics(form)
+  const keep = () =>
+    act.run(async () =>
+      setRecord(
+        drive,
+        await ask(
+          api.PUT('/api/v1/drives/{drive_id}/mechanics', {
+            params: { path: { drive_id: drive } },
+            body: { mechanics: wanted },
+          }),
+        ),
+      ),
+    )
+  return (
+    <div>
+      <NativeSelect
+        label={t('scene.what')}
+        value={shaft ? 'shaft' : form.kind}
+        onChange={(event) => {
+          const chosen = event.currentTarget.value
+          setShaft(chosen === 'shaft')
+          if (chosen !== 'shaft') setForm({ ...form, kind: chosen as Form['kind'] })
+        }}
+        data={(['shaft', ...KINDS] as const).map((value) => ({
+          value,
+          label: t(`scene.${value}`),
+        }))}
+      />
+      {!shaft && (
+        <MechanicsFields
+          form={form}
+          change={(part) => setForm({ ...form, ...part })}
+          resolution={false}
+        />
+      )}
+      <div className="row wrap">
+        <Button
+          loading={act.busy}
+          disabled={(!shaft && wanted === null) || JSON.stringify(wanted) === kept}
+          onClick={() => void keep()}
+        >
+          {t('scene.keep')}
+        </Button>
+        <a href={href('setup', drive)}>{t('scene.gear')}</a>
+      </div>
+      <p className="dim">{t('scene.keepHelp')}</p>
+      <ProblemNote problem={act.problem} onClose={act.clear} />
+    </div>
+  )
+}
+
+/** The drive's own limits: written to the drive like every parameter, and read back. */
+function Limits({ drive }: { drive: string }) {
+  const t = useT()
+  const reachable = useReachable(drive, LIMITS)
+  return (
+    <div>
+      <h3>{t('scene.limits')}</h3>
+      {reachable.length === 0 ? (
+        <p className="dim">{t('scene.noLimits')}</p>
+      ) : (
+        <ParameterFields drive={drive} keys={LIMITS} />
+      )}
+    </div>
+  )
+}
