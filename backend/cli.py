@@ -6,16 +6,29 @@ import asyncio
 import contextlib
 import json
 import os
+import signal
 import sys
 import tempfile
 from collections.abc import Awaitable, Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from backend.bench import Bench
-from backend.commands import functions, keep, measure, params, people, profile, report
+from backend.commands import (
+    functions,
+    keep,
+    live,
+    measure,
+    params,
+    people,
+    profile,
+    remote_params,
+    report,
+)
+from backend.commands.remote import Server, server_for
 from backend.commands.serve import Serving, state_folder
 from backend.commands.serve import serve as run_server
 from backend.commands.session import opened, run, show_progress
@@ -38,6 +51,8 @@ app.add_typer(keep.library, name="library")
 app.command("backup")(keep.backup)
 app.command("restore")(keep.restore)
 app.add_typer(people.app, name="people")
+app.command("jog")(live.jog)
+app.command("scope")(live.scope)
 app.command("sweep")(measure.sweep)
 app.command("inertia")(measure.inertia)
 app.command("report")(report.report)
@@ -55,7 +70,7 @@ Host = Annotated[
         help="address to listen on; any but loopback needs accounts and uses HTTPS",
     ),
 ]
-Port = Annotated[int, typer.Option(help="port to listen on; 0 takes a free one")]
+Port = Annotated[int, typer.Option(help="port to listen on; 0 takes a free one", min=0, max=65535)]
 Config = Annotated[Path | None, typer.Option(help="folder of drives and parameter sets")]
 Open = Annotated[bool, typer.Option("--open", help="open the page in a browser")]
 
@@ -142,6 +157,23 @@ def _until_interrupted(work: Callable[[], Awaitable[None]]) -> None:
         run(work)
 
 
+def _one_drive(file: Path, folder: Path, nvm: Path | None) -> DemoBench:
+    """The bench of `virtual`; its errors are about the command line, not about a file."""
+    try:
+        return DemoBench(file, folder, nvm)
+    except NotAllowed as error:
+        error.message = error.message.removeprefix(f"bench file {file}: ")
+        raise
+
+
+async def _told_to_end() -> None:
+    """Wait for Ctrl+C or for the end that a service is given (SIGTERM)."""
+    over, loop = asyncio.Event(), asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, over.set)
+    await over.wait()
+
+
 @app.command()
 def virtual(
     drive: str,
@@ -153,7 +185,14 @@ def virtual(
     """Run one virtual drive on a real wire, for any client."""
 
     async def work() -> None:
-        parse_url(on)
+        bus = parse_url(on)
+        if bus.scheme == "ethercat" and not bus.is_virtual:
+            raise NotAllowed(
+                f"a virtual drive does not go on {on} by itself: it would answer on your network",
+                value=on,
+                limit="ethercat://virtual0",
+                remedy="write ethercat://virtual0, or see docs/virtual-drives.md for an interface",
+            )
         try:
             spec = load_mechanics(mechanics) if mechanics else standard_mechanics()
         except (OSError, ValueError) as error:
@@ -168,11 +207,11 @@ def virtual(
                 "mechanics": spec.model_dump(exclude_defaults=True),
             }
             file.write_text(json.dumps({"axis": [axis]}), "utf-8")
-            with DemoBench(file, Path(folder), nvm) as drives:
+            with _one_drive(file, Path(folder), nvm) as drives:
                 for real in drives.addresses.values():
                     print(f"{drive} answers at {real} station {station}  (Ctrl+C ends it)")
                 sys.stdout.flush()
-                await asyncio.Event().wait()
+                await _told_to_end()
 
     _until_interrupted(work)
 
@@ -181,34 +220,46 @@ def virtual(
 def scan(
     url: Annotated[str, typer.Argument(metavar="BUS_URL")],
     as_json: Annotated[bool, typer.Option("--json")] = False,
+    server: Server = None,
 ) -> None:
     """Look for drives on a bus."""
 
     async def work() -> None:
-        async with opened(url) as link:
-            found = await link.scan(show_progress, None)
-            if as_json:
-                rows = [
-                    {
-                        "station": f.station, "vendor_id": f.vendor_id,
-                        "product_code": f.product_code, "revision": f.revision,
-                        "serial": f.serial, "name": f.name, "alias": f.alias,
-                        "firmware": f.firmware, "state": f.state, "notes": list(f.notes),
-                        "profiles": [m.profile.drive for m in match_profiles(link.kind, f)],
-                    }
-                    for f in found
-                ]  # fmt: skip
-                print(json.dumps(rows, indent=1))
-                return
-            for f in found:
-                fits = ", ".join(
-                    f"{m.profile.drive} ({m.confidence})" for m in match_profiles(link.kind, f)
-                )
-                print(f"station {f.station}: {f.name or 'no name'}  serial {f.serial}  {fits}")
-            if not found:
-                print("no drive answers: check power, cable, baud rate, parity and address")
+        rows = await _found(url, server)
+        if as_json:
+            print(json.dumps([row | {"profiles": list(fits)} for row, fits in rows], indent=1))
+            return
+        for row, fits in rows:
+            which = ", ".join(f"{name} ({sure})" for name, sure in fits.items())
+            name = row["name"] or "no name"
+            print(f"station {row['station']}: {name}  serial {row['serial']}  {which}")
+        if not rows:
+            print("no drive answers: check power, cable, baud rate, parity and address")
 
     run(work)
+
+
+_FOUND = {
+    "station", "vendor_id", "product_code", "revision", "serial", "name", "alias", "firmware",
+    "state", "notes",
+}  # fmt: skip
+
+
+async def _found(url: str, server: str | None) -> list[tuple[dict[str, object], dict[str, str]]]:
+    """What answers, and the profiles that fit with how sure that is."""
+    if at := server_for(url, server):
+        return [
+            (f.model_dump(include=_FOUND), {m.profile: m.confidence for m in f.matches})
+            for f in await remote_params.scan(at, url)
+        ]
+    async with opened(url) as link:
+        return [
+            (
+                {name: value for name, value in asdict(f).items() if name in _FOUND},
+                {m.profile.drive: m.confidence for m in match_profiles(link.kind, f)},
+            )
+            for f in await link.scan(show_progress, None)
+        ]
 
 
 def main() -> None:

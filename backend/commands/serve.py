@@ -177,6 +177,13 @@ def _listen(host: str, port: int) -> socket.socket:
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((host.strip("[]"), port))
+    except socket.gaierror as error:
+        listening.close()
+        raise NotAllowed(
+            f"{host} is no address of this computer: {error.strerror}",
+            value=host,
+            remedy="give one with --host, as 127.0.0.1, or 0.0.0.0 for all",
+        ) from error
     except OSError as error:
         listening.close()
         raise NotAllowed(

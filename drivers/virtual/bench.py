@@ -21,10 +21,14 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, OutOfRange
 from drivers.urls import parse_url
 from drivers.virtual.mechanics.spec import MechanicsSpec, standard_mechanics
+from profiles.loader import ProfileError, load_profile
 
+#: Highest station of each bus: MODBUS over Serial Line V1.02 clause 2.2, CiA 301 clause 7.2.1, and
+#: the places of an EtherCAT segment (16-bit addresses).
+_LAST_STATION = {"mlink": 247, "modbus": 247, "canopen": 127, "ethercat": 65535}
 STANDARD_BENCH = Path(__file__).with_name("standard_bench.toml")
 
 
@@ -91,12 +95,69 @@ def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
             value=str(path),
             remedy="see docs/virtual-drives.md",
         ) from error
-    except (OSError, ValueError) as error:
-        raise NotAllowed(
-            f"bench file {path}: {error}", value=str(path), remedy="see docs/virtual-drives.md"
-        ) from error
+    except OSError as error:
+        raise _wrong(path, f"{error.filename or path}: {error.strerror}") from error
+    except (ValueError, AttributeError, TypeError) as error:
+        raise _wrong(path, str(error)) from error
+    _check_names(bench, path)
     _check_stations(bench, path)
+    for axis in bench.axis:
+        _check_ports(axis, path)
     return bench
+
+
+def _wrong(path: Path, why: str) -> NotAllowed:
+    return NotAllowed(
+        f"bench file {path}: {why}", value=str(path), remedy="see docs/virtual-drives.md"
+    )
+
+
+def _check_names(bench: BenchSpec, path: Path) -> None:
+    names = [axis.name for axis in bench.axis]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise NotAllowed(
+            f"bench file {path}: two axes are named {twice!r}",
+            value=twice,
+            remedy="give each axis a name of its own",
+        )
+
+
+def _check_ports(axis: AxisSpec, path: Path) -> None:
+    """Every port is one that the family has, under a number that its bus has."""
+    try:
+        profile = load_profile(axis.drive)
+    except ProfileError as error:
+        raise _wrong(path, f"{axis.name}: {error}") from error
+    for url, station in axis.ports:
+        try:
+            bus = parse_url(url)
+        except OutOfRange as error:
+            raise _wrong(path, f"{axis.name}: {error.message}") from error
+        kinds = ", ".join(link.kind for link in profile.links)
+        if profile.link(bus.scheme) is None:
+            raise NotAllowed(
+                f"bench file {path}: {axis.name}: a {profile.title} has no {bus.scheme} port",
+                value=url,
+                limit=kinds,
+                remedy=f"it can hang on {kinds}",
+            )
+        if bus.scheme == "canopen" and not (bus.is_virtual or bus.place.startswith("slcan/")):
+            raise NotAllowed(
+                f"bench file {path}: {axis.name}: a virtual drive answers on no {bus}",
+                value=url,
+                limit="canopen://virtual0, canopen://slcan/PATH",
+                remedy="let it make an slcan adapter, as canopen://slcan//tmp/can0",
+            )
+        last = _LAST_STATION[bus.scheme]
+        if not 1 <= station <= last:
+            raise NotAllowed(
+                f"bench file {path}: {axis.name}: station {station} of {url} is outside 1 to "
+                f"{last}",
+                value=station,
+                limit=f"1 to {last}",
+                remedy="give a number that the bus has",
+            )
 
 
 def _check_stations(bench: BenchSpec, path: Path) -> None:

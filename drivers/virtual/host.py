@@ -33,6 +33,7 @@ from drivers.virtual.wires.canopen import CanopenNode
 from drivers.virtual.wires.modbus import ModbusSlave, ObjectRegisters, Registers, TableRegisters
 from drivers.virtual.wires.pty import PtyWire, WireTime
 from drivers.virtual.wires.slcan import SlcanSide
+from profiles.loader import ProfileError
 
 
 class Cable(Protocol):
@@ -225,7 +226,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         wires = Wires(load_bench(options.bench), options.folder, options.nvm)
         wires.start()
-    except (DriveError, ValueError) as error:
+    except (DriveError, ProfileError, ValueError, OSError) as error:
         _answer({"ready": False, "error": str(error)})
         return 1
     _answer({"ready": True, "wires": wires.real_urls})

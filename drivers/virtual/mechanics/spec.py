@@ -11,12 +11,19 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+#: Servo motors give three to three and a half times their rated torque for a moment.
+_PEAK_PER_RATED = 3.5
+
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class MotorSpec(_Part):
+class _Finite(_Part):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class MotorSpec(_Finite):
     """The motor: rotor inertia and the rating that torque in ‰ refers to."""
 
     inertia_kgm2: float = Field(gt=0)
@@ -26,7 +33,7 @@ class MotorSpec(_Part):
     """A holding brake of twice the rated torque is mounted."""
 
 
-class FrictionSpec(_Part):
+class FrictionSpec(_Finite):
     """Friction at the motor shaft and a constant torque on the last inertia of the chain.
 
     The motor holds the load with ``+gravity_nm``: the load itself pulls to negative positions.
@@ -37,7 +44,7 @@ class FrictionSpec(_Part):
     gravity_nm: float = 0.0
 
 
-class EncoderSpec(_Part):
+class EncoderSpec(_Finite):
     """Motor encoder; noise is the standard deviation of white Gaussian noise in counts."""
 
     counts_per_rev: int = Field(default=2**23, ge=16)
@@ -63,7 +70,8 @@ class TravelSpec(_Part):
 class SwitchSpec(_Part):
     """Positions of the switches, in motor revolutions from the start position.
 
-    Limit switches default to 0.25 revolutions before the end stops. The home switch is a cam
+    Limit switches default to 0.25 revolutions before the end stops, or to a tenth of the travel
+    where it is short. The home switch is a cam
     that is active from ``home_from_rev`` to ``home_to_rev``; either end may be infinite.
     """
 
@@ -72,18 +80,37 @@ class SwitchSpec(_Part):
     home_from_rev: float = 0.2
     home_to_rev: float = 0.7
 
+    @model_validator(mode="after")
+    def _in_order(self) -> SwitchSpec:
+        low, high = self.negative_limit_rev, self.positive_limit_rev
+        if low is not None and high is not None and not low < high:
+            raise ValueError(
+                f"switches: negative_limit_rev {low} must lie below positive_limit_rev {high}"
+            )
+        if not self.home_from_rev < self.home_to_rev:
+            raise ValueError(
+                f"switches: the home cam must begin before it ends: home_from_rev "
+                f"{self.home_from_rev}, home_to_rev {self.home_to_rev}"
+            )
+        return self
 
-class SupplySpec(_Part):
-    """The DC supply. One that cannot sink lets regeneration raise the bus voltage."""
+
+class SupplySpec(_Finite):
+    """The DC supply. One that cannot sink lets regeneration raise the bus voltage.
+
+    Without ``braking_resistor`` nothing is connected where the drive wants its braking resistor
+    (the bridge B1-B2 of an EP3E is open, the terminals RB of a DS_C are empty).
+    """
 
     voltage_v: float = Field(default=48.0, gt=0)
     resistance_ohm: float = Field(default=0.05, gt=0)
     capacitance_f: float = Field(default=1e-3, gt=0)
     sinks: bool = True
+    braking_resistor: bool = True
     ambient_c: float = 25.0
 
 
-class LoadSpec(_Part):
+class LoadSpec(_Finite):
     """One more inertia, hung on the one before by a spring with damping and maybe backlash.
 
     ``backlash_rad`` is the whole width of the gap.
@@ -112,6 +139,33 @@ class MechanicsSpec(_Part):
             raise ValueError("load: at most three couplings of a chain may have backlash")
         return self
 
+    @model_validator(mode="after")
+    def _can_be_held(self) -> MechanicsSpec:
+        most_nm = _PEAK_PER_RATED * self.motor.rated_torque_nm
+        if abs(self.friction.gravity_nm) > most_nm:
+            raise ValueError(
+                f"friction: gravity_nm {self.friction.gravity_nm:g} is more than this motor holds "
+                f"even for a moment ({_PEAK_PER_RATED:g} times rated_torque_nm: {most_nm:g} Nm); "
+                "torques are those at the motor shaft, behind the gear"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _switches_can_be_reached(self) -> MechanicsSpec:
+        low, high = self.limit_switches_rev
+        if not low < high:
+            raise ValueError(
+                f"switches: the negative limit switch at {low:g} and the positive one at {high:g} "
+                "revolutions leave no room between them"
+            )
+        for name, place in (("negative_limit_rev", low), ("positive_limit_rev", high)):
+            if not self.travel.min_rev <= place <= self.travel.max_rev:
+                raise ValueError(
+                    f"switches: {name} {place:g} lies beyond the end stops "
+                    f"({self.travel.min_rev:g} to {self.travel.max_rev:g}) and would never trip"
+                )
+        return self
+
     @property
     def total_inertia_kgm2(self) -> float:
         """Motor and all loads, as seen below the first resonance."""
@@ -121,9 +175,10 @@ class MechanicsSpec(_Part):
     def limit_switches_rev(self) -> tuple[float, float]:
         """Where the negative and the positive limit switch trip, motor revolutions."""
         negative, positive = self.switches.negative_limit_rev, self.switches.positive_limit_rev
+        margin = min(0.25, 0.1 * (self.travel.max_rev - self.travel.min_rev))
         return (
-            self.travel.min_rev + 0.25 if negative is None else negative,
-            self.travel.max_rev - 0.25 if positive is None else positive,
+            self.travel.min_rev + margin if negative is None else negative,
+            self.travel.max_rev - margin if positive is None else positive,
         )
 
 

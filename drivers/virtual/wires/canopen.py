@@ -13,7 +13,16 @@ from collections.abc import Callable
 
 from drivers.canopen import frames
 from drivers.canopen.frames import Frame
-from drivers.virtual.device import ABORT_NO_OBJECT, ABORT_NO_SUBINDEX, Device, SdoAbort
+from drivers.virtual.device import (
+    ABORT_LENGTH,
+    ABORT_NO_DATA,
+    ABORT_NO_OBJECT,
+    ABORT_NO_SUBINDEX,
+    ABORT_READ_ONLY,
+    ABORT_VALUE_RANGE,
+    Device,
+    SdoAbort,
+)
 from drivers.virtual.wires.canopen_objects import CommunicationObjects, Pdo
 from drivers.virtual.wires.sdo_server import SdoServer
 
@@ -44,7 +53,9 @@ class CanopenNode:
         """Answers guarding with the same toggle bit each time."""
         self._clock = clock
         self._objects = CommunicationObjects(device, node_id)
-        self._server = SdoServer(self._read, self._write, offers_block=offers_block)
+        self._server = SdoServer(
+            self._read, self._write, offers_block=offers_block, size=self._size
+        )
         self._outbox: list[tuple[int, Frame]] = []
         self._answers_due_ns = 0
         self._delays: list[int] = []
@@ -206,10 +217,8 @@ class CanopenNode:
             return struct.pack("<I", _SERVO_DEVICE_TYPE)
         if (index, subindex) == (0x1001, 0):
             return bytes([self._error_register])
-        if index == 0x1003 and subindex <= len(self._history):
-            if subindex == 0:
-                return bytes([len(self._history)])
-            return struct.pack("<I", self._history[subindex - 1])
+        if index == 0x1003:
+            return self._past_error(subindex)
         if index == 0x1018 and identity.vendor_id is not None:
             known = [identity.vendor_id, identity.product_code, identity.revision]
             values = [v for v in known if v is not None]
@@ -219,13 +228,39 @@ class CanopenNode:
                 return struct.pack("<I", values[subindex - 1])
         raise refusal
 
+    def _past_error(self, subindex: int) -> bytes:
+        """1003h; an entry that holds no error is no data (CiA 301 clause 7.5.2.4)."""
+        if subindex == 0:
+            return bytes([len(self._history)])
+        if subindex > _HISTORY:
+            raise SdoAbort(ABORT_NO_SUBINDEX)
+        if subindex > len(self._history):
+            raise SdoAbort(ABORT_NO_DATA)
+        return struct.pack("<I", self._history[subindex - 1])
+
     def _write(self, index: int, subindex: int, data: bytes) -> None:
         if self._objects.owns(index):
             self._objects.write(index, subindex, data)
-        elif (index, subindex) == (0x1003, 0) and data == b"\0":
+        elif index == 0x1003 and index not in self.device.indices():
+            if subindex > _HISTORY:
+                raise SdoAbort(ABORT_NO_SUBINDEX)
+            if subindex:
+                raise SdoAbort(ABORT_READ_ONLY)
+            if data != b"\0":
+                # Only 0, which empties the list, may be written.
+                raise SdoAbort(ABORT_VALUE_RANGE if len(data) == 1 else ABORT_LENGTH)
             self._history.clear()
         else:
             self.device.write(index, subindex, data)
+
+    def _size(self, index: int, subindex: int) -> int | None:
+        """Bytes of an object whose type has a fixed length, for writes that do not tell theirs."""
+        if self._objects.owns(index):
+            return len(self._objects.read(index, subindex))
+        try:
+            return self.device.entry(index, subindex).bit_length // 8 or None
+        except SdoAbort:
+            return None
 
     # Emergencies
 
@@ -249,7 +284,7 @@ class CanopenNode:
         for pdo in self._objects.pdos:
             if not pdo.valid or pdo.image is None or pdo.identifier != frame.cob_id:
                 continue
-            if pdo.direction == "tx" and frame.remote:
+            if pdo.direction == "tx" and frame.remote and pdo.answers_remote:
                 self._say(pdo.identifier, pdo.image.pack(), now)
             elif pdo.direction == "rx" and not frame.remote:
                 if len(frame.data) < pdo.image.size:

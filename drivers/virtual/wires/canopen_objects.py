@@ -24,6 +24,14 @@ from drivers.virtual.device import (
 
 INVALID = 0x80000000
 _IDENTIFIER = 0x7FF
+_NO_REMOTE = 0x40000000
+_GENERATES_SYNC = 0x40000000
+_EXTENDED = 0x20000000
+#: Identifiers that belong to other services (CiA 301 table 40).
+_RESTRICTED = (
+    range(0x001), range(0x001, 0x080), range(0x101, 0x181), range(0x581, 0x600),
+    range(0x601, 0x680), range(0x6E0, 0x700), range(0x701, 0x780), range(0x780, 0x800),
+)  # fmt: skip
 _ENTRIES = 8
 
 
@@ -45,6 +53,11 @@ class Pdo:
     def valid(self) -> bool:
         """Exchanged at all."""
         return not self.cob_id & INVALID
+
+    @property
+    def answers_remote(self) -> bool:
+        """A remote frame with its identifier is answered (bit 30 of the COB-ID is 0)."""
+        return not self.cob_id & _NO_REMOTE
 
     @property
     def identifier(self) -> int:
@@ -134,7 +147,7 @@ class CommunicationObjects:
         elif (index, subindex) == (0x1016, 1):
             self.consumer = _number(data, 4)
         elif (index, subindex) == (0x1005, 0):
-            self.sync_cob = _number(data, 4)
+            self.sync_cob = _sync_identifier(_number(data, 4))
         elif index < 0x1400:
             self.read(index, subindex)
             raise SdoAbort(ABORT_READ_ONLY)
@@ -151,6 +164,8 @@ class CommunicationObjects:
             cob_id = _number(data, 4)
             if pdo.valid and not cob_id & INVALID and cob_id & _IDENTIFIER != pdo.identifier:
                 raise SdoAbort(ABORT_VALUE_RANGE)
+            if not cob_id & INVALID:
+                _check_identifier(cob_id)
             pdo.cob_id = cob_id
         elif subindex == 2:
             kind = _number(data, 1)
@@ -158,7 +173,11 @@ class CommunicationObjects:
                 raise SdoAbort(ABORT_VALUE_RANGE)
             pdo.kind = kind
         elif subindex == 3 and pdo.direction == "tx":
-            pdo.inhibit_100us = _number(data, 2)
+            inhibit_100us = _number(data, 2)
+            if pdo.valid:
+                # CiA 301 clause 7.5.2.37: not to be changed while the PDO exists.
+                raise SdoAbort(ABORT_DEVICE_STATE)
+            pdo.inhibit_100us = inhibit_100us
         elif subindex == 5:
             pdo.event_ms = _number(data, 2)
         else:
@@ -205,6 +224,20 @@ def _read_pdo(pdo: Pdo, subindex: int) -> bytes:
     if subindex not in values:
         raise SdoAbort(ABORT_NO_SUBINDEX)
     return values[subindex]
+
+
+def _check_identifier(cob_id: int) -> None:
+    """Refuse identifiers of other services and 29-bit ones, which this node does not have."""
+    if cob_id & _EXTENDED or any(cob_id & _IDENTIFIER in taken for taken in _RESTRICTED):
+        raise SdoAbort(ABORT_VALUE_RANGE)
+
+
+def _sync_identifier(cob_id: int) -> int:
+    """1005h: this node takes SYNC and cannot send it (CiA 301 clause 7.5.2.5)."""
+    if cob_id & _GENERATES_SYNC:
+        raise SdoAbort(ABORT_VALUE_RANGE)
+    _check_identifier(cob_id)
+    return cob_id
 
 
 def _number(data: bytes, size: int) -> int:

@@ -18,6 +18,7 @@ from drivers.virtual.device import (
 )
 
 _ABORT_BLOCK_SIZE = 0x05040002
+_ABORT_SEQUENCE = 0x05040003
 _ABORT_CRC = 0x05040004
 _BLOCK = 64
 _LONGEST = 1 << 20
@@ -40,7 +41,10 @@ class _Transfer:
 
 
 class SdoServer:
-    """Answers request frames. ``read`` and ``write`` take (index, subindex[, data])."""
+    """Answers request frames. ``read`` and ``write`` take (index, subindex[, data]).
+
+    ``size`` tells an object's bytes where its type fixes them: a write may leave its length open.
+    """
 
     def __init__(
         self,
@@ -48,9 +52,11 @@ class SdoServer:
         write: Callable[[int, int, bytes], None],
         *,
         offers_block: bool = True,
+        size: Callable[[int, int], int | None] | None = None,
     ) -> None:
         self._read = read
         self._write = write
+        self._size = size
         self._offers_block = offers_block
         self._transfer: _Transfer | None = None
 
@@ -113,12 +119,17 @@ class SdoServer:
         mux = frame[1:4]
         self._transfer = None
         if frame[0] & 0x02:
-            size = 4 - (frame[0] >> 2 & 3) if frame[0] & 0x01 else 4
+            size = 4 - (frame[0] >> 2 & 3) if frame[0] & 0x01 else self._open_size(mux)
             self._write(*_object(mux), frame[4 : 4 + size])
         else:
             size_given = struct.unpack("<I", frame[4:8])[0] if frame[0] & 0x01 else None
             self._transfer = _Transfer("download", mux, size=size_given)
         return [b"\x60" + mux + bytes(4)]
+
+    def _open_size(self, mux: bytes) -> int:
+        """How much of an expedited write without a length is meant: what the object takes."""
+        known = self._size(*_object(mux)) if self._size is not None else None
+        return 4 if known is None else min(known, 4)
 
     def _download_segment(self, transfer: _Transfer, frame: bytes) -> list[bytes]:
         if frame[0] & 0x10 != transfer.toggle:
@@ -155,6 +166,9 @@ class SdoServer:
             self._transfer = None
             return []
         if step == 2:
+            left = -(-len(transfer.data[transfer.position :]) // 7) or 1
+            if frame[1] > min(transfer.block, left):
+                raise SdoAbort(_ABORT_SEQUENCE)
             transfer.position += 7 * frame[1]
             if not 1 <= frame[2] <= 127:
                 raise SdoAbort(_ABORT_BLOCK_SIZE)

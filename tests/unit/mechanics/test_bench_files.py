@@ -1,0 +1,115 @@
+"""Bench files with odd but plausible machines are taken; impossible ones are refused, with why."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from drivers.errors import NotAllowed
+from drivers.virtual.bench import load_bench
+from drivers.virtual.mechanics.spec import (
+    FrictionSpec,
+    LoadSpec,
+    MechanicsSpec,
+    MotorSpec,
+    SwitchSpec,
+    TravelSpec,
+)
+
+MOTOR = MotorSpec(inertia_kgm2=5e-5, rated_torque_nm=1.27, rated_speed_rpm=3000)
+AXIS = '[[axis]]\nname = "{name}"\ndrive = "{drive}"\non = "{on}"\nstation = {station}\n'
+
+
+def refused(tmp_path: Path, text: str) -> str:
+    file = tmp_path / "bench.toml"
+    file.write_text(text, "utf-8")
+    with pytest.raises(NotAllowed) as caught:
+        load_bench(file)
+    return caught.value.message
+
+
+@pytest.mark.parametrize(
+    ("drive", "on", "station", "says"),
+    [
+        ("mms8", "mlink://virtual0", 1, "no profile named 'mms8'; there are: ds_c"),
+        ("m6l", "mlink://virtual0", 1, "has no mlink port"),
+        ("mms7", "canopen://virtual0", 1, "has no canopen port"),
+        ("mms7", "mlink://virtual0", 248, "station 248 of mlink://virtual0 is outside 1 to 247"),
+        ("ds_c", "canopen://virtual0", 128, "outside 1 to 127"),
+        ("ds_c", "canopen://virtual0", 0, "outside 1 to 127"),
+        ("ds_c", "canopen://socketcan/can0", 1, "answers on no canopen://socketcan/can0"),
+        ("mms7", "usb://virtual0", 1, "no bus URL"),
+    ],
+)
+def test_ports_that_a_drive_does_not_have(
+    tmp_path: Path, drive: str, on: str, station: int, says: str
+) -> None:
+    assert says in refused(tmp_path, AXIS.format(name="X", drive=drive, on=on, station=station))
+
+
+def test_two_axes_of_one_name_would_be_one_machine(tmp_path: Path) -> None:
+    text = "".join(
+        AXIS.format(name="X", drive="mms7", on="mlink://virtual0", station=n) for n in (1, 2)
+    )
+    assert "two axes are named 'X'" in refused(tmp_path, text)
+
+
+@pytest.mark.parametrize("text", ['axis = "X"', "axis = [1]", "", "[[axis]]", "\x00", '{"axis"'])
+def test_what_is_no_bench_is_told_in_words(tmp_path: Path, text: str) -> None:
+    assert str(tmp_path / "bench.toml") in refused(tmp_path, text)
+
+
+def test_missing_mechanics_are_named(tmp_path: Path) -> None:
+    text = AXIS.format(name="X", drive="mms7", on="mlink://virtual0", station=1)
+    message = refused(tmp_path, text + 'mechanics = "gantry.toml"\n')
+    assert f"{tmp_path / 'gantry.toml'}: No such file or directory" in message
+
+
+@pytest.mark.parametrize(
+    ("parts", "says"),
+    [
+        ({"friction": {"gravity_nm": -5.0}}, "more than this motor holds"),
+        ({"friction": {"coulomb_nm": math.inf}}, "finite"),
+        ({"motor": {"inertia_kgm2": math.inf}}, "finite"),
+        ({"load": [{"inertia_kgm2": 1e-4, "stiffness_nm_per_rad": math.inf}]}, "finite"),
+        ({"travel": {"min_rev": math.nan, "max_rev": 2}}, "start position"),
+        ({"switches": {"negative_limit_rev": 3, "positive_limit_rev": -3}}, "must lie below"),
+        ({"switches": {"home_from_rev": 1, "home_to_rev": 1}}, "begin before it ends"),
+        (
+            {"travel": {"min_rev": -2, "max_rev": 2}, "switches": {"positive_limit_rev": 2.5}},
+            "positive_limit_rev 2.5 lies beyond the end stops",
+        ),
+        (
+            {"travel": {"min_rev": -2, "max_rev": 2}, "switches": {"positive_limit_rev": -1.9}},
+            "leave no room",
+        ),
+    ],
+)
+def test_impossible_machines_are_refused(parts: dict[str, object], says: str) -> None:
+    motor = parts.pop("motor", {})
+    assert isinstance(motor, dict)
+    table = {"motor": MOTOR.model_dump() | motor} | parts
+    with pytest.raises(ValueError, match=says):
+        MechanicsSpec.model_validate(table)
+
+
+def test_a_short_travel_keeps_its_switches_apart() -> None:
+    """A gripper of a fifth of a turn each way: 0.25 turns before the stops would cross over."""
+    gripper = MechanicsSpec(motor=MOTOR, travel=TravelSpec(min_rev=-0.2, max_rev=0.2))
+    assert gripper.limit_switches_rev == pytest.approx((-0.16, 0.16))
+
+
+def test_odd_but_plausible_machines_are_taken() -> None:
+    behind_a_gear_of_60 = LoadSpec(inertia_kgm2=3.6 / 60**2, stiffness_nm_per_rad=9000 / 60**2)
+    vertical = FrictionSpec(gravity_nm=1.2, coulomb_nm=0.1)
+    for spec in (
+        MechanicsSpec(motor=MOTOR, load=(behind_a_gear_of_60,)),
+        MechanicsSpec(motor=MOTOR.model_copy(update={"brake": True}), friction=vertical),
+        MechanicsSpec(motor=MOTOR, friction=FrictionSpec(coulomb_nm=10.0)),  # seized, to train on
+        MechanicsSpec(motor=MOTOR, travel=TravelSpec(min_rev=0, max_rev=900)),
+        MechanicsSpec(motor=MOTOR, switches=SwitchSpec(home_from_rev=-math.inf)),
+    ):
+        low, high = spec.limit_switches_rev
+        assert low < high
