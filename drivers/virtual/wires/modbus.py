@@ -294,7 +294,10 @@ def _execute(registers: Registers, request: Request) -> bytes:
             if not 1 <= request.count <= MAX_READ_REGISTERS:
                 return exception_response(request.station, READ, _ILLEGAL_DATA)
             return read_response(request.station, registers.read(request.start, request.count))
-        if request.function in (WRITE_ONE, WRITE_MANY) and request.values:
+        if request.function in (WRITE_ONE, WRITE_MANY):
+            if not request.values:
+                # A whole frame whose count and length contradict each other or the standard.
+                return exception_response(request.station, request.function, _ILLEGAL_DATA)
             registers.write(request.start, request.values)
             return write_response(request)
     except SdoAbort as abort:
