@@ -19,8 +19,13 @@ from backend.parameter_set import MAX_BYTES, BadSet, Row
 from profiles.schema import Parameter, Profile, Raw
 
 _MAX_LINES = 20_000
+#: The last two are what spreadsheets of Western and Chinese systems write.
+_ENCODINGS = ["utf-8-sig", "cp1252", "gb18030"]
 _KEY = re.compile(r"(?:0x)?([0-9a-f]{4})(?:h?[:.\s_/-]\s*|sub)(?:0x)?([0-9a-f]{1,2})h?", re.I)
 _INDEX = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{4})h?)", re.I)
+#: What a spreadsheet writes and wants in front of a list.
+_SEPARATOR_LINE = re.compile(r'"?sep=([,;\t])"?', re.I)
+_SAME_UNIT = {"r/min": "rpm", "1/min": "rpm", "min-1": "rpm", "u/min": "rpm", "sec": "s"}
 _HEADINGS = {
     "key": {"key", "address", "object", "parameter", "id", "number"},
     "index": {"index", "idx"},
@@ -40,6 +45,7 @@ class _Columns:
     subindex: int = -1
     raw: int = -1
     value: int = -1
+    unit: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +84,14 @@ def read_csv(data: bytes, profile: Profile, name: str = "the file") -> Parameter
         raise BadSet(f"{name} is larger than {MAX_BYTES} bytes", remedy="choose another file")
     text = _decoded(data, name)
     separator = _separator(text)
-    lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] != "#"]
+    places, lines = _lines(text)
     columns: _Columns | None = None
     readings: dict[str, Reading] = {}
     problems: list[str] = []
     try:
         rows = csv.reader(lines[:_MAX_LINES], delimiter=separator, skipinitialspace=True)
-        for number, cells in enumerate(rows, start=1):
+        for cells in rows:
+            number = places[rows.line_num - 1]
             if columns is None:
                 columns = _headed(cells)
                 if columns is not None:
@@ -119,7 +126,7 @@ def _harmless(cell: Raw) -> Raw:
 
 
 def _decoded(data: bytes, name: str) -> str:
-    encodings = ["utf-16"] if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ["utf-8-sig", "cp1252"]
+    encodings = ["utf-16"] if data[:2] in (b"\xff\xfe", b"\xfe\xff") else _ENCODINGS
     for encoding in encodings:
         try:
             text = data.decode(encoding)
@@ -130,9 +137,24 @@ def _decoded(data: bytes, name: str) -> str:
     raise BadSet(f"{name} is no text file", remedy="choose a CSV file")
 
 
+def _lines(text: str) -> tuple[list[int], list[str]]:
+    """Lines that are neither empty nor a comment, and their numbers in the file."""
+    kept = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and line.lstrip()[0] != "#" and not _SEPARATOR_LINE.fullmatch(line.strip())
+    ]
+    return [number for number, _ in kept], [line for _, line in kept]
+
+
 def _separator(text: str) -> str:
-    """Of the first line that is no comment: tabulator before semicolon before comma."""
-    first = next((li for li in text.splitlines() if li.strip() and li.lstrip()[0] != "#"), "")
+    """As a spreadsheet's first line says; else of the first line that is no comment: tabulator
+    before semicolon before comma.
+    """
+    told = _SEPARATOR_LINE.fullmatch(text.partition("\n")[0].strip(" \r"))
+    if told is not None:
+        return told[1]
+    first = next(iter(_lines(text)[1]), "")
     return next((mark for mark in ("\t", ";") if mark in first), ",")
 
 
@@ -144,7 +166,6 @@ def _headed(cells: list[str]) -> _Columns | None:
         for column, names in _HEADINGS.items():
             if title in names:
                 places.setdefault(column, place)
-    places.pop("unit", None)
     if not ({"key", "index"} & places.keys() and {"raw", "value"} & places.keys()):
         return None
     return _Columns(**places)
@@ -173,6 +194,11 @@ def _reading(cells: list[str], columns: _Columns, profile: Profile, separator: s
     value = _value(parameter, text, separator)
     if isinstance(value, str):
         return _made(parameter, value)
+    if not _same_unit(cell(columns.unit), parameter.unit):
+        raise ValueError(
+            f"{parameter.key}: {text[:40]} is in {cell(columns.unit)[:20]}, and this parameter "
+            f"is in {parameter.unit or 'plain numbers'}"
+        )
     return _made(parameter, parameter.to_raw(value))
 
 
@@ -198,6 +224,16 @@ def _parameter(key: str, index: str, subindex: str, profile: Profile) -> Paramet
     return found
 
 
+def _same_unit(theirs: str, ours: str) -> bool:
+    """Whether a list's unit is the parameter's; a list need not name any."""
+
+    def plain(unit: str) -> str:
+        bare = unit.strip(" []()").casefold().replace("\u00b5", "\u03bc").replace("^", "")
+        return _SAME_UNIT.get(bare, bare)
+
+    return not theirs or plain(theirs) == plain(ours)
+
+
 def _whole(text: str) -> int | None:
     match = re.fullmatch(r"([+-]?)(?:0x([0-9a-f]{1,16})|([0-9]{1,20}))", text, re.I | re.A)
     if match is None:
@@ -211,8 +247,8 @@ def _value(parameter: Parameter, text: str, separator: str) -> Raw:
         return text.removeprefix("'") if text[:2] in ("'=", "'+", "'-", "'@") else text
     if (whole := _whole(text)) is not None:
         return whole
-    if separator != "," and re.fullmatch(r"[+-]?\d{1,3}(,\d{3})+", text, re.A):
-        # 1,000 is a thousand to one person and one to another.
+    if separator != "," and re.fullmatch(r"[+-]?[1-9]\d{0,2}([,.])\d{3}(\1\d{3})*", text, re.A):
+        # 1,000 and 1.000 are a thousand to one person and one to another.
         raise ValueError(f"{parameter.key}: {text} can be read in two ways")
     if separator != ",":
         text = text.replace(",", ".")

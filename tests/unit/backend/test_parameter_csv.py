@@ -41,6 +41,11 @@ def test_what_is_written_is_read(profile: Profile) -> None:
         "2005h:03h;350\n",
         "0x2005:3,350",
         "\ufeffkey,raw\r\n2005:03,350\r\n",
+        "sep=;\r\nkey;value\r\n2005:03;35,0\r\n",
+        '"sep=,"\nkey,value\n2005:03,35.0\n',
+        'key,name,value\n2005:03,"Speed\nbandwidth",35.0\n',
+        "key;value;unit\n2005:03;35;[hz]\n",
+        "key;value;unit\n2005:03;35;\n",
     ],
 )
 def test_lists_of_other_tools(profile: Profile, text: str) -> None:
@@ -66,9 +71,28 @@ def test_a_bad_line_spoils_only_itself(profile: Profile, line: str, complaint: s
     assert complaint in found.problems[0]
 
 
-def test_a_thousand_or_one_is_not_guessed(profile: Profile) -> None:
-    found = read_csv(b"key;raw\n2100:00;5\n2005:03;1,000\n", profile)
+@pytest.mark.parametrize("number", ["1,000", "1.000", "-12.500", "1.000.000", "1,000,000"])
+def test_a_thousand_or_one_is_not_guessed(profile: Profile, number: str) -> None:
+    found = read_csv(f"key;raw\n2100:00;5\n2005:03;{number}\n".encode(), profile)
     assert "two ways" in found.problems[0]
+
+
+def test_another_unit_is_not_taken_for_the_parameters(profile: Profile) -> None:
+    found = read_csv(b"key,value,unit\n2100:00,5,\n2005:03,0.35,kHz\n", profile)
+    assert [r.key for r in found.readings] == ["2100:00"]
+    assert found.problems == ("line 3: 2005:03: 0.35 is in kHz, and this parameter is in Hz",)
+
+
+def test_problems_name_the_line_of_the_file(profile: Profile) -> None:
+    text = "# made by a tool\n\nkey,raw\n2100:00,5\n\n2005:03,many\n"
+    assert read_csv(text.encode(), profile).problems[0].startswith("line 6: ")
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "gb18030", "cp1252", "utf-8-sig"])
+def test_encodings_of_spreadsheets(profile: Profile, encoding: str) -> None:
+    name = "速度环带宽，优先" if encoding != "cp1252" else "Geschwindigkeit für Größe"
+    data = f"key;name;raw\n2005:03;{name};350\n".encode(encoding)
+    assert {r.key: r.raw for r in read_csv(data, profile).readings} == {"2005:03": 350}
 
 
 def test_no_formulas_for_spreadsheets(profile: Profile) -> None:
