@@ -71,22 +71,26 @@ export function OverviewPage({ drive }: { drive: string }) {
             <Words state={state} />
           </Panel>
           <div className="later stack">
-            <SceneHere drive={drive} />
             <WatchPanel drive={drive} />
             <Procedures drive={drive} />
           </div>
         </div>
-        <Panel title={t('overview.machine')}>
-          <StateMachine
-            state={state?.fresh ? state.state : null}
-            goals={state?.fresh ? state.goals : []}
-            busy={change.busy}
-            onGoal={(goal) => void goTo(goal)}
-          />
-          <p className="dim">{t('overview.machineHelp')}</p>
-          <Blocked state={state} />
-          <ProblemNote problem={change.problem} onClose={change.clear} />
-        </Panel>
+        <div className="stack">
+          <Panel title={t('overview.machine')}>
+            <StateMachine
+              state={state?.fresh ? state.state : null}
+              goals={state?.fresh ? state.goals : []}
+              busy={change.busy}
+              onGoal={(goal) => void goTo(goal)}
+            />
+            <p className="dim">{t('overview.machineHelp')}</p>
+            <Blocked state={state} />
+            <ProblemNote problem={change.problem} onClose={change.clear} />
+          </Panel>
+          <div className="later">
+            <SceneHere drive={drive} />
+          </div>
+        </div>
       </div>
     </div>
   )

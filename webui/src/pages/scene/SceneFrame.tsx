@@ -21,8 +21,8 @@ export function SceneFrame({ axis, className = '' }: { axis?: string; className?
   const place = drives.findIndex((each) => each.id === axis)
   if (place >= 0) {
     const y = (drives.length / 2 - 0.5 - place) * SPACING
-    query.set('initialCameraPosition', `-0.15,${(y - 1.55).toFixed(3)},0.85`)
-    query.set('initialCameraLookAt', `-0.15,${y.toFixed(3)},0.12`)
+    query.set('initialCameraPosition', `-0.2,${(y - 1.2).toFixed(3)},0.95`)
+    query.set('initialCameraLookAt', `-0.2,${y.toFixed(3)},0.1`)
   }
   return (
     <iframe
