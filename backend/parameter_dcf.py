@@ -8,7 +8,13 @@ from datetime import datetime
 from backend.drive import Reading
 from backend.parameter_csv import ParameterList
 from backend.parameter_set import BadSet, Row
-from profiles.importer import ImportFailed, ImportReport, export_dcf, read_dcf_values
+from profiles.importer import (
+    ImportFailed,
+    ImportReport,
+    export_dcf,
+    read_dcf_identity,
+    read_dcf_values,
+)
 from profiles.importer.values import default_value
 from profiles.schema import Profile, Raw
 
@@ -41,6 +47,7 @@ def read_dcf(data: bytes, profile: Profile, name: str = "the file") -> Parameter
     readings: dict[str, Reading] = {}
     problems: list[str] = []
     try:
+        problems += _of_another_drive(data, profile, name)
         for value in read_dcf_values(data, name, report):
             key = f"{value.index:04X}:{value.subindex:02X}"
             parameter = profile.by_key.get(key)
@@ -63,3 +70,28 @@ def read_dcf(data: bytes, profile: Profile, name: str = "the file") -> Parameter
             remedy="choose a file of the same drive family",
         )
     return ParameterList(tuple(readings.values()), tuple(problems))
+
+
+def _of_another_drive(data: bytes, profile: Profile, name: str) -> list[str]:
+    """What the file says of its drive against the profile: the same numbers of another maker's
+    drive mean something else.
+
+    Raises:
+        BadSet: another maker's. ImportFailed: too big.
+    """
+    vendor, product = read_dcf_identity(data, name)
+    ours = profile.identity
+    if vendor is not None and ours.vendor_id and vendor != ours.vendor_id:
+        raise BadSet(
+            f"{name} is for a drive of vendor {vendor:08X}h; a {profile.title} has "
+            f"{ours.vendor_id:08X}h",
+            value=vendor,
+            limit=f"{ours.vendor_id:08X}h",
+            remedy="choose the family that the file is of",
+        )
+    if product is not None and ours.product_code and product != ours.product_code:
+        return [
+            f"{name} is for product {product:08X}h, this family is {ours.product_code:08X}h: "
+            "check every value"
+        ]
+    return []

@@ -8,7 +8,8 @@ from backend.drive import Drive
 from backend.parameter_csv import ParameterList, read_csv, write_csv
 from backend.parameter_dcf import read_dcf, write_dcf
 from backend.parameter_set import ParameterSet, dump
-from profiles.importer import is_dcf
+from drivers.link import Found
+from profiles.importer import is_dcf, read_dcf_identity
 from profiles.schema import Profile
 
 
@@ -20,9 +21,16 @@ def import_list(
     Raises:
         BadSet: no such list, or nothing in it belongs to ``profile``.
     """
-    found = (read_dcf if is_dcf(data) else read_csv)(data, profile, name)
     # A list names no drive: the set must not claim to have been saved from one.
     source = Drive("", f"list {name}", profile, [])
+    if is_dcf(data):
+        found = read_dcf(data, profile, name)
+        vendor, product = read_dcf_identity(data, name)
+        if vendor is not None:
+            # Loading it asks about drives of another kind, as with a set of our own.
+            source.found = Found(0, vendor_id=vendor, product_code=product)
+    else:
+        found = read_csv(data, profile, name)
     notes = "\n".join(("imported from a list", *found.problems))[:4000]
     return dump(source, found.readings, author="", notes=notes, saved=saved), found
 

@@ -1,7 +1,12 @@
 """Profiles from makers' description files (ESI, EDS, DCF) or from a drive's own dictionary."""
 
 from profiles.importer.build import ImportedProfile, build_profile
-from profiles.importer.dcf import ConfiguredValue, is_dcf, read_dcf_values
+from profiles.importer.dcf import (
+    ConfiguredValue,
+    is_dcf,
+    read_dcf_identity,
+    read_dcf_values,
+)
 from profiles.importer.description import DescribedEntry, DescribedPdo, Description
 from profiles.importer.dictionary import describe_dictionary
 from profiles.importer.eds import read_eds
@@ -26,6 +31,7 @@ __all__ = [
     "export_eds",
     "import_file",
     "is_dcf",
+    "read_dcf_identity",
     "read_dcf_values",
     "read_eds",
     "read_esi",

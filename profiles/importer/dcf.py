@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from profiles.importer.eds import MAX_BYTES, object_values
+from profiles.importer.eds import MAX_BYTES, device_identity, object_values
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.importer.texts import check_size, decode_text
 
@@ -44,3 +44,14 @@ def read_dcf_values(data: bytes, name: str, report: ImportReport) -> Iterator[Co
     if not found:
         raise ImportFailed(f"{name} sets no values: an EDS describes a drive, a DCF configures it")
     return iter(found)
+
+
+def read_dcf_identity(data: bytes, name: str) -> tuple[int | None, int | None]:
+    """Vendor and product number of the drive that the file was made for, None where not given.
+
+    Raises:
+        ImportFailed: too big.
+    """
+    check_size(data, MAX_BYTES, name)
+    quiet = ImportReport()
+    return device_identity(decode_text(data, name, quiet), name, quiet)

@@ -83,8 +83,16 @@ def read_eds(data: bytes, name: str, report: ImportReport) -> Description:
 def object_values(
     text: str, name: str, report: ImportReport
 ) -> Iterator[tuple[int, int, str, int]]:
-    """Index, subindex, ``ParameterValue`` and line of every object that has one (a DCF)."""
+    """Index, subindex, ``ParameterValue`` and line of every object that has one (a DCF).
+
+    Values of arrays in compact storage stand in a section of their own, as ``[607DValue]``.
+    """
     for title, section in _sections(text, name, report).items():
+        if (match := _COMPACT.match(title)) and match[2] == "value":
+            for key, text_of_key in section.values.items():
+                if key.isdecimal() and 1 <= int(key) <= 254 and text_of_key:
+                    yield int(match[1], 16), int(key), text_of_key, section.line
+            continue
         value = section.get("parametervalue")
         if not value:
             continue
@@ -92,6 +100,15 @@ def object_values(
             yield int(match[1], 16), int(match[2], 16), value, section.line
         elif match := _OBJECT.match(title):
             yield int(match[1], 16), 0, value, section.line
+
+
+def device_identity(text: str, name: str, report: ImportReport) -> tuple[int | None, int | None]:
+    """Vendor and product number of [DeviceInfo]; None where the file gives none."""
+    device = _sections(text, name, ImportReport()).get("deviceinfo", _Section(0))
+    return (
+        _identity(device, "vendornumber", name, report),
+        _identity(device, "productnumber", name, report),
+    )
 
 
 def _identity(device: _Section, key: str, name: str, report: ImportReport) -> int | None:

@@ -15,9 +15,11 @@ from typer.testing import CliRunner
 
 from backend.commands.params import app
 from backend.parameter_dcf import read_dcf, write_dcf
+from backend.parameter_list import import_list
 from backend.parameter_set import BadSet, Row, parse
 from profiles import load_profile
 from profiles.importer import export_eds
+from profiles.schema import Profile
 
 DS_C = load_profile("ds_c")
 WHEN = datetime(2026, 1, 2, 3, 4)
@@ -79,6 +81,35 @@ def test_another_makers_file() -> None:
     # FFFFFB50h as a 32-bit two's complement is -1200; a default is no value to be set.
     assert {r.key: r.raw for r in found.readings} == {"6083:00": 250, "607C:00": -1200}
     assert any("5FFF:00" in problem for problem in found.problems)
+
+
+def test_arrays_in_compact_storage() -> None:
+    """CiA 306-1 clause 7.5.3: their values stand in a section of their own."""
+    compact = b"[607D]\nObjectType=8\nCompactSubObj=2\n[607DValue]\nNrOfEntries=2\n1=-9\n2=0x8\n"
+    found = read_dcf(compact, load_profile("generic402"))
+    assert {r.key: r.raw for r in found.readings} == {"607D:01": -9, "607D:02": 8}
+
+
+def test_a_file_for_another_makers_drive_is_refused() -> None:
+    identity = DS_C.identity.model_copy(update={"vendor_id": 0x31, "product_code": 5})
+    known = DS_C.model_copy(update={"identity": identity})
+
+    def read(numbers: bytes, profile: Profile = known) -> tuple[str, ...]:
+        return read_dcf(THEIRS.replace(b"VendorName=somebody", numbers), profile).problems
+
+    for numbers in (b"VendorNumber=0x31\r\nProductNumber=5", b"VendorNumber=0", b"VendorNumber="):
+        assert not any("product" in problem for problem in read(numbers))
+    assert "for product 00000006h, this family is 00000005h" in read(b"ProductNumber=6")[0]
+    with pytest.raises(BadSet, match="is for a drive of vendor 00000099h"):
+        read(b"VendorNumber=0x99")
+    read(b"VendorNumber=0x99", DS_C)  # whose manual prints no vendor number
+
+
+def test_the_set_of_a_dcf_says_for_which_drive_it_is() -> None:
+    numbered = THEIRS.replace(b"VendorName=somebody", b"VendorNumber=0x31\r\nProductNumber=5")
+    for data, identity in ((numbered, (0x31, 5, None)), (THEIRS, (None, None, None))):
+        content = parse(import_list(data, DS_C, "theirs.dcf", WHEN)[0])
+        assert (content.vendor_id, content.product_code, content.serial) == identity
 
 
 def test_parameters_without_an_object_are_counted() -> None:
