@@ -1,4 +1,4 @@
-"""Runs every check in turn, says how long each took, and fails if any failed.
+"""Runs every check, says how long each took, and fails if any failed.
 
     python tests/run_all.py [--fast]
 
@@ -12,8 +12,12 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
+import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import IO, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 BIN = Path(sys.executable).parent
@@ -29,28 +33,87 @@ REAL_TIME = [
     "tests/wire/ethercat_host",
     "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
 ]  # fmt: skip
+#: Suites that compute and keep no time: what the others leave of the machine is enough for them.
+PATIENT = ["tests/profiles", "tests/unit", "tests/virtual"]
+#: Runs only while nothing else wants to (SCHED_IDLE), so that no bus is kept waiting for it.
+AT_IDLE = ["chrt", "--idle", "0"]
 
-CHECKS: list[tuple[str, list[str], Path]] = [
-    ("format", [str(BIN / "ruff"), "format", "--check", "."], ROOT),
-    ("lint", [str(BIN / "ruff"), "check", "."], ROOT),
-    ("types", [str(BIN / "mypy")], ROOT),
-    ("dependencies", [str(BIN / "deptry"), "."], ROOT),
-    ("import contracts", [str(BIN / "lint-imports")], ROOT),
-    ("page: types and lint", [*NPM, "run", "--silent", "check"], ROOT / "webui"),
-    ("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),
-    ("client drift", [sys.executable, "tests/client_drift.py"], ROOT),
-    ("docs", [str(BIN / "mkdocs"), "build", "--strict", "--quiet"], ROOT),
-    ("tests", [*PYTEST, "-n", "2", "--dist", "loadfile", "-m", "not browser",
-               *(f"--ignore={path}" for path in REAL_TIME)], ROOT),
-    ("EtherCAT tests", [*PYTEST, *REAL_TIME], ROOT),
-    ("browser tests", [*PYTEST, "-m", "browser", "tests/browser"], ROOT),
+
+class Check(NamedTuple):
+    """A command that must end with 0."""
+
+    name: str
+    command: Sequence[str]
+    folder: Path = ROOT
+
+
+def pytest(name: str, *arguments: str) -> Check:
+    """A suite; each keeps its own note of what failed, as two may run at a time."""
+    return Check(name, [*PYTEST, "-o", f"cache_dir=.pytest_cache/{name}", *arguments])
+
+
+QUICK = [
+    Check("format", [str(BIN / "ruff"), "format", "--check", "."]),
+    Check("lint", [str(BIN / "ruff"), "check", "."]),
+    Check("types", [str(BIN / "mypy")]),
+    Check("dependencies", [str(BIN / "deptry"), "."]),
+    Check("import contracts", [str(BIN / "lint-imports")]),
+    Check("page: types and lint", [*NPM, "run", "--silent", "check"], ROOT / "webui"),
+    Check("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),
+    Check("client drift", [sys.executable, "tests/client_drift.py"]),
+]
+#: One after the other, with the machine to themselves but for `BESIDE`.
+TIMED = [
+    pytest("tests", "-n", "2", "--dist", "loadfile", "-m", "not browser", "tests",
+           *(f"--ignore={path}" for path in (*REAL_TIME, *PATIENT))),
+    pytest("EtherCAT tests", *REAL_TIME),
+    pytest("browser tests", "-m", "browser", "tests/browser"),
 ]  # fmt: skip
-SLOW = {"tests", "EtherCAT tests", "browser tests", "docs"}
+BESIDE = [
+    Check("docs", [str(BIN / "mkdocs"), "build", "--strict", "--quiet"]),
+    pytest("patient tests", *PATIENT),
+]
 
 
-def last_failed() -> list[str]:
-    """Files with tests that failed in the last run of pytest; forgotten with this answer."""
-    note = ROOT / ".pytest_cache" / "v" / "cache" / "lastfailed"
+class Runner:
+    """Runs checks one by one, and remembers which failed."""
+
+    def __init__(self, out: IO[str], before: Sequence[str] = ()) -> None:
+        self.failed: list[str] = []
+        self._out = out
+        self._before = before
+        self._environment = os.environ | {"PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
+
+    def run(self, checks: Sequence[Check]) -> None:
+        """Run them in turn; what they print goes where this prints."""
+        for check in checks:
+            self._say(f"== {check.name}")
+            began = time.monotonic()
+            code = self._once(check.command, check.folder)
+            if code == 1 and list(check.command[: len(PYTEST)]) == PYTEST:
+                # Once more, alone, and said aloud: a busy machine is no defect, a defect stays one.
+                # Whole files, as the tests of some follow one another.
+                files = last_failed(check.name)
+                self._say(f"== {check.name}: once more, alone: {' '.join(files)}")
+                code = self._once(pytest(check.name, *files).command, ROOT)
+            self._say(f"== {check.name}: {time.monotonic() - began:.0f} s, exit {code}")
+            if code != 0:
+                self.failed.append(check.name)
+
+    def _say(self, line: str) -> None:
+        print(line, file=self._out, flush=True)
+
+    def _once(self, command: Sequence[str], folder: Path) -> int:
+        whole = [*self._before, *command]
+        return subprocess.run(
+            whole, cwd=folder, env=self._environment, check=False,
+            stdout=self._out, stderr=subprocess.STDOUT,
+        ).returncode  # fmt: skip
+
+
+def last_failed(name: str) -> list[str]:
+    """Files with tests that failed in the last run of a suite; forgotten with this answer."""
+    note = ROOT / ".pytest_cache" / name / "v" / "cache" / "lastfailed"
     failed = json.loads(note.read_text("utf-8"))
     note.unlink()
     return sorted({test.partition("::")[0] for test in failed})
@@ -59,27 +122,22 @@ def last_failed() -> list[str]:
 def main() -> int:
     """Run the checks; the exit code is the number of those that failed."""
     fast = "--fast" in sys.argv
-    (ROOT / ".pytest_cache" / "v" / "cache" / "lastfailed").unlink(missing_ok=True)
-    environment = os.environ | {"PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
-    failed: list[str] = []
-    for name, command, folder in CHECKS:
-        if fast and name in SLOW:
-            continue
-        print(f"== {name}", flush=True)
-        began = time.monotonic()
-        done = subprocess.run(command, cwd=folder, env=environment, check=False)
-        if done.returncode == 1 and command[: len(PYTEST)] == PYTEST:
-            # Once more, alone, and said aloud: a busy machine is no defect, a defect stays one.
-            # Whole files, as the tests of some follow one another.
-            files = last_failed()
-            print(f"== {name}: once more, alone: {' '.join(files)}", flush=True)
-            done = subprocess.run([*PYTEST, *files], cwd=folder, env=environment, check=False)
-        print(f"== {name}: {time.monotonic() - began:.0f} s, exit {done.returncode}", flush=True)
-        if done.returncode != 0:
-            failed.append(name)
+    shutil.rmtree(ROOT / ".pytest_cache", ignore_errors=True)
+    runner = Runner(sys.stdout)
+    runner.run(QUICK)
+    checks, failed = QUICK, runner.failed
+    if not fast:
+        with tempfile.TemporaryFile("w+", encoding="utf-8") as printed:
+            beside = Runner(printed, AT_IDLE)
+            thread = threading.Thread(target=beside.run, args=(BESIDE,))
+            thread.start()
+            runner.run(TIMED)
+            thread.join()
+            printed.seek(0)
+            shutil.copyfileobj(printed, sys.stdout)
+        checks, failed = [*QUICK, *TIMED, *BESIDE], runner.failed + beside.failed
     print(f"failed: {', '.join(failed)}" if failed else "all checks passed")
-    passed = len(CHECKS) - len(failed) if not fast else len(CHECKS) - len(SLOW) - len(failed)
-    print(f"{passed} passed, {len(failed)} failed")
+    print(f"{len(checks) - len(failed)} passed, {len(failed)} failed")
     return len(failed)
 
 
