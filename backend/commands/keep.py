@@ -55,13 +55,13 @@ def _records(config: Path | None, database: str | None, blobs: str | None = None
     return Records(state_folder(config), Journal(), database, blobs)
 
 
-def _existing(config: Path | None, database: str | None) -> Records:
+def _existing(config: Path | None, database: str | None, blobs: str | None = None) -> Records:
     """The same, where there is something to look at.
 
     Raises:
         NotAllowed: there is no database in this folder.
     """
-    records = _records(config, database)
+    records = _records(config, database, blobs)
     file = records.store.sqlite_file
     if file is not None and not file.exists():
         raise NotAllowed(
@@ -196,7 +196,7 @@ def list_(
     as_json: Annotated[bool, typer.Option("--json")] = False,
 ) -> None:
     """Search the library."""
-    records = _records(config, database)
+    records = _existing(config, database)
     records.sets.take_in()
     records.index.refresh()
     query = Query(words=" ".join(words or ()), kinds=_kinds(kind), tag=tag, limit=1000)
@@ -238,7 +238,7 @@ def export_set(
     out: Out = None,
 ) -> None:
     """Write a parameter set's file."""
-    records = _records(config, database, blobs)
+    records = _existing(config, database, blobs)
     data = records.sets.read(name, version)
     records.store.close()
     if out is None:
@@ -276,7 +276,7 @@ def purge(
     days: Annotated[float, typer.Option(min=0, help="put aside longer ago than this")] = 30.0,
 ) -> None:
     """Delete for good what was put aside, and contents that nothing names any more."""
-    records = _records(config, database, blobs)
+    records = _existing(config, database, blobs)
     gone = records.library.purge(datetime.now(UTC) - timedelta(days=days))
     records.audit.close()
     records.store.close()

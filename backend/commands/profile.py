@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from backend.commands.session import opened, show_progress
+from backend.commands.session import opened, show_progress, told
 from backend.description import profile_of_drive
-from drivers.errors import DriveError, NotAllowed
+from backend.files import write_atomically
+from drivers.errors import NotAllowed
 from profiles import drive_names, load_profile
 from profiles.check import check as check_profile
 from profiles.check import coverage
@@ -30,14 +34,12 @@ app = typer.Typer(help="Drive profiles: show, check, import.")
 
 
 @app.command("show")
+@told
 def show(
     drive: str, as_json: Annotated[bool, typer.Option("--json", help="one stable form")] = False
 ) -> None:
     """Print a whole profile."""
-    try:
-        profile = load_profile(drive)
-    except ProfileError as error:
-        raise typer.BadParameter(str(error)) from error
+    profile = load_profile(drive)
     if as_json:
         print(json.dumps(shown(profile), indent=1, ensure_ascii=False))
         return
@@ -50,9 +52,44 @@ def show(
         )
 
 
+@contextmanager
+def _importing() -> Iterator[None]:
+    """A description that cannot be used is an error as any other."""
+    try:
+        yield
+    except (ImportFailed, ValueError) as error:
+        raise NotAllowed(str(error), remedy="see docs/drives/not-listed.md") from error
+
+
+def _product_code(text: str) -> int:
+    try:
+        return int(text, 0)
+    except ValueError as error:
+        raise NotAllowed(
+            f"--product-code {text!r} is no number", value=text, remedy="write it as 0x190 or 400"
+        ) from error
+
+
+def _check_name(name: str | None) -> None:
+    if name is None:
+        return
+    if not re.fullmatch("[a-z][a-z0-9_]*", name):
+        raise NotAllowed(
+            f"{name!r} cannot be the name of a profile",
+            value=name,
+            limit="lower-case letters, digits and _, a letter first",
+            remedy="choose a name such as my_drive",
+        )
+    if name in drive_names():
+        raise NotAllowed(
+            f"there is a profile {name!r} already", value=name, remedy="choose another --name"
+        )
+
+
 @app.command("import")
+@told
 def import_description(
-    file: Annotated[Path, typer.Argument(help="ESI (.xml), EDS or DCF file", exists=True)],
+    file: Annotated[Path, typer.Argument(help="ESI (.xml), EDS or DCF file")],
     name: Annotated[str | None, typer.Option(help="name of the new profile")] = None,
     product_code: Annotated[
         str | None, typer.Option(help="which device of an ESI file, e.g. 0x190")
@@ -62,19 +99,14 @@ def import_description(
     ] = None,
 ) -> None:
     """Make a generic profile from a maker's description file."""
-    try:
-        code = None if product_code is None else int(product_code, 0)
+    if folder is None:
+        _check_name(name)
+    with _importing():
+        code = None if product_code is None else _product_code(product_code)
         imported = import_file(file.read_bytes(), file.name, drive=name, product_code=code)
-    except (ImportFailed, OSError, ValueError) as error:
-        raise typer.BadParameter(str(error)) from error
-    if folder is None and imported.profile.drive in drive_names():
-        raise typer.BadParameter(
-            f"there is a profile {imported.profile.drive!r} already: choose another with --name"
-        )
-    try:
+        if folder is None:
+            _check_name(imported.profile.drive)
         target = write_profile(imported.profile, folder or user_folder())
-    except (ImportFailed, OSError) as error:
-        raise typer.BadParameter(str(error)) from error
     for finding in imported.report.findings:
         print(f"  {finding}")
     print(f"{imported.profile.title}: {len(imported.profile.parameters)} parameters, "
@@ -83,43 +115,42 @@ def import_description(
 
 
 @app.command("from-drive")
+@told
 def import_from_drive(
     url: Annotated[str, typer.Argument(metavar="BUS_URL")],
     name: Annotated[str, typer.Option(help="name of the new profile")],
     station: Annotated[int, typer.Option(help="station address on the bus")] = 1,
 ) -> None:
     """Make a generic profile from a drive's own dictionary (EtherCAT, SDO information)."""
-    if name in drive_names():
-        raise typer.BadParameter(f"there is a profile {name!r} already: choose another --name")
+    _check_name(name)
 
     async def read() -> ImportedProfile:
         async with opened(url) as link:
             seen = await link.scan(show_progress, [station])
             found = next((f for f in seen if f.station == station), None)
             if found is None:
-                raise NotAllowed(f"nothing answers at station {station} of {url}")
+                raise NotAllowed(
+                    f"nothing answers at station {station} of {url}",
+                    remedy="check power, cable and station",
+                )
             return await profile_of_drive(link, found, name, show_progress)
 
-    try:
+    with _importing():
         imported = asyncio.run(read())
         target = write_profile(imported.profile, user_folder())
-    except (DriveError, ImportFailed, OSError) as error:
-        raise typer.BadParameter(str(error)) from error
     for finding in imported.report.findings:
         print(f"  {finding}")
     print(f"{len(imported.profile.parameters)} parameters written to {target}; use it as {name}")
 
 
 @app.command("export-eds")
+@told
 def export_description(
     drive: str, out: Annotated[Path, typer.Argument(help="the EDS file to write")]
 ) -> None:
     """Write a profile's objects as a CANopen EDS file."""
-    try:
-        profile = load_profile(drive)
-    except ProfileError as error:
-        raise typer.BadParameter(str(error)) from error
-    out.write_bytes(export_eds(profile, datetime.now(), out.name).encode("utf-8"))
+    profile = load_profile(drive)
+    write_atomically(out, export_eds(profile, datetime.now(), out.name).encode("utf-8"))
     print(f"{out} written")
 
 

@@ -85,3 +85,15 @@ def test_a_wrong_dimension_is_named_with_its_value() -> None:
     done = CliRunner().invoke(cli.app, ["gear", "mms7", "--kind", "screw", "--lead", "-1"])
     assert done.exit_code == 1
     assert "lead_mm is -1.0: Input should be greater than" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words", [["list"], ["list", "--json"], ["export", "x.sdset"], ["purge"]], ids=" ".join
+)
+def test_a_library_that_is_not_there_is_not_an_empty_one(words: list[str], tmp_path: Path) -> None:
+    """A slip in --config must not look as if everything had been deleted, nor make a folder."""
+    elsewhere = tmp_path / "sttion"
+    done = CliRunner().invoke(cli.app, ["library", *words, "--config", str(elsewhere)])
+    assert (done.exit_code, done.stdout) == (1, "")
+    assert f"there is no database {elsewhere}/servodeck.db" in done.stderr
+    assert not elsewhere.exists()

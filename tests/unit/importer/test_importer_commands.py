@@ -50,8 +50,30 @@ def test_a_broken_file_is_refused_in_words(folder: Path) -> None:
     source = folder / "broken.xml"
     source.write_text("<EtherCATInfo>", "utf-8")
     done = CliRunner().invoke(app, ["import", str(source)])
-    assert done.exit_code == 2
+    assert done.exit_code == 1
     assert "not well-formed" in done.output
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["show", "nosuch"], "no profile named 'nosuch'"),
+        (["import", "@none.eds"], "none.eds: No such file"),
+        (["import", "@good.eds", "--name", "a/b"], "'a/b' cannot be the name of a profile"),
+        (["import", "@good.eds", "--name", "mms7"], "there is a profile 'mms7' already"),
+        (["import", "@good.xml", "--product-code", "many"], "--product-code 'many' is no number"),
+        (["from-drive", "mlink:///x", "--name", "A"], "'A' cannot be the name"),
+        (["export-eds", "mms7", "@"], "could not be written: Is a directory"),
+    ],
+)
+def test_errors_are_one_sentence_and_exit_code_1(folder: Path, words: list[str], says: str) -> None:
+    (folder / "good.eds").write_text(GOOD_EDS, "utf-8")
+    (folder / "good.xml").write_text(GOOD_ESI, "utf-8")
+    done = CliRunner().invoke(app, [w.replace("@", f"{folder}/") for w in words])
+    assert done.exit_code == 1, done.output
+    assert done.stderr.startswith("error: ")
+    assert says in done.stderr
+    assert "Usage" not in done.stderr
 
 
 def test_the_generic_profile_is_sound() -> None:
