@@ -388,6 +388,7 @@ class Drive:
                 remedy=f"give a value of type {parameter.type}",
             )
         if isinstance(raw, str):
+            self._encodes(parameter, raw)
             return raw
         low, high = parameter.raw_limits
         if (low is not None and raw < low) or (high is not None and raw > high):
@@ -400,10 +401,7 @@ class Drive:
                 limit=limits,
                 remedy=f"choose a value from {limits}",
             )
-        try:
-            encode(parameter.type, raw)
-        except OutOfRange as error:
-            raise self._named(error, parameter) from error
+        self._encodes(parameter, raw)
         if parameter.enum and not parameter.bits and int(raw) not in parameter.enum:
             choices = ", ".join(f"{code} ({text})" for code, text in parameter.enum.items())
             raise OutOfRange(
@@ -415,6 +413,12 @@ class Drive:
                 remedy="choose one of the listed values",
             )
         return raw
+
+    def _encodes(self, parameter: Parameter, raw: Raw) -> None:
+        try:
+            encode(parameter.type, raw)
+        except OutOfRange as error:
+            raise self._named(error, parameter) from error
 
     async def write(self, key: str, value: Raw, *, raw: bool = True) -> Reading:
         """Write one parameter and return what was read back.

@@ -29,7 +29,9 @@ def encode(data_type: DataType, raw: Raw) -> bytes:
     Raises:
         OutOfRange: not a number of this type, or outside it.
     """
-    if data_type in ("STRING", "OCTETS"):
+    if data_type == "OCTETS":
+        return _octets(raw)
+    if data_type == "STRING":
         return raw.encode("utf-8") if isinstance(raw, str) else bytes([int(raw)])
     if isinstance(raw, str) or (isinstance(raw, bool) and data_type != "BOOL"):
         raise OutOfRange(f"{raw!r} is not a {data_type} number", value=raw)
@@ -37,7 +39,7 @@ def encode(data_type: DataType, raw: Raw) -> bytes:
         raise OutOfRange(f"{raw} is no number of {data_type}", value=raw)
     if data_type == "REAL32":
         return struct.pack("<f", float(raw))
-    if float(raw) != int(raw):
+    if isinstance(raw, float) and not raw.is_integer():
         raise OutOfRange(f"{raw} is not a whole number, {data_type} needs one", value=raw)
     low, high = INTEGER_RANGE[data_type]
     if not low <= int(raw) <= high:
@@ -47,6 +49,19 @@ def encode(data_type: DataType, raw: Raw) -> bytes:
     return struct.pack(_FORMAT[data_type], int(raw))
 
 
+def _octets(raw: Raw) -> bytes:
+    """The bytes that `decode` shows as "0a ff"; anything else would be written as letters."""
+    try:
+        return bytes.fromhex(raw) if isinstance(raw, str) else bytes([int(raw)])
+    except (ValueError, OverflowError) as error:
+        raise OutOfRange(
+            f"{raw!r} is no row of bytes in hexadecimal",
+            value=raw,
+            limit="such as 0a ff 00",
+            remedy="write two hexadecimal digits for each byte",
+        ) from error
+
+
 def decode(data_type: DataType, data: bytes) -> Raw:
     """Bytes to raw value.
 
@@ -54,7 +69,12 @@ def decode(data_type: DataType, data: bytes) -> Raw:
         ProtocolError: the length does not fit the type.
     """
     if data_type == "STRING":
-        return data.split(b"\0", 1)[0].decode("utf-8", "replace").strip()
+        text = data.split(b"\0", 1)[0]
+        try:
+            return text.decode("utf-8").strip()
+        except UnicodeDecodeError:
+            # CiA 301 knows only ASCII; makers write their own code page. No letter must be lost.
+            return text.decode("latin-1").strip()
     if data_type == "OCTETS":
         return data.hex(" ")
     form = _FORMAT[data_type]
