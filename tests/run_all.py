@@ -34,7 +34,7 @@ REAL_TIME = [
     "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
 ]  # fmt: skip
 #: Suites that compute and keep no time: what the others leave of the machine is enough for them.
-PATIENT = ["tests/profiles", "tests/unit", "tests/virtual"]
+PATIENT = ["tests/profiles", "tests/unit", "tests/virtual/conformance", "tests/virtual/firmware"]
 #: Runs only while nothing else wants to (SCHED_IDLE), so that no bus is kept waiting for it.
 AT_IDLE = ["chrt", "--idle", "0"]
 
