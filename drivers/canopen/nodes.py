@@ -39,6 +39,8 @@ _EMERGENCY_EXACT = {
 _LATE_PERIODS = 2.5
 _LATE_EXTRA_S = 0.1
 _DUPLICATE_WINDOW_S = 10.0
+#: A drive that flickers sends hundreds of emergencies a second: so many of a node are told in one.
+_EMERGENCIES_PER_S = 10
 
 
 def emergency_text(code: int) -> str:
@@ -61,6 +63,9 @@ class NodeRecord:
     boots: int = 0
     emergencies: int = 0
     last_emergency: int | None = None
+    emergency_window_s: float | None = None
+    emergencies_told: int = 0
+    emergencies_untold: int = 0
     guard_toggle: int | None = None
     guard_asked_s: float | None = None
     foreign_master_s: float | None = None
@@ -92,7 +97,7 @@ class NodeWatch:
         if function == HEARTBEAT and len(frame.data) == 1:
             return self._heartbeat(self.record(node), frame.data[0], now_s)
         if function == EMERGENCY and len(frame.data) == 8:
-            return self._emergency(self.record(node), frame.data)
+            return self._emergency(self.record(node), frame.data, now_s)
         if function == SDO_REQUEST:
             self.record(node).foreign_master_s = now_s
         return []
@@ -145,28 +150,49 @@ class NodeWatch:
             )
         ]
 
-    def _emergency(self, record: NodeRecord, data: bytes) -> list[LinkEvent]:
+    def _emergency(self, record: NodeRecord, data: bytes, now_s: float) -> list[LinkEvent]:
+        events = self._end_of_storm(record, now_s)
         code = int.from_bytes(data[:2], "little")
         record.emergencies += 1
         record.last_emergency = code
         text = emergency_text(code)
         if code == 0x8150:
             record.conflict = text
+        if record.emergencies_told >= _EMERGENCIES_PER_S:
+            record.emergencies_untold += 1
+            return events
+        record.emergencies_told += 1
         extra = f", maker's bytes {data[3:8].hex(' ')}" if any(data[3:8]) else ""
-        return [
-            LinkEvent(
-                "emergency",
-                record.node,
-                f"node {record.node}: {text} (emergency {code:04X}h, "
-                f"error register {data[2]:02X}h{extra})",
-                code,
-            )
-        ]
+        told = LinkEvent(
+            "emergency",
+            record.node,
+            f"node {record.node}: {text} (emergency {code:04X}h, "
+            f"error register {data[2]:02X}h{extra})",
+            code,
+        )
+        return [*events, told]
+
+    def _end_of_storm(self, record: NodeRecord, now_s: float) -> list[LinkEvent]:
+        """Every second emergencies are told again, after how many were not."""
+        if record.emergency_window_s is not None and now_s - record.emergency_window_s < 1.0:
+            return []
+        untold, code = record.emergencies_untold, record.last_emergency
+        record.emergency_window_s = now_s
+        record.emergencies_told = record.emergencies_untold = 0
+        if not untold:
+            return []
+        text = (
+            f"node {record.node} sent {untold} more emergencies within a second, the last one "
+            f"{code:04X}h: a contact or a limit flickers"
+        )
+        return [LinkEvent("emergency", record.node, text, code)]
 
     def overdue(self, now_s: float) -> list[LinkEvent]:
-        """Nodes whose heartbeat stopped; each is told of once."""
+        """Nodes whose heartbeat stopped, each told of once; and emergencies not told yet."""
         events = []
         for record in self.nodes.values():
+            if record.emergencies_untold:
+                events += self._end_of_storm(record, now_s)
             if not record.alive or record.last_heartbeat_s is None or record.period_s is None:
                 continue
             limit_s = record.period_s * _LATE_PERIODS + _LATE_EXTRA_S

@@ -124,6 +124,22 @@ def test_emergency_codes(code: int, text: str) -> None:
     assert emergency_text(code) == text
 
 
+def test_a_storm_of_emergencies_does_not_fill_the_log() -> None:
+    """1000 in half a second, as from a flickering contact: ten are told, then how many were not."""
+    watch = NodeWatch()
+    storm = [Frame(0x85, bytes([0x10, 0x50, 1]) + bytes(5))] * 999
+    storm.append(Frame(0x85, bytes([0x00, 0x00, 0]) + bytes(5)))
+    told = [e for n, frame in enumerate(storm) for e in watch.observe(frame, n * 0.0005)]
+    assert len(told) == 10
+    assert watch.record(5).emergencies == 1000
+    assert watch.overdue(0.9) == []
+    (summary,) = watch.overdue(1.0)
+    assert "990 more emergencies" in summary.text
+    assert "0000h" in summary.text
+    assert watch.overdue(3.0) == []
+    assert len(watch.observe(storm[0], 3.1)) == 1
+
+
 @given(st.binary(max_size=9), st.integers(0, 0x7FF), st.booleans())
 def test_the_watch_survives_any_frame(data: bytes, cob_id: int, remote: bool) -> None:
     watch = NodeWatch()
