@@ -1,9 +1,13 @@
-"""What a drive sets by itself: gains from a rigidity level, notches from a resonance it hears.
+"""What a drive sets by itself: gains from a rigidity level, notches from a resonance it hears,
+the command notch from a swing that it sees.
 
 M6-L: P09.06, P09.07 (000:3423), P09.08 and P09.22 (000:3427, 000:3444). R6L: P07.00, P07.01
 (002:11088-11109), P07.11 (002:11168). Neither manual prints its table of levels: the bandwidths
 are those that the MMS7's manual prints for its 32 levels (table 38, 004:3003). How a resonance is
 found is not printed either: here it is the strongest line of the speed error above 80 Hz.
+
+P09.25 (000:3447-3450): after a move the deviation of the position is watched; where it swings by
+more than P09.28, its frequency becomes P09.26. How, and how long it is watched, is not printed.
 """
 
 from __future__ import annotations
@@ -15,10 +19,14 @@ import numpy as np
 
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.families.base import SwingKeys
 from profiles.loader import load_profile
 
 _LOWEST_HZ = 80.0
 _PERIOD_S = 0.25
+_SWING_SAMPLE_S = 0.002
+_SWING_SAMPLES = 400
+"""0.8 s: a swing of 2.5 Hz shows two of its turns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +86,11 @@ class Automatic:
             self._rigidity = None
         if self._notches is not None and self._notches.mode in known:
             core.schedule.after(_PERIOD_S, self._listen)
+        swing = core.family.traits.swing
+        self._swing = swing if swing is not None and swing.mode in known else None
+        self._deviations: list[float] = []
+        if self._swing is not None:
+            core.schedule.after(_PERIOD_S, self._watch_swing)
 
     def settings_changed(self) -> None:
         """Take a new rigidity level."""
@@ -155,3 +168,34 @@ class Automatic:
         strong = amplitude > 0.05 * self._core.motor.rated_torque_nm
         alone = spectrum[place] > 10 * np.median(spectrum[band])
         return float(hertz[place]) if strong and alone else None
+
+    # --- swings ----------------------------------------------------------------------------
+    def _watch_swing(self) -> None:
+        keys, s = self._swing, self._axis.s
+        if keys is None:
+            return
+        wanted = int(self._core.number(keys.mode)) == keys.automatic_raw and self._axis.powered
+        if wanted and s[k.S_V_DEMAND] == 0.0:
+            self._deviations.append(float(s[k.S_P_DEMAND] - s[k.S_THETA]))
+        else:
+            self._deviations.clear()
+        if len(self._deviations) >= _SWING_SAMPLES:
+            self._take_swing(keys)
+            self._deviations.clear()
+        pause_s = _SWING_SAMPLE_S if wanted else _PERIOD_S
+        self._core.schedule.after(pause_s, self._watch_swing)
+
+    def _take_swing(self, keys: SwingKeys) -> None:
+        """Frequency of the zero crossings, if the swings were large enough."""
+        seen = np.array(self._deviations)
+        seen -= seen[seen.size // 2 :].mean()
+        threshold = self._core.number(keys.threshold) / abs(self._core.units.position_per_rad)
+        crossings = np.flatnonzero(np.diff(np.signbit(seen)))
+        if np.abs(seen).max() < threshold or crossings.size < 3:
+            return
+        turns_s = (crossings[-1] - crossings[0]) * _SWING_SAMPLE_S / (crossings.size - 1) * 2
+        hertz = 1.0 / turns_s
+        parameter = self._core.profile.by_key[keys.frequency]
+        if 1.0 <= hertz <= float(parameter.to_value(parameter.max_raw or 0)):
+            self._core.od.put(keys.frequency, parameter.to_raw(hertz))
+            self._core.apply_settings()

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import expm
 
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.settings import (
@@ -15,6 +16,7 @@ from drivers.virtual.firmware.settings import (
     LoopSettings,
     MotorData,
     ProtectionSettings,
+    SwingFilter,
 )
 from drivers.virtual.mechanics import MechanicsSpec
 from drivers.virtual.mechanics.chain import FIRST_LOAD, discretise
@@ -45,6 +47,7 @@ class VirtualAxis:
         self._scratch = np.zeros_like(self._x)
         self._loops: LoopSettings | None = None
         self._homing = False
+        self._braked = self._brake_released = False
         self._set_physics(spec)
         self.set_current_loop(1000.0)
         self.apply_protections(ProtectionSettings())
@@ -155,10 +158,30 @@ class VirtualAxis:
         p[k.P_TORQUE_BIAS], p[k.P_FRICTION_VISCOUS] = compensation.bias_nm, compensation.viscous_nms
         p[k.P_FRICTION_POSITIVE] = compensation.positive_nm
         p[k.P_FRICTION_NEGATIVE] = compensation.negative_nm
+        self._apply_extras(loops)
         p[k.P_NOTCH_COUNT] = len(loops.notches)
         for i, notch in enumerate(loops.notches):
             start = k.P_NOTCHES + 4 * i
             p[start : start + 4] = notch.a1, notch.a2, notch.b1, notch.b2
+
+    def _apply_extras(self, loops: LoopSettings) -> None:
+        """Third gains, command notch and quadrant compensation of the families that have them."""
+        p, third, swing = self.p, loops.third, loops.swing
+        p[k.P_THIRD_GAINS] = third is not None
+        if third is not None:
+            p[k.P_THIRD_DELAY] = third.delay_s
+            p[k.P_KP_POSITION_3] = third.gains.position_per_s
+            p[k.P_KP_SPEED_3] = third.gains.speed_nms
+            p[k.P_KI_SPEED_3] = third.gains.integral_nm
+        p[k.P_SHAPE_ON] = swing is not None
+        if swing is not None:
+            first = k.P_SHAPE_A11
+            p[first : first + 6] = _swing_coefficients(swing)
+        quadrant = loops.quadrant
+        p[k.P_QUADRANT_POSITIVE] = quadrant.positive_nm
+        p[k.P_QUADRANT_NEGATIVE] = quadrant.negative_nm
+        p[k.P_QUADRANT_DELAY], p[k.P_QUADRANT_ANGLE] = quadrant.delay_s, quadrant.angle_rad
+        p[k.P_QUADRANT_FILTER] = _lag(quadrant.filter_s)
 
     def use_homing_gains(self, homing: bool) -> None:
         """Switch to or from the gain set for homing."""
@@ -171,7 +194,8 @@ class VirtualAxis:
         p = self.p
         p[k.P_OCP_A], p[k.P_UVLO_V] = limits.over_current_a, limits.under_voltage_v
         p[k.P_OVP_V], p[k.P_BRAKE_ON_V] = limits.over_voltage_v, limits.brake_on_v
-        p[k.P_BRAKE_OFF_V], p[k.P_BRAKE_ENABLED] = limits.brake_off_v, limits.brake_enabled
+        fitted = limits.brake_enabled and self.spec.supply.braking_resistor
+        p[k.P_BRAKE_OFF_V], p[k.P_BRAKE_ENABLED] = limits.brake_off_v, fitted
         p[k.P_LOCK_ANGLE], p[k.P_LOCK_S] = limits.locked_angle_rad, limits.locked_s
         p[k.P_OVERLOAD_NM], p[k.P_OVERLOAD_S] = limits.overload_nm, limits.overload_s
         p[k.P_OTP_C], p[k.P_OVER_SPEED] = limits.over_temperature_c, limits.over_speed_rad_s
@@ -181,8 +205,8 @@ class VirtualAxis:
         rated = self.motor.rated_torque_nm
         p[k.P_I2T_RATED_NM] = min(limits.i2t_rated_nm, 1e3 * rated)
         p[k.P_LOCK_NM] = rated if limits.locked_nm is None else limits.locked_nm
-        braked = limits.holding_brake or self.spec.motor.brake
-        p[k.P_BRAKE_TORQUE] = 2 * rated if braked else 0.0
+        self._braked = limits.holding_brake or self.spec.motor.brake
+        self.release_brake(self._brake_released)
 
     def apply_impedance(self, settings: ImpedanceSettings) -> None:
         """Gains of the impedance controller."""
@@ -246,6 +270,12 @@ class VirtualAxis:
         """Raise EV_STOPPED as soon as the axis, which is not powered, has come to rest."""
         self.s[k.S_STOPPED] = 0.0
         self.p[k.P_STOPPING] = 1.0
+
+    def release_brake(self, released: bool) -> None:
+        """Whether the holding brake is kept open, with or without power."""
+        self._brake_released = released
+        grips = self._braked and not released
+        self.p[k.P_BRAKE_TORQUE] = 2 * self.motor.rated_torque_nm if grips else 0.0
 
     def close_brake(self, closed: bool) -> None:
         """The holding brake, apart from the power stage (it grips without power in any case)."""
@@ -390,3 +420,11 @@ class VirtualAxis:
 
 def _lag(time_constant_s: float) -> float:
     return 1.0 if time_constant_s <= 0 else 1.0 - math.exp(-k.STEP_S / time_constant_s)
+
+
+def _swing_coefficients(swing: SwingFilter) -> list[float]:
+    """The kernel's A11, A12, A21, A22, B1, B2: the notch's low pass, sampled exactly."""
+    w, two_zeta_w = TURN * swing.frequency_hz, 2 * swing.damping * TURN * swing.frequency_hz
+    block = np.array([[0.0, 1.0, 0.0], [-w * w, -two_zeta_w, two_zeta_w], [0.0, 0.0, 0.0]])
+    solved = expm(block * k.STEP_S)
+    return [solved[i, j] for i, j in ((0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2))]

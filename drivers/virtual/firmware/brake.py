@@ -24,6 +24,7 @@ class HoldingBrake:
         self._core = core
         self._axis = core.axis
         self._timer: Timer | None = None
+        self._bus: bool | None = None
 
     def times(self) -> BrakeTimes | None:
         """None without a brake on the motor, whatever the parameters say."""
@@ -37,7 +38,23 @@ class HoldingBrake:
     @property
     def released(self) -> bool:
         """Whether the brake output is on."""
+        if self._bus is not None:
+            return not self._bus
         return self._axis.powered and self._axis.p[k.P_BRAKE_CLOSED] == 0.0
+
+    def follow_bus(self, applied: bool | None) -> None:
+        """The bus applies (True) or releases the brake, or leaves it to the drive (None)."""
+        if applied == self._bus:
+            return
+        self.cancel()
+        self._bus = applied
+        self._axis.release_brake(applied is False)
+        self._axis.close_brake(applied is True)
+
+    def grip(self) -> None:
+        """A fault applies the brake, whatever the bus says (001:940)."""
+        if self._bus is not None:
+            self.follow_bus(True)
 
     def cancel(self) -> None:
         """Something else happens to the axis."""
@@ -47,6 +64,8 @@ class HoldingBrake:
 
     def open(self, ready: Callable[[], None]) -> bool:
         """Hold the axis while it opens; False where there is none to wait for."""
+        if self._bus is not None:
+            return False
         times = self.times()
         if times is None:
             self._axis.close_brake(False)
@@ -68,7 +87,7 @@ class HoldingBrake:
 
     def close(self, enabled_again: Callable[[], bool]) -> bool:
         """Close it and keep the power for its time; False where there is none."""
-        times = self.times()
+        times = None if self._bus is not None else self.times()
         if times is None or not self._axis.powered:
             return False
         standing = abs(self._axis.speed_rad_s) <= times.speed_rad_s

@@ -32,6 +32,7 @@ class Commands:
             "fault_reset": self._reset_fault,
             "clear_encoder_fault": self._clear_encoder_fault,
             "identify": self._identify,
+            "identify_poles": self._identify_poles,
         }
         self.load: LoadIdentification | None = None
         keys = KEYS.get(core.profile.drive)
@@ -84,15 +85,17 @@ class Commands:
         self._raise("Err68")
 
     def _raise(self, code: str) -> None:
-        fault = self._control.alarms.find(code)
-        if fault is not None:
-            self._control.raise_alarm(fault)
+        self._control.faults.raise_code(code)
 
     def _identify(self) -> None:
         if self._core.axis.powered or self._control.alarms.active:
             raise SdoAbort(ABORT_DEVICE_STATE)
         if self.load is not None:
             self.load.start()
+
+    def _identify_poles(self) -> None:
+        if self._control.alarms.active or not self._control.poles.start():
+            raise SdoAbort(ABORT_DEVICE_STATE)
 
     def _identification_failed(self) -> None:
         keys = KEYS.get(self._core.profile.drive)
@@ -102,7 +105,7 @@ class Commands:
     def _clear_encoder_fault(self) -> None:
         """P12.05 of the R6L ends AL.221 and AL.222 (002:1681)."""
         self._control.alarms.cleared_by_step |= {"AL.221", "AL.222"}
-        self._control.reset_fault()
+        self._control.faults.reset()
 
     def _write_settings(self) -> None:
         self._core.od.activate("write_settings")
@@ -127,4 +130,4 @@ class Commands:
         self._core.zero_rad = self._core.axis.angle_rad
 
     def _reset_fault(self) -> None:
-        self._control.reset_fault()
+        self._control.faults.reset()

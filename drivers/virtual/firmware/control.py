@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Final
 
 from drivers.virtual.firmware import kernel as k
-from drivers.virtual.firmware.alarms import Alarms, FaultLog, Snapshot, snapshot_of
+from drivers.virtual.firmware.alarms import FaultLog
 from drivers.virtual.firmware.brake import HoldingBrake
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.families.base import FaultInfo
+from drivers.virtual.firmware.faults import Faults
 from drivers.virtual.firmware.identification import Identification
+from drivers.virtual.firmware.jog import TerminalJog
 from drivers.virtual.firmware.modes import CST, PP, PT, Modes
-from drivers.virtual.firmware.schedule import Timer
+from drivers.virtual.firmware.poles import PoleIdentification
 from drivers.virtual.firmware.states import Command, State, decode, next_state
 from drivers.virtual.firmware.stopping import Stopping
-from profiles.schema import Fault
 
 _HALT, _FAULT_RESET, _IDENTIFY = 1 << 8, 1 << 7, 1 << 11
 _OPERATING: Final = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
+_AT_REST: Final = (State.SWITCH_ON_DISABLED, State.READY, State.SWITCHED_ON)
 _STOP_OPTIONS: Final = {Command.SHUTDOWN: "605B:00", Command.SWITCH_ON: "605C:00"}
-Emergency = tuple[int, int, bytes]
 
 
 class DeviceControl:
@@ -33,25 +33,19 @@ class DeviceControl:
         self._traits = core.family.traits
         self.modes = Modes(core)
         self.identification = Identification(core)
-        self.alarms = Alarms(
-            core.profile, self._traits.faults, core.axis,
-            FaultLog(self._traits.history_size) if log is None else log,
-        )  # fmt: skip
         self.state = State.SWITCH_ON_DISABLED
         self.control_word = 0
-        self.emergencies: list[Emergency] = []
+        self.faults = Faults(core, self, log)
+        self.alarms = self.faults.alarms
         self.on_disabled: list[Callable[[], None]] = []
         """Told whenever the power stage has been switched off."""
-        self.levels: Callable[[], tuple[int, int]] = lambda: (0, 0)
-        """Levels of inputs and outputs, for the record of a fault."""
         self._stops = Stopping(core, self.modes)
         self.brake = HoldingBrake(core)
+        self.jog = TerminalJog(core, self.brake, self._free)
+        self.poles = PoleIdentification(core, self._pole_failed, self._free)
         self._halted = False
-        self._reported = 0
-        self._since_s: dict[str, float] = {}
         self._after_stop: Callable[[], None] | None = None
         self._halt_done: Callable[[], None] | None = None
-        self._retry_timer: Timer | None = None
         self._emergency = False
         self.modes.homing.guard_limits()
         self.modes.homing.on_failed = self._homing_failed
@@ -62,13 +56,13 @@ class DeviceControl:
         """A new control word, in force at once."""
         before, self.control_word = self.control_word, word
         if word & ~before & _FAULT_RESET:
-            self.reset_fault()
+            self.faults.reset()
         if word & _FAULT_RESET and self._traits.status == "cia402":
             return  # while bit 7 stays 1 no other command acts (001:315, 002:2849, 004:3618)
         self._command(decode(word))
         if self.state is not State.OPERATION_ENABLED or self._after_stop is not None:
             return
-        if self.brake.moving:
+        if self.brake.moving or self.poles.active:
             return  # the brake is opening: commands are lost (000:1377)
         if word & _IDENTIFY and not before & _IDENTIFY:
             self._begin_identification()
@@ -84,7 +78,7 @@ class DeviceControl:
         if mode == self.modes.mode:
             return
         if self.state is State.OPERATION_ENABLED and self._after_stop is None:
-            if self.brake.moving:
+            if self.brake.moving or self.poles.active:
                 self.modes.mode = mode
                 return
             self._halted = False
@@ -119,19 +113,32 @@ class DeviceControl:
         resumed = self.state is State.QUICK_STOP_ACTIVE
         self._core.od.activate("reenable")
         self._core.apply_settings()
-        refused = self._core.family.refusal(self._core.od, self.modes.mode)
-        if refused is not None and (fault := self.alarms.find(refused)) is not None:
-            self.raise_alarm(fault)
+        refused = self._core.family.refusal(self._core.od, self.modes.mode) or self.poles.refusal
+        if refused is not None and self.faults.raise_code(refused):
             return
+        self.jog.cancel()
         self.state = State.OPERATION_ENABLED
         self._after_stop = None
         self._halted = False
         self.modes.limited = False
-        if resumed or not self.brake.open(lambda: self.modes.start(self.modes.mode)):
-            self.modes.start(self.modes.mode)
+        if self.poles.needed:
+            self.poles.start(self._begin_mode)
+        elif resumed or not self.brake.open(self._begin_mode):
+            self._begin_mode()
+
+    def _begin_mode(self) -> None:
+        self.modes.start(self.modes.mode)
+
+    def _free(self) -> bool:
+        """Whether nobody commands the axis, so that the drive may move it by itself."""
+        return self.state in _AT_REST and self._after_stop is None and not self.brake.moving
+
+    def _pole_failed(self, code: str) -> None:
+        self.faults.raise_code(code)
 
     def _leave_operation(self, new: State, command: Command) -> None:
         self._end_identification()
+        self.poles.cancel()
         self.modes.end()
         if command is Command.QUICK_STOP:
             self._quick_stop(self._option("605A:00", 2))
@@ -238,9 +245,10 @@ class DeviceControl:
         if events & k.EV_ALARM_CLOCK:
             self._core.schedule.run()
         if events & k.EV_FAULT:
-            self._on_fault()
+            self.faults.look()
         if events & k.EV_STOPPED:
             done = self._after_stop
+            self.jog.stopped()
             if done is not None:
                 self._after_stop = None
                 done()
@@ -253,9 +261,8 @@ class DeviceControl:
     def _homing_failed(self, timed_out: bool) -> None:
         warning, fault = self._traits.homing_alarms
         self.alarms.warn(warning)
-        entry = self.alarms.find(fault)
-        if timed_out and entry is not None:
-            self.raise_alarm(entry)
+        if timed_out:
+            self.faults.raise_code(fault)
 
     # --- identification --------------------------------------------------------------------
     def _begin_identification(self) -> None:
@@ -271,119 +278,33 @@ class DeviceControl:
             self.modes.start(self.modes.mode)
 
     # --- faults ----------------------------------------------------------------------------
-    def raise_fault(self, bits: int) -> None:
-        """A protection outside the 50 µs loop, or trouble made on purpose."""
-        self._axis.raise_fault(bits)
-        self._on_fault()
-
-    def raise_alarm(self, fault: Fault) -> None:
-        """An entry of the fault table by itself; warnings only show."""
-        if fault.kind == "warning":
-            self.alarms.warn(fault.code)
-        else:
-            self._take_in([self.alarms.info_of(fault)])
-
-    @property
-    def error_code(self) -> int:
-        """603Fh."""
-        self._watch_limits()
-        return self.alarms.error_code
-
-    def _on_fault(self) -> None:
-        new = self._axis.faults & ~self._reported
-        if not new:
-            return
-        self._reported |= new
-        infos: list[FaultInfo] = []
-        for i in range(new.bit_length()):
-            if new >> i & 1:
-                infos += self._reports(1 << i)
-        self._take_in(infos)
-
-    def _reports(self, bit: int) -> list[FaultInfo]:
-        """What a protection reports now: its fault, or nothing where it only warns."""
-        if bit == k.F_POSITION_LIMIT and any(self._traits.limits.faults):
-            side = int(self._axis.s[k.S_SIGNALS]) & k.SIG_POSITIVE != 0
-            fault = self.alarms.find(self._traits.limits.faults[side])
-            return [] if fault is None else [self.alarms.info_of(fault)]
-        choice = self._traits.choices.get(bit)
-        if choice is not None:
-            action = choice.actions.get(self._option(choice.key, -1), choice.default)
-            if action != "fault":
-                self.alarms.warn(choice.warning)
-                if action == "stop" and self.state is State.OPERATION_ENABLED:
-                    self._leave_operation(State.QUICK_STOP_ACTIVE, Command.QUICK_STOP)
-                return []
-        return self.alarms.of_bits(bit)
-
-    def _take_in(self, infos: list[FaultInfo]) -> None:
-        new = self.alarms.add(infos, self._snapshot)
-        if not new:
-            return
-        now_s = float(self._axis.s[k.S_STEP]) * k.STEP_S
-        self._since_s |= {item.name: now_s for item in new}
-        told = next((item for item in new if item.code), new[0])
-        status = self._axis.faults & 0xFFFF
-        self.emergencies.append(
-            (told.code or 0xFF00, told.error_register, status.to_bytes(5, "little"))
-        )
-        if self.state in (State.FAULT, State.NOT_READY):
-            return
+    def trip(self, new: list[FaultInfo]) -> None:
+        """Faults came: stop as the family does, then "fault"."""
         self.identification.stop()
+        self.jog.cancel()
+        self.poles.cancel()
         moving = self._axis.powered
         self.modes.end()
         self.brake.cancel()
+        self.brake.grip()
         self.state = State.FAULT_REACTION
         self._after_stop = self._fault_reaction_done
         self._finish_now(moving and self._stops.react(new, self._option("605E:00", 0)))
 
-    def _snapshot(self) -> Snapshot:
-        inputs, outputs = self.levels()
-        axis = self._axis
-        return snapshot_of(
-            axis, self._core.position_of(axis.angle_rad), inputs=inputs, outputs=outputs
-        )
-
     def _fault_reaction_done(self) -> None:
         self._switch_off(at_once=True)
         self.state = State.FAULT
-        if self._core.number("200B:07") == 1:  # retry, 004:6221-6232
-            delay_s = self._core.number("200B:08", 3000) * 1e-3
-            self._retry_timer = self._core.schedule.after(delay_s, self._retry)
+        self.faults.reacted()
 
-    def _retry(self) -> None:
-        self._retry_timer = None
-        if self.reset_fault() and decode(self.control_word) is Command.ENABLE:
+    def stop_on_warning(self) -> None:
+        """A protection that brakes and holds instead of tripping."""
+        self._leave_operation(State.QUICK_STOP_ACTIVE, Command.QUICK_STOP)
+
+    def retry_enable(self) -> None:
+        """The fault was reset by the drive itself: on again, if that is still wanted."""
+        if decode(self.control_word) is Command.ENABLE:
             self.state = State.SWITCHED_ON
             self._enter_operation()
-
-    def reset_fault(self) -> bool:
-        """Leave the fault state if no cause is present and the faults let it (004:5068-5073)."""
-        if self.state is not State.FAULT:
-            self.alarms.warnings.clear()
-            self._reported &= self._axis.live_faults()
-            self._axis.clear_faults()
-            return False
-        if self._axis.live_faults() or not self.alarms.resettable() or self._cooling():
-            return False
-        self._axis.clear_faults()
-        self._reported = 0
-        self._since_s.clear()
-        self.alarms.clear()
-        self.alarms.warnings.clear()
-        if self._retry_timer is not None:
-            self._retry_timer.cancel()
-            self._retry_timer = None
-        self.state = State.SWITCH_ON_DISABLED
-        return True
-
-    def _cooling(self) -> bool:
-        """A fault that a reset ends only after a time (000:3882)."""
-        now_s = float(self._axis.s[k.S_STEP]) * k.STEP_S
-        waits = self._traits.reset_after_s
-        return any(
-            now_s - since_s < waits.get(name, 0.0) for name, since_s in self._since_s.items()
-        )
 
     def communication_lost(self) -> None:
         """EtherCAT or CAN traffic ended while the servo is on.
@@ -401,27 +322,9 @@ class DeviceControl:
         elif option == 3 and self.state is State.OPERATION_ENABLED:
             self._leave_operation(State.QUICK_STOP_ACTIVE, Command.QUICK_STOP)
         elif option == 1:
-            self.raise_fault(fault)
+            self.faults.raise_bits(fault)
 
     # --- status ----------------------------------------------------------------------------
-    def _watch_limits(self) -> None:
-        """Warnings of the limit switches come and go with the switches."""
-        if not any(self._traits.limits.warnings):
-            return
-        signals = int(self._axis.s[k.S_SIGNALS])
-        for warning, switch in zip(
-            self._traits.limits.warnings, (k.SIG_NEGATIVE, k.SIG_POSITIVE), strict=True
-        ):
-            self.alarms.warn(warning, bool(signals & switch))
-
-    @property
-    def warning(self) -> bool:
-        """Over-temperature announced 20 °C early (004:4842-4846), or a warning of the table."""
-        self._watch_limits()
-        threshold = float(self._axis.p[k.P_OTP_C])
-        hot = float(self._axis.s[k.S_TEMPERATURE])
-        return bool(self.alarms.warnings) or (math.isfinite(threshold) and hot >= threshold - 20)
-
     def status_word(self) -> int:
         """6041h; "voltage enabled" and "remote" are always set (004:6798-6806)."""
         traits = self._traits
@@ -432,7 +335,7 @@ class DeviceControl:
             word |= traits.disabled_bits
         if traits.home_found_bit is not None and self.homed:
             word |= 1 << traits.home_found_bit
-        if self.warning:
+        if self.faults.warning:
             word |= 1 << 7
         if self.identification.active:
             word |= 1 << 14

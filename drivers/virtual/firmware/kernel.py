@@ -78,8 +78,12 @@ LIMIT_IGNORED, LIMIT_FAULT, LIMIT_HOLDS = range(3)
     P_TORQUE_FILTER_2, P_SWITCH_HYSTERESIS, P_SWITCH_DELAY, P_SWITCH_INPUT, P_LIMIT_DEC,
     P_DYNAMIC_BRAKE, P_BRAKE_CLOSED, P_I2T_LIMIT, P_LOCK_NM, P_FRICTION_POSITIVE,
     P_FRICTION_NEGATIVE, P_FRICTION_VISCOUS, P_TORQUE_BIAS, P_I2T_RATED_NM,
-) = range(116)  # fmt: skip
-P_NOTCHES = 116
+    P_THIRD_GAINS, P_THIRD_DELAY, P_KP_POSITION_3, P_KP_SPEED_3, P_KI_SPEED_3,
+    P_SHAPE_ON, P_SHAPE_A11, P_SHAPE_A12, P_SHAPE_A21, P_SHAPE_A22, P_SHAPE_B1, P_SHAPE_B2,
+    P_QUADRANT_POSITIVE, P_QUADRANT_NEGATIVE, P_QUADRANT_DELAY, P_QUADRANT_FILTER,
+    P_QUADRANT_ANGLE,
+) = range(133)  # fmt: skip
+P_NOTCHES = 133
 """Start of the notches: per notch a1, a2, b1, b2 of (z² + a1·z + a2)/(z² + b1·z + b2)."""
 P_SIZE = P_NOTCHES + 16
 
@@ -96,8 +100,10 @@ P_SIZE = P_NOTCHES + 16
     S_IP_POSITION, S_IP_POSITION_INC, S_IP_SPEED, S_IP_SPEED_INC, S_IP_TORQUE, S_IP_TORQUE_INC,
     S_IP_LEFT, S_Z_INTEGRAL, S_Z_SPEED, S_SPARE_NORMAL, S_HAS_SPARE, S_LIMIT_ACTIVE, S_UQ,
     S_TORQUE_FILTERED, S_SECOND_GAINS, S_SWITCH_T, S_I2T, S_LIMIT_HELD,
-) = range(60)  # fmt: skip
-S_NOTCHES = 60
+    S_THIRD_MIX, S_REST_T, S_SHAPE, S_SHAPE_RATE,
+    S_QUADRANT_SIGN, S_QUADRANT_T, S_QUADRANT_FROM, S_QUADRANT,
+) = range(68)  # fmt: skip
+S_NOTCHES = 68
 """Start of the notch states, two per notch."""
 S_TRACE = S_NOTCHES + 8
 """Start of the last TRACE_STEPS torque commands, as a ring by the step counter."""
@@ -399,9 +405,58 @@ def _select_gains(p, s, loop):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def _third_share(p, s, loop):  # type: ignore[no-untyped-def]
+    """Share of the third gains, 0 to 1: they hold an axis whose command has come to rest."""
+    resting = loop == LOOP_POSITION and s[S_V_DEMAND] == 0.0
+    s[S_REST_T] = s[S_REST_T] + STEP_S if resting else 0.0
+    on = p[P_THIRD_GAINS] > 0.0 and resting and s[S_REST_T] >= p[P_THIRD_DELAY]
+    rate = STEP_S / max(p[P_SWITCH_TIME], STEP_S)
+    share = _clamp(1.0 if on else 0.0, s[S_THIRD_MIX] - rate, s[S_THIRD_MIX] + rate)
+    s[S_THIRD_MIX] = share
+    return share
+
+
+@njit(cache=True, nogil=True)
+def _shape(p, s):  # type: ignore[no-untyped-def]
+    """What a notch (s² + ω²)/(s² + 2ζωs + ω²) takes from the demanded position, and its rate.
+
+    The part taken is 2ζω/(s² + 2ζωs + ω²) of the demanded speed, so that a constant position
+    passes unchanged and the swing of a load at ω is not excited.
+    """
+    if p[P_SHAPE_ON] == 0.0:
+        s[S_SHAPE] = 0.0
+        s[S_SHAPE_RATE] = 0.0
+        return
+    taken, rate, speed = s[S_SHAPE], s[S_SHAPE_RATE], s[S_V_DEMAND]
+    s[S_SHAPE] = p[P_SHAPE_A11] * taken + p[P_SHAPE_A12] * rate + p[P_SHAPE_B1] * speed
+    s[S_SHAPE_RATE] = p[P_SHAPE_A21] * taken + p[P_SHAPE_A22] * rate + p[P_SHAPE_B2] * speed
+
+
+@njit(cache=True, nogil=True)
+def _quadrant_compensation(p, s):  # type: ignore[no-untyped-def]
+    """Torque after the demand has turned round: late, filtered, and over a length of travel."""
+    sign = 1.0 if s[S_V_DEMAND] > 0.0 else -1.0 if s[S_V_DEMAND] < 0.0 else 0.0
+    if sign != 0.0 and sign != s[S_QUADRANT_SIGN]:
+        turned = s[S_QUADRANT_SIGN] != 0.0
+        s[S_QUADRANT_SIGN] = sign
+        s[S_QUADRANT_T] = 0.0 if turned else -1.0  # setting off is no turn
+        s[S_QUADRANT_FROM] = s[S_P_DEMAND]
+    if s[S_QUADRANT_T] >= 0.0:
+        s[S_QUADRANT_T] += STEP_S
+    near = abs(s[S_P_DEMAND] - s[S_QUADRANT_FROM]) < p[P_QUADRANT_ANGLE]
+    goal = 0.0
+    if near and s[S_QUADRANT_T] > p[P_QUADRANT_DELAY]:
+        positive = s[S_QUADRANT_SIGN] > 0.0
+        goal = p[P_QUADRANT_POSITIVE] if positive else -p[P_QUADRANT_NEGATIVE]
+    s[S_QUADRANT] += p[P_QUADRANT_FILTER] * (goal - s[S_QUADRANT])
+    return s[S_QUADRANT]
+
+
+@njit(cache=True, nogil=True)
 def _friction_compensation(p, s):  # type: ignore[no-untyped-def]
     """Torque that the drive adds for friction by the direction of the demand, and its bias."""
     torque = p[P_TORQUE_BIAS] + p[P_FRICTION_VISCOUS] * s[S_V_DEMAND]
+    torque += _quadrant_compensation(p, s)
     if s[S_V_DEMAND] > 0.0:
         torque += p[P_FRICTION_POSITIVE]
     elif s[S_V_DEMAND] < 0.0:
@@ -410,10 +465,12 @@ def _friction_compensation(p, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _speed_controller(p, s, reference, mix):  # type: ignore[no-untyped-def]
+def _speed_controller(p, s, reference, mix, third):  # type: ignore[no-untyped-def]
     """PI controller with torque feed-forward; returns the torque and the integral's increment."""
     kp = p[P_KP_SPEED_1] + mix * (p[P_KP_SPEED_2] - p[P_KP_SPEED_1])
+    kp += third * (p[P_KP_SPEED_3] - kp)
     ki = p[P_KI_SPEED_1] + mix * (p[P_KI_SPEED_2] - p[P_KI_SPEED_1])
+    ki += third * (p[P_KI_SPEED_3] - ki)
     error = reference - s[S_OMEGA]
     limit = p[P_SPEED_OUT_LIMIT]
     torque = _clamp(kp * error + s[S_INTEGRAL], -limit, limit)
@@ -448,6 +505,10 @@ def _control(p, s):  # type: ignore[no-untyped-def]
         s[S_SATURATED] = 0.0
         s[S_TORQUE_FILTERED] = 0.0
         s[S_SPEED_REFERENCE] = s[S_OMEGA]
+        s[S_SHAPE] = 0.0
+        s[S_SHAPE_RATE] = 0.0
+        s[S_QUADRANT] = 0.0
+        s[S_QUADRANT_SIGN] = 0.0
         for i in range(8):
             s[S_NOTCHES + i] = 0.0
         return
@@ -455,20 +516,26 @@ def _control(p, s):  # type: ignore[no-untyped-def]
     s[S_SPEED_LIMITED] = 0.0
     if loop in (LOOP_POSITION, LOOP_SPEED):
         mix = _select_gains(p, s, loop)
+        third = _third_share(p, s, loop)
         reference = s[S_V_DEMAND]
         if loop == LOOP_POSITION:
-            error = s[S_P_DEMAND] - s[S_THETA_FILTERED]
+            _shape(p, s)
+            error = s[S_P_DEMAND] - s[S_SHAPE] - s[S_THETA_FILTERED]
             kp = p[P_KP_POSITION_1] + mix * (p[P_KP_POSITION_2] - p[P_KP_POSITION_1])
-            wanted = p[P_FF_SPEED] * s[S_V_DEMAND]
+            kp += third * (p[P_KP_POSITION_3] - kp)
+            wanted = p[P_FF_SPEED] * (s[S_V_DEMAND] - s[S_SHAPE_RATE])
             s[S_FF_SPEED] += p[P_FF_SPEED_COEFFICIENT] * (wanted - s[S_FF_SPEED])
             limit = p[P_POSITION_OUT_LIMIT]
             reference = _clamp(kp * error, -limit, limit) + s[S_FF_SPEED]
             if int(p[P_GEN]) == GEN_CYCLIC:
                 reference += s[S_IP_SPEED]
+        else:
+            s[S_SHAPE] = 0.0
+            s[S_SHAPE_RATE] = 0.0
         limited = _clamp(reference, -p[P_MAX_SPEED], p[P_MAX_SPEED])
         s[S_SPEED_LIMITED] = 0.0 if limited == reference else 1.0
         s[S_SPEED_REFERENCE] = limited
-        torque, increment = _speed_controller(p, s, limited, mix)
+        torque, increment = _speed_controller(p, s, limited, mix, third)
         torque += _friction_compensation(p, s)
         if int(p[P_GEN]) == GEN_CYCLIC:
             torque += s[S_IP_TORQUE]

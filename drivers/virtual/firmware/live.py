@@ -68,7 +68,7 @@ def live_values(
     has_terminals = core.family.traits.assigns_terminals or isinstance(panel, Terminals)
     values: dict[str, Callable[[], Number]] = {
         "1001:00": lambda: control.alarms.error_register,
-        "603F:00": lambda: control.error_code,
+        "603F:00": lambda: control.faults.error_code,
         "6041:00": status_word,
         "6061:00": lambda: control.modes.mode,
         "6062:00": demand,

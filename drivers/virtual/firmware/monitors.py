@@ -174,7 +174,9 @@ def _ep3e(f: Sources) -> dict[str, Value]:
     """2600h to 26A2h (001:77-130)."""
     motor = f.core.motor
     return {
-        "2600:00": lambda: 0 if f.control.error_code == 0xFF3C else f.control.error_code & 0xFF,
+        "2600:00": lambda: (
+            0 if f.control.faults.error_code == 0xFF3C else f.control.faults.error_code & 0xFF
+        ),
         "2601:00": lambda: f.turn_share() * 2**32,
         "2602:00": lambda: f.item(k.S_THETA) // (2 * math.pi) % 65536,
         "2603:00": lambda: 1,

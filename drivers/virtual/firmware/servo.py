@@ -20,10 +20,11 @@ from drivers.virtual.firmware.alarms import FaultLog
 from drivers.virtual.firmware.automatic import Automatic
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.commands import Commands
-from drivers.virtual.firmware.control import DeviceControl, Emergency
+from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.dictionary import Entry, ObjectDictionary
 from drivers.virtual.firmware.families.base import Family
+from drivers.virtual.firmware.faults import Emergency
 from drivers.virtual.firmware.live import live_values
 from drivers.virtual.firmware.mapping import MappingRules
 from drivers.virtual.firmware.panel import Panel
@@ -38,6 +39,7 @@ from profiles.schema import Profile, Raw
 _RESET_AFTER_STEPS: Final = 400
 """20 ms from the reset command to the reset, so that the wire can still answer it."""
 _BOOT_S: Final = 0.3
+_OUTPUTS: Final = 0x60FE01
 #: Set-points that the cyclic modes and bit 4 of the control word fetch by themselves.
 _FETCHED: Final = frozenset({"607A:00", "60B0:00", "60B1:00", "60B2:00", "60FE:01", "60FE:02"})
 _OPTION_CODES: Final = frozenset({"605A:00", "605B:00", "605C:00", "605D:00", "605E:00"})
@@ -76,6 +78,7 @@ class VirtualServo:
         self._start_ns: int | None = None
         self._off_until_ns: int | None = None
         self._reset_step: int | None = None
+        self._maps_outputs = False
         self._power_on()
 
     # --- power -----------------------------------------------------------------------------
@@ -95,7 +98,7 @@ class VirtualServo:
         self.core.apply_settings()
         self._connect()
         if self._storage.nvm.damaged:
-            self.control.raise_fault(k.F_MEMORY)
+            self.control.faults.raise_bits(k.F_MEMORY)
 
     def power_cycle(self, off_s: float = 0.0) -> None:
         """Off for a time and on again; the shaft coasts meanwhile, the absolute zero stays."""
@@ -164,7 +167,7 @@ class VirtualServo:
             self._storage.autosave(entry)
         except SdoAbort as refused:
             if refused.code == ABORT_STORE:
-                self.control.raise_fault(k.F_MEMORY)
+                self.control.faults.raise_bits(k.F_MEMORY)
             raise
         if self._commands.load is not None and entry.key == "6040:00":
             self._commands.load.stop()  # whoever commands the axis ends its own swings
@@ -211,9 +214,12 @@ class VirtualServo:
         parts = check_mapping(self.od, entries, direction, limit)
         if direction == "tx":
             return InputImage(parts)
+        self._maps_outputs = any(item >> 8 == _OUTPUTS for item in entries)
         return OutputImage(parts, self.od, self._outputs_arrived)
 
     def _outputs_arrived(self) -> None:
+        if isinstance(self.panel, Terminals):
+            self.panel.cycle(carries_outputs=self._maps_outputs)
         self.control.modes.on_cycle()
 
     # --- reactions to writes ---------------------------------------------------------------
@@ -278,11 +284,13 @@ class VirtualServo:
 
     def _terminals_changed(self) -> None:
         if self._watches_terminals and self.panel.update():
-            self.control.reset_fault()
+            self.control.faults.reset()
 
     # --- trouble ---------------------------------------------------------------------------
     def communication_lost(self, reason: str) -> None:  # noqa: ARG002 - the seam's signature
         """The wire's watchdog fired or the network state fell."""
+        if isinstance(self.panel, Terminals):
+            self.panel.bus_lost()
         self.control.communication_lost()
 
     def network_started(self) -> None:
@@ -293,12 +301,12 @@ class VirtualServo:
         self.core.apply_settings()
         fault = self.control.alarms.find(self._family.gear_fault(self.od) or "")
         if fault is not None:
-            self.control.raise_alarm(fault)
+            self.control.faults.raise_entry(fault)
 
     def take_emergencies(self) -> list[Emergency]:
         """Emergencies since the last call."""
-        taken = list(self.control.emergencies)
-        self.control.emergencies.clear()
+        taken = list(self.control.faults.emergencies)
+        self.control.faults.emergencies.clear()
         return taken
 
     def inject(self, what: str, value: float = 1.0) -> None:

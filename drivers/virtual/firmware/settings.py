@@ -61,6 +61,33 @@ class Compensation:
 
 
 @dataclass(frozen=True, slots=True)
+class ThirdGains:
+    """Gains that hold an axis whose position command has rested for ``delay_s``."""
+
+    gains: GainSet
+    delay_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class SwingFilter:
+    """Notch in the position command: (s² + ω²)/(s² + 2ζωs + ω²) with ω of ``frequency_hz``."""
+
+    frequency_hz: float
+    damping: float
+
+
+@dataclass(frozen=True, slots=True)
+class QuadrantCompensation:
+    """Torque in the new direction after the command has turned round, over ``angle_rad``."""
+
+    positive_nm: float = 0.0
+    negative_nm: float = 0.0
+    delay_s: float = 0.0
+    filter_s: float = 0.0
+    angle_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class LoopSettings:
     """Everything between command and current loop."""
 
@@ -69,6 +96,9 @@ class LoopSettings:
     homing: GainSet | None
     switching: Switching = Switching()
     compensation: Compensation = Compensation()
+    third: ThirdGains | None = None
+    swing: SwingFilter | None = None
+    quadrant: QuadrantCompensation = QuadrantCompensation()
     current_loop_hz: float = 1000.0
     speed_feed_forward: float = 0.0
     speed_feed_forward_s: float = 0.0

@@ -11,6 +11,7 @@ from drivers.virtual.firmware.families.terminals import (
     SWITCHES,
     Input,
     InputUse,
+    Output,
     OutputUse,
     TerminalTable,
     is_virtually_on,
@@ -35,7 +36,9 @@ class Terminals:
         self._index_count = float(core.axis.s[k.S_INDEX_COUNT])
         self._latched = dict.fromkeys(_LATCHES, 0)
         self._counts = [0, 0, 0, 0]
-        control.levels = lambda: (self.input_bits(), self.output_bits())
+        self._cyclic = False
+        self._kept = 0
+        control.faults.levels = lambda: (self.input_bits(), self.output_bits())
 
     # --- inputs ----------------------------------------------------------------------------
     def level(self, place: int) -> bool:
@@ -92,7 +95,7 @@ class Terminals:
             "running": lambda: control.state is State.OPERATION_ENABLED,
             "fault": lambda: faulty,
             "no_fault": lambda: not faulty,
-            "warning": lambda: control.warning,
+            "warning": lambda: control.faults.warning,
             "zero_speed": lambda: bool(s[k.S_ZERO_T] > 0),
             "in_position": lambda: bool(s[k.S_POSITION_T] > 0),
             "homed": lambda: control.homed,
@@ -103,18 +106,50 @@ class Terminals:
         shown = known.get(use) if use is not None else None
         return shown is not None and shown()
 
+    def cycle(self, *, carries_outputs: bool) -> None:
+        """Process data arrived, with 60FEh or without it.
+
+        Outputs may follow the bus then; the brake of an EP3E only where 60FEh came along.
+        """
+        self._cyclic = True
+        if carries_outputs and self._core.family.traits.brake_by_bus:
+            value, mask = self._bus_outputs()
+            faulty = self._control.state in (State.FAULT, State.FAULT_REACTION)
+            self._control.brake.follow_bus(bool(value & 1) or faulty if mask & 1 else None)
+
+    def bus_lost(self) -> None:
+        """Process data ended: outputs of the bus stay or go off, by P20.27 (000:3124-3132)."""
+        if not self._cyclic:
+            return
+        value, mask = self._bus_outputs()
+        off = 0 if self._table.keep_key is None else int(self._core.number(self._table.keep_key))
+        self._kept = value & mask & ~(off << 16)
+        self._cyclic = False
+
+    def _bus_outputs(self) -> tuple[int, int]:
+        """60FEh:01 and its mask."""
+        return int(self._core.number("60FE:01")), int(self._core.number("60FE:02"))
+
+    def _forced(self, terminal: Output, use: OutputUse | None) -> bool | None:
+        """Level that the bus gives an output, None where the drive rules."""
+        table, (value, mask) = self._table, self._bus_outputs()
+        if terminal.bit is None or (table.bus_outputs_need_function and use != "bus"):
+            return None
+        if table.masks_outputs and not mask >> terminal.bit & 1:
+            return None
+        if table.bus_outputs_need_cycles and not self._cyclic:
+            value = self._kept
+        return bool(value >> terminal.bit & 1)
+
     def output_bits(self) -> int:
         """Outputs as bits from the first on, forced by 60FEh where its mask says so."""
         core = self._core
-        value, mask = int(core.number("60FE:01")), int(core.number("60FE:02"))
         bits = 0
         for place, terminal in enumerate(self._table.outputs):
             use = self._table.output_use(terminal, core.od)
-            forced = terminal.bit is not None and mask >> terminal.bit & 1
-            if self._table.bus_outputs_need_function:
-                forced = use == "bus"  # no mask for DO1 to DO5, only their function (001:988)
-            if forced and terminal.bit is not None:
-                on = bool(value >> terminal.bit & 1)
+            forced = self._forced(terminal, use)
+            if forced is not None:
+                on = forced
             else:
                 on = self._shows(use)
                 if terminal.logic is not None and terminal.logic.inverted(core.od):
@@ -137,7 +172,10 @@ class Terminals:
         if now["fault"] and not before.get("fault", False):
             fault = self._control.alarms.find("Er.043")
             if fault is not None:
-                self._control.raise_alarm(fault)
+                self._control.faults.raise_entry(fault)
+        self._control.jog.update(
+            forward=self.active("jog_forward"), backward=self.active("jog_backward")
+        )
         return now["reset"] and not before.get("reset", False)
 
     # --- touch probes ----------------------------------------------------------------------

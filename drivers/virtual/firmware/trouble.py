@@ -41,7 +41,7 @@ def make_trouble(
     elif what == "temperature_c":
         core.axis.s[k.S_TEMPERATURE] = value
     elif what in _FAULTS:
-        control.raise_fault(_FAULTS[what])
+        control.faults.raise_bits(_FAULTS[what])
     elif what.startswith("di") and what[2:].isdigit():
         place = int(what[2:]) - 1
         if not 0 <= place < len(panel.external):
@@ -50,11 +50,11 @@ def make_trouble(
     elif (fault := _entry(control, what)) is not None:
         bit = _protection_of(core, fault.code)
         if bit:
-            control.raise_fault(bit)
+            control.faults.raise_bits(bit)
         else:
-            control.raise_alarm(fault)
+            control.faults.raise_entry(fault)
     else:
-        control.raise_fault(_fault_by_code(core, what))
+        control.faults.raise_bits(_fault_by_code(core, what))
 
 
 def _entry(control: DeviceControl, what: str) -> Fault | None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -71,8 +72,12 @@ def continuous_chain(
     return a, b
 
 
+@lru_cache(maxsize=256)
 def discretise(spec: MechanicsSpec, current_loop_rad_s: float, step_s: float) -> DiscreteChain:
-    """Zero-order-hold discretisation by the matrix exponential (Van Loan 1978)."""
+    """Zero-order-hold discretisation by the matrix exponential (Van Loan 1978).
+
+    The arrays are shared by all who ask for the same chain: they are not to be written.
+    """
     gaps = [i for i, load in enumerate(spec.load) if load.backlash_rad > 0]
     pairs = []
     for contact in range(2 ** len(gaps)):

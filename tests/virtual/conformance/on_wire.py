@@ -17,7 +17,7 @@ from drivers.virtual.mechanics import MechanicsSpec
 from drivers.virtual.wires.canopen import CanopenNode
 from profiles import load_profile
 from profiles.schema import Profile
-from tests.wire.ethercat_slave.frames import Wire
+from tests.wire.ethercat_slave.frames import IN, LWR, OUT, SAFEOP, Wire, fmmu
 
 _FORM = {
     "BOOL": "<B", "INT8": "<b", "UINT8": "<B", "INT16": "<h", "UINT16": "<H",
@@ -160,6 +160,43 @@ class OnWire:
         assert isinstance(self.wire, EthercatWire)
         for state in (1, 2):
             assert self.wire.wire.request(state) == (state, 0)
+
+    # --- process data ----------------------------------------------------------------------
+    def operate(self, rx_pdo: int, tx_pdo: int, outputs: bytes, in_size: int) -> None:
+        """Assign one PDO each way and go to Op with these outputs."""
+        assert isinstance(self.wire, EthercatWire)
+        wire, size = self.wire.wire, len(outputs)
+        for assigned, pdo in (("1C12", rx_pdo), ("1C13", tx_pdo)):
+            index = int(assigned, 16)
+            size_0 = 2 if self.drive == "mms7" else 1
+            self.wire.download(index, 0, bytes(size_0))
+            self.wire.download(index, 1, struct.pack("<H", pdo))
+            self.wire.download(index, 0, (1).to_bytes(size_0, "little"))
+        wire.write(0x0810, struct.pack("<HHBBBB", OUT, size, 0x64, 0, 1, 0))
+        wire.write(0x0818, struct.pack("<HHBBBB", IN, in_size, 0x20, 0, 1, 0))
+        wire.write(0x0600, fmmu(0, size, OUT, write=True))
+        wire.write(0x0610, fmmu(0x100, in_size, IN, write=False))
+        assert wire.request(SAFEOP) == (SAFEOP, 0)
+        wire.write(0x0120, struct.pack("<H", 8))
+        self.cycle(outputs)  # lets it enter Op; outputs act from the next ones on
+        assert wire.state() == (8, 0)
+        self.cycle(outputs)
+
+    def cycle(self, outputs: bytes) -> None:
+        """One frame of process data."""
+        assert isinstance(self.wire, EthercatWire)
+        assert self.wire.wire.one(LWR, 0, 0, outputs).wkc == 1
+
+    def exchange(self, outputs: bytes, seconds: float) -> None:
+        """Frames every 10 ms, which the watchdog of the sync manager is content with."""
+        for _ in range(round(seconds / 0.01)):
+            self.cycle(outputs)
+            self.run(0.01)
+
+    def leave_operation(self) -> None:
+        """Back to Safe-Op."""
+        assert isinstance(self.wire, EthercatWire)
+        assert self.wire.wire.request(SAFEOP)[0] == SAFEOP
 
     # --- state machine ---------------------------------------------------------------------
     @property

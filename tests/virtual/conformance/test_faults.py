@@ -130,29 +130,45 @@ def test_over_voltage_by_regeneration(name: str, code: str) -> None:
     """A great inertia, braked hard, on a supply that takes nothing back and without a resistor."""
     heavy = MotorSpec(inertia_kgm2=1e-2, rated_torque_nm=RATED, rated_speed_rpm=3000)
     volts = 48.0 if name in ("mms7", "ds_c") else 310.0
-    d = drive(
-        name, motor=heavy, supply=SupplySpec(voltage_v=volts, sinks=False, capacitance_f=1e-4)
-    )
+    supply = SupplySpec(
+        voltage_v=volts, sinks=False, capacitance_f=1e-4,
+        braking_resistor=name not in ("ep3e", "ds_c"),  # none at its terminals
+    )  # fmt: skip
+    d = drive(name, motor=heavy, supply=supply)
     if name == "mms7":
         d.set("200B:01", 0x03)  # neither resistor nor lock protection
         write_settings(d)
     without_resistor = {"m6l": ("2002:13", 2), "r6l": ("2001:19", 2)}
     if name in without_resistor:
         d.set(*without_resistor[name])
-    if name in ("ep3e", "ds_c"):
-        d.device.axis.p[k.P_BRAKE_ENABLED] = 0.0  # the jumper of the resistor is open
     for key in ("6083:00", "6084:00"):
         if d.has(key):
             d.set(key, d.ramp(30))
     d.enable(d.speed_mode)
     d.set("60FF:00", 30 * d.speed_per_rev_s)
     d.until(lambda: d.speed_rev_s > 28, 20.0, 0.05)
-    if name in ("ep3e", "ds_c"):
-        d.device.axis.p[k.P_BRAKE_ENABLED] = 0.0
     d.set("60FF:00", 0)
     fault = shows(d, code, 20.0)
     assert d.device.axis.s[k.S_VOLTAGE] > 1.1 * volts
     assert explained(fault)
+
+
+@pytest.mark.parametrize("name", ["ep3e", "ds_c"])
+def test_with_its_resistor_the_same_stop_is_no_fault(name: str) -> None:
+    """25 Ω take 5 kW at 372 V and 130 W at 58 V; the stops give 220 W and 55 W at most."""
+    inertia, volts, ramp = (2e-3, 48.0, 25) if name == "ds_c" else (1e-2, 310.0, 20)
+    heavy = MotorSpec(inertia_kgm2=inertia, rated_torque_nm=RATED, rated_speed_rpm=3000)
+    supply = SupplySpec(voltage_v=volts, sinks=False, capacitance_f=1e-3)
+    d = drive(name, motor=heavy, supply=supply)
+    for key in ("6083:00", "6084:00"):
+        if d.has(key):
+            d.set(key, d.ramp(ramp))
+    d.enable(d.speed_mode)
+    d.set("60FF:00", 30 * d.speed_per_rev_s)
+    d.until(lambda: d.speed_rev_s > 28, 30.0, 0.05)
+    d.set("60FF:00", 0)
+    d.until(lambda: abs(d.speed_rev_s) < 0.1, 30.0, 0.05)
+    assert not in_fault(d)
 
 
 def test_a_braking_resistor_keeps_the_r6l_below_its_limit() -> None:

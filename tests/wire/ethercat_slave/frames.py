@@ -82,7 +82,7 @@ class Wire:
         self.clock = ManualClock()
         self.devices = [
             DictionaryDevice(make_profile(**profile))  # type: ignore[arg-type]
-            for _ in range(count)
+            for _ in range(count if real is None else 0)
         ]
         drives: list[Device] = list(self.devices) if real is None else [real]
         self.slaves = [Slave(device, self.clock) for device in drives]

@@ -114,6 +114,42 @@ class SwitchKeys:
     hysteresis: str | None = None
     delay: str | None = None
     ramp: str | None = None
+    third_delay: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SwingKeys:
+    """Notch of the position command: frequency and width, and how the drive finds them itself.
+
+    With ``mode`` at ``automatic_raw`` it takes the frequency of a deviation above ``threshold``
+    (command units).
+    """
+
+    frequency: str
+    width: str
+    mode: str
+    threshold: str
+    automatic_raw: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class QuadrantKeys:
+    """Torque after a change of direction: % of the rated torque, ms, ms, command units."""
+
+    positive: str
+    negative: str
+    delay: str
+    filter: str
+    travel: str
+
+
+@dataclass(frozen=True, slots=True)
+class JogKeys:
+    """The drive's own jog: speed [rpm] and the times [ms] to 1000 rpm and back."""
+
+    speed: str
+    rise: str
+    fall: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,6 +300,13 @@ class Traits:
     second_gains: GainKeys | None = None
     switching: SwitchKeys | None = None
     compensation: CompensationKeys | None = None
+    third_gains: GainKeys | None = None
+    swing: SwingKeys | None = None
+    quadrant: QuadrantKeys | None = None
+    jog: JogKeys | None = None
+    identifies_poles: bool = False
+    brake_by_bus: bool = False
+    """Bit 0 of 60FEh applies the holding brake while process data carry it (EP3E, 001:970)."""
     speed_filter: tuple[str, str] | None = None
     """Low-pass of the speed feedback: parameter and "Hz", "ms" or "µs"."""
     feed_forward: FeedForward | None = None

@@ -16,7 +16,7 @@ from drivers.virtual.firmware.families.base import Wiring
 
 InputUse = Literal[
     "negative_limit", "positive_limit", "home", "reset", "emergency", "probe1", "probe2", "gain",
-    "fault",
+    "fault", "jog_forward", "jog_backward",
 ]  # fmt: skip
 OutputUse = Literal[
     "ready", "running", "fault", "no_fault", "warning", "zero_speed", "in_position", "homed",
@@ -78,6 +78,11 @@ class TerminalTable:
     inputs_key: str | None = None
     outputs_key: str | None = None
     bus_outputs_need_function: bool = False
+    """Only outputs with the function "bus" follow 60FEh."""
+    bus_outputs_need_cycles: bool = False
+    masks_outputs: bool = True
+    keep_key: str | None = None
+    """What its outputs do when process data end: a set bit switches the output off."""
     index_bit: int | None = None
     probe_bits: tuple[int, int] | None = None
 
@@ -131,6 +136,8 @@ M6L = TerminalTable(
     input_uses={
         2: "reset",
         3: "gain",
+        17: "jog_forward",
+        18: "jog_backward",
         32: "home",
         34: "emergency",
         35: "positive_limit",
@@ -147,9 +154,13 @@ M6L = TerminalTable(
         6: "warning",
         11: "in_position",
         18: "brake",
+        28: "bus",
     },
     inputs_key="200B:0D",
     outputs_key="200B:0E",
+    bus_outputs_need_function=True,
+    bus_outputs_need_cycles=True,
+    keep_key="2014:1C",
     index_bit=25,
     probe_bits=(26, 27),
 )
@@ -172,6 +183,8 @@ R6L = TerminalTable(
         23: "home",
         30: "probe1",
         31: "probe2",
+        39: "jog_forward",
+        40: "jog_backward",
     },
     output_uses={0: "brake", 1: "fault", 2: "in_position", 6: "homed"},
     inputs_key="200D:14",
@@ -198,6 +211,7 @@ EP3E = TerminalTable(
         Output("DO5", 20, fixed="brake"),
     ),
     bus_outputs_need_function=True,
+    masks_outputs=False,  # no mask for DO1 to DO5, only their function (001:988)
 )
 
 DS_C = TerminalTable(
