@@ -113,13 +113,16 @@ def torque(page: Page, station: Station, axis: str) -> None:
                    duration_s=20)  # fmt: skip
     spectrum.get_by_label("Trace").select_option(VELOCITY)
 
-    def whole() -> bool:
-        """Five seconds of nothing but the signal are in sight."""
-        found = peaks(page)
-        return bool(found) and abs(found[0][0] - 12) < 0.05 and abs(found[0][1] - 20) < 2
+    heights = [0.0]
 
-    until(whole, LONG_S, "the sine alone")
-    page.wait_for_timeout(4000)
+    def steady() -> bool:
+        """Five seconds of nothing but the signal are in sight: its line has stopped growing."""
+        page.wait_for_timeout(500)
+        (hertz, height), *_ = peaks(page) or [(0.0, 0.0)]
+        heights.append(height)
+        return abs(hertz - 12) < 0.02 and height > 15 and abs(height / heights[-2] - 1) < 1e-3
+
+    until(steady, LONG_S, "the sine alone")
     page.get_by_role("button", name="Pause").click()
     for trace in (VELOCITY, TORQUE):
         spectrum.get_by_label("Trace").select_option(trace)
