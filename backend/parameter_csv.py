@@ -141,7 +141,7 @@ def _lines(text: str) -> tuple[list[int], list[str]]:
     """Lines that are neither empty nor a comment, and their numbers in the file."""
     kept = [
         (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
+        for number, line in enumerate(text.splitlines(keepends=True), start=1)
         if line.strip() and line.lstrip()[0] != "#" and not _SEPARATOR_LINE.fullmatch(line.strip())
     ]
     return [number for number, _ in kept], [line for _, line in kept]

@@ -95,6 +95,13 @@ def test_encodings_of_spreadsheets(profile: Profile, encoding: str) -> None:
     assert {r.key: r.raw for r in read_csv(data, profile).readings} == {"2005:03": 350}
 
 
+def test_text_of_several_lines_stays_whole() -> None:
+    generic = load_profile("generic402")
+    text = 'it\'s, "x"\n;\r\n速度'
+    written = write_csv(generic, [Row("6404:00", text)])
+    assert values(generic, written) == {"6404:00": text}
+
+
 def test_no_formulas_for_spreadsheets(profile: Profile) -> None:
     evil = profile.parameters[0].model_copy(update={"name": "=1+1"})
     changed = Profile.model_validate(
