@@ -17,6 +17,7 @@ from backend.drive import Drive, Port, Reading
 from backend.drive_list import DriveList, SavedDrive, SavedPort
 from backend.jobs import Job, JobRunner, Progress
 from backend.journal import Journal
+from backend.matching import profile_for
 from backend.measurements import MeasurementStore
 from backend.monitor import Monitor, Snapshot
 from backend.records import Records
@@ -25,7 +26,6 @@ from drivers.errors import Busy, DriveError, NotAllowed
 from drivers.link import Found, Link, LinkEvent, NeedsProfile
 from drivers.modbus.link import RegisterLink
 from drivers.urls import link_for
-from profiles import load_profile
 from profiles.loader import ProfileError
 
 
@@ -247,11 +247,11 @@ class Bench:
 
         Raises:
             Busy: another drive uses this station. LinkLost: the bus cannot be opened.
+            NotAllowed: no such profile, or one of drives that have no such port.
         """
         link = await self.link(url)
         self._require_free(link, url, station)
-        facts = load_profile(profile)
-        spec = facts.link(link.kind)
+        facts, spec = profile_for(link.kind, profile)
         if isinstance(link, NeedsProfile):
             link.configure_station(station, facts)
         drive_id = self._new_id(name or f"{profile}-{station}")

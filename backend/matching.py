@@ -6,9 +6,11 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
+from drivers.errors import NotAllowed
 from drivers.link import Found
-from profiles import load_all
-from profiles.schema import Profile
+from profiles import load_all, load_profile
+from profiles.loader import ProfileError
+from profiles.schema import LinkSpec, Profile
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,3 +44,28 @@ def match_profiles(kind: str, found: Found) -> list[Match]:
             matches.append(Match(profile, "possible", text))
     order = ("certain", "likely", "possible")
     return sorted(matches, key=lambda m: order.index(m.confidence))
+
+
+def profile_for(kind: str, name: str) -> tuple[Profile, LinkSpec]:
+    """The profile ``name`` for a drive on a bus of this kind, and how it is reached there.
+
+    Raises:
+        NotAllowed: no such profile, or one whose drives have no such port: its numbers would be
+            written into a drive of another family.
+    """
+    try:
+        profile = load_profile(name)
+    except ProfileError as error:
+        raise NotAllowed(
+            str(error), value=name, remedy="choose one of the listed profiles"
+        ) from error
+    spec = profile.link(kind)
+    if spec is None:
+        kinds = ", ".join(link.kind for link in profile.links)
+        raise NotAllowed(
+            f"a {profile.title} has no {kind} port: this must be a drive of another family",
+            value=name,
+            limit=kinds,
+            remedy=f"choose a profile of drives with {kind}",
+        )
+    return profile, spec

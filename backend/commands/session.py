@@ -12,11 +12,10 @@ from typing import ParamSpec, TypeVar
 import typer
 
 from backend.drive import Drive, Port
-from backend.matching import match_profiles
+from backend.matching import match_profiles, profile_for
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link, NeedsProfile
 from drivers.urls import link_for
-from profiles import load_profile
 from profiles.loader import ProfileError
 
 P = ParamSpec("P")
@@ -98,14 +97,14 @@ async def drive_at(url: str, station: int, profile: str | None) -> AsyncIterator
                 f"nothing answers at station {station} of {url}",
                 remedy="check power, cable, station address, baud rate and parity",
             )
-        facts = load_profile(profile or _recognise(link, found))
+        facts, spec = profile_for(link.kind, profile or _recognise(link, found))
         if isinstance(link, NeedsProfile):
             link.configure_station(station, facts)
         drive = Drive(
             f"{facts.drive}-{station}",
             f"{facts.drive} station {station}",
             facts,
-            [Port(link, station, facts.link(link.kind))],
+            [Port(link, station, spec)],
         )
         drive.found = found
         yield drive

@@ -9,6 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 from backend import cli
+from backend.bench import Bench
 from backend.commands import session
 from backend.commands.params import _assignment
 from backend.drive import Drive
@@ -30,6 +31,27 @@ def test_an_unknown_profile_is_told_with_those_that_there_are(bus: MemoryLink) -
     assert "error: no profile named 'mms8'; there are: ds_c" in done.stderr
     assert "try:" in done.stderr
     assert isinstance(done.exception, SystemExit)
+
+
+def test_a_profile_of_drives_without_this_port_is_refused(bus: MemoryLink) -> None:
+    """An M6-L has EtherCAT only: its numbers would go into some other drive."""
+    words = ["params", "set", "mlink:///x", "6040:00=15", "--profile", "m6l"]
+    done = CliRunner().invoke(cli.app, words)
+    assert done.exit_code == 1
+    assert "has no mlink port" in done.stderr
+    assert bus.written == []
+
+
+async def test_the_bench_refuses_it_too(tmp_path: Path, link: MemoryLink) -> None:
+    bench = Bench(tmp_path, {"mlink://virtual0": lambda: link})
+    try:
+        with pytest.raises(NotAllowed, match="has no mlink port"):
+            await bench.connect("mlink://virtual0", 1, "m6l")
+        with pytest.raises(NotAllowed, match="no profile named 'mms8'; there are"):
+            await bench.connect("mlink://virtual0", 1, "mms8")
+        assert bench.members == {}
+    finally:
+        await bench.close()
 
 
 @pytest.mark.parametrize("text", ["nan", "inf", "-inf", "1e400", "five"])
