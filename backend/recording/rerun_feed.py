@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from backend.bench import Bench
+from backend.drive import Reading
 from backend.journal import Entry
+from backend.recording.changed_settings import ChangedSettings
 from backend.recording.reader import Channel
 from backend.recording.recorder import describe_streams
 from backend.scope import Subscription
@@ -99,12 +101,16 @@ class RerunFeed:
         self._events: deque[Entry] = deque(maxlen=200)
         self._task: asyncio.Task[None] | None = None
         self._changed = False
+        self._settings = ChangedSettings(bench)
         bench.on_drives.append(self._drives)
+        bench.on_readings.append(self._readings)
         bench.journal.listen(self._logged)
 
     def join(self) -> FeedClient:
         """A page begins to look."""
         client = FeedClient()
+        if not self.clients:
+            self._settings.begin()
         self.clients.add(client)
         if self._first:
             client.begin(self._session, self._first)
@@ -131,6 +137,14 @@ class RerunFeed:
     def _logged(self, entry: Entry) -> None:
         if self.clients:
             self._events.append(entry)
+
+    def _readings(self, drive: str, readings: list[Reading]) -> None:
+        """A setting that became another one is a line of the text log."""
+        if not self.clients:
+            self._settings.forget()
+            return
+        for _, text in self._settings.among(drive, readings):
+            self._events.append(Entry(time.time(), "info", drive, "", text))
 
     # --- the feed ---------------------------------------------------------------------
 

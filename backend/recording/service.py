@@ -15,6 +15,7 @@ from backend.files import StorageFailed
 from backend.jobs import Job, JobResult, Progress
 from backend.journal import Entry
 from backend.recording.capture import FaultCapture
+from backend.recording.changed_settings import ChangedSettings
 from backend.recording.library import RecordingLibrary
 from backend.recording.recorder import Recorder, Settings
 from backend.recording.writer import free_bytes
@@ -33,7 +34,7 @@ class Recordings:
         self.running: dict[str, Recorder] = {}
         self.ended: dict[str, Recorder] = {}
         self.capture: FaultCapture | None = None
-        self._known: dict[tuple[str, str], object] = {}
+        self._changed = ChangedSettings(bench)
         self._exporting: dict[tuple[str, str], Job] = {}
 
     def open(self) -> None:
@@ -68,6 +69,7 @@ class Recordings:
         name = self.library.free_name(settings.name or f"recording {stamp}")
         recorder = Recorder(self.bench, self.library.path(name), settings, self._ended)
         self.running[name] = recorder
+        self._changed.begin()
         try:
             await self._prune()
             await recorder.start()
@@ -147,24 +149,12 @@ class Recordings:
     def _readings(self, drive: str, readings: list[Reading]) -> None:
         """A setting that changed while something records is an event of it."""
         if not self.running:
-            self._known.clear()
+            self._changed.forget()
             return
-        member = self.bench.members.get(drive)
-        if member is None:
-            return
-        for reading in readings:
-            parameter = member.drive.parameter(reading.key)
-            place = (drive, reading.key)
-            if parameter.access != "rw" or reading.raw is None:
-                continue
-            before = self._known.get(place, reading.raw)
-            self._known[place] = reading.raw
-            if before == reading.raw:
-                continue
-            text = f"{member.drive.name}: {parameter.name} is now {reading.value} {parameter.unit}"
+        for key, text in self._changed.among(drive, readings):
             for recorder in list(self.running.values()):
-                if recorder.concerns(drive) and not recorder.records(drive, reading.key):
-                    recorder.event("parameter", text.strip(), drive=drive)
+                if recorder.concerns(drive) and not recorder.records(drive, key):
+                    recorder.event("parameter", text, drive=drive)
 
     # --- stored ones ------------------------------------------------------------------
 

@@ -1,0 +1,53 @@
+"""Settings that become others while somebody records or looks on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from backend.bench import Bench
+from backend.cyclic import OUTPUT_ROLES
+from backend.drive import Drive, Reading
+
+#: Commands, which a motion writes twenty times a second, are no settings; the mode is one.
+_COMMANDS = tuple(role for role in OUTPUT_ROLES if role != "mode")
+
+
+class ChangedSettings:
+    """Compares every reading of what can be written with the one before, from `begin` on."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+        self._known: dict[tuple[str, str], object] = {}
+
+    def begin(self) -> None:
+        """What is known of the drives by now is what they had before."""
+        for drive_id, member in self._bench.members.items():
+            for key, reading in member.drive.readings.items():
+                if reading.raw is not None:
+                    self._known.setdefault((drive_id, key), reading.raw)
+
+    def forget(self) -> None:
+        """Nobody records or looks any more."""
+        self._known.clear()
+
+    def among(self, drive_id: str, readings: Iterable[Reading]) -> list[tuple[str, str]]:
+        """Key and words of each setting that is another one now."""
+        member = self._bench.members.get(drive_id)
+        if member is None:
+            return []
+        drive, found = member.drive, []
+        commands = {drive.key(role) for role in _COMMANDS}
+        for reading in readings:
+            if reading.raw is None or reading.key in commands:
+                continue
+            place = (drive_id, reading.key)
+            before = self._known.get(place, reading.raw)
+            self._known[place] = reading.raw
+            if before != reading.raw and drive.parameter(reading.key).access == "rw":
+                found.append((reading.key, _words(drive, reading)))
+        return found
+
+
+def _words(drive: Drive, reading: Reading) -> str:
+    parameter = drive.parameter(reading.key)
+    return f"{drive.name}: {parameter.name} is now {reading.value} {parameter.unit}".strip()

@@ -1,0 +1,56 @@
+"""What counts as a setting that became another one."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from backend.recording.changed_settings import ChangedSettings
+
+GAIN, SPEED, TARGET, MODE = "2002:01", "606C:00", "607A:00", "6060:00"
+_PARAMETERS = {
+    GAIN: SimpleNamespace(name="Gain", unit="1/s", access="rw"),
+    SPEED: SimpleNamespace(name="Speed", unit="rpm", access="ro"),
+    TARGET: SimpleNamespace(name="Target position", unit="inc", access="rw"),
+    MODE: SimpleNamespace(name="Mode", unit="", access="rw"),
+}
+
+
+def reading(key: str, raw: int | None) -> Any:
+    return SimpleNamespace(key=key, raw=raw, value=raw)
+
+
+def bench_with(**known: int) -> Any:
+    drive = SimpleNamespace(
+        name="X",
+        readings={GAIN: reading(GAIN, known["gain"])} if known else {},
+        key={"position_target": TARGET, "mode": MODE}.get,
+        parameter=_PARAMETERS.__getitem__,
+    )
+    return SimpleNamespace(members={"x": SimpleNamespace(drive=drive)})
+
+
+def test_the_first_change_counts_too() -> None:
+    settings = ChangedSettings(bench_with(gain=20))
+    settings.begin()
+    assert settings.among("x", [reading(GAIN, 20)]) == []
+    assert settings.among("x", [reading(GAIN, 30)]) == [(GAIN, "X: Gain is now 30 1/s")]
+    assert settings.among("x", [reading(GAIN, 30)]) == []
+
+
+def test_what_was_never_read_has_not_changed() -> None:
+    settings = ChangedSettings(bench_with())
+    settings.begin()
+    assert settings.among("x", [reading(GAIN, 30)]) == []
+    assert settings.among("x", [reading(GAIN, None)]) == [], "it could not be read"
+    assert settings.among("x", [reading(GAIN, 31)]) == [(GAIN, "X: Gain is now 31 1/s")]
+    settings.forget()
+    assert settings.among("x", [reading(GAIN, 40)]) == []
+
+
+def test_commands_and_measured_values_are_no_settings() -> None:
+    settings = ChangedSettings(bench_with())
+    settings.among("x", [reading(SPEED, 1), reading(TARGET, 1), reading(MODE, 1)])
+    changed = settings.among("x", [reading(SPEED, 2), reading(TARGET, 2), reading(MODE, 8)])
+    assert changed == [(MODE, "X: Mode is now 8")]
+    assert settings.among("gone", [reading(GAIN, 1)]) == []
