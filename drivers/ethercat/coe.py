@@ -361,11 +361,18 @@ def _info_once(box: Mailbox, opcode: int, data: bytes, answer_code: int) -> Step
                 int.from_bytes(answer[6:10], "little"), parameter=f"description of {index:04X}"
             )
         parts.append(answer[6:])
-        if int.from_bytes(answer[4:6], "little") == 0:
+        left = int.from_bytes(answer[4:6], "little")
+        if left == 0:
             return parts
         if sum(map(len, parts)) > _MAX_BYTES:
             raise ProtocolError("the drive's description does not end")
         answer = yield from box.receive(matches, box.timeout_s)
+        if answer[2] & 0x7F != 0x07 and int.from_bytes(answer[4:6], "little") != left - 1:
+            box.unsettled = True
+            raise ProtocolError(
+                "a part of the drive's description of itself is missing",
+                remedy="read it again; or make the profile from its ESI file",
+            )
 
 
 def _answer_to(index: int, subindex: int) -> Callable[[Mail], bool]:

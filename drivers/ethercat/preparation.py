@@ -86,6 +86,7 @@ class Preparation:
         }
         self._write_mappings()
         initial = self._map()
+        self._check_places()
         self._clocks_and_watchdogs()
         images = [self._image(number, initial[number]) for number in sorted(self._setups)]
         self._ring.prepare(sum(i.output_size + i.input_size for i in images))
@@ -132,6 +133,13 @@ class Preparation:
                     remedy="the drive keeps a mapping of its own: use its fixed process data",
                 )
         return initial
+
+    def _check_places(self) -> None:
+        jobs = {
+            number: setup_.check_places(self._stations[number - 1], plan)
+            for number, plan in self._setups.items()
+        }
+        self._run("register", jobs, "looking where the process data are")
 
     def _clocks_and_watchdogs(self) -> None:
         self._promise("starting the distributed clocks")

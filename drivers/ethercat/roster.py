@@ -153,6 +153,7 @@ class Roster:
 
     def _returned(self, station: Station, *, restarted: bool) -> None:
         station.lost = False
+        station.forget_void()
         how = "was switched on again" if restarted else "answers again"
         self.event("back", station.number, f"station {station.number} {how}")
         if self.exchange.loop is not None and station.number in self.exchange.setups:

@@ -32,6 +32,8 @@ _NAME_LIMIT = 15
 _EMERGENCY = "an emergency or another unexpected mail came in between"
 _FRAME_TIMEOUT_US = 2000
 _STALL_S = 0.1
+_MOST_STRAY = 64
+"""Frames of something else that may come before the answer."""
 _OTHER_FRAME, _TOO_MANY = -2, -4
 """What SOEM's search returns besides a number of slaves."""
 
@@ -175,15 +177,18 @@ class Segment:
         self, requests: Sequence[frames.Request], sent: bytes
     ) -> list[bytes | None] | None:
         ear = self._ear
-        if ear is None:
+        if ear is None or self.socket_fd is None:
             return None
-        # Where the last one was lost, it is no busy computer's: nobody waits as long again.
-        patience_us = _FRAME_TIMEOUT_US if self.silent else self.frame_timeout_us
+        # Process data must not wait long for each of many frames that do not come back.
+        hurried = self.silent and not os.get_blocking(self.socket_fd)
+        patience_us = _FRAME_TIMEOUT_US if hurried else self.frame_timeout_us
         deadline = time.monotonic() + patience_us * 1e-6
         scrap = memoryview(self._scrap)
         try:
             ear.send(sent, socket.MSG_DONTWAIT)
-            while (left_s := deadline - time.monotonic()) > 0:
+            # What has come is taken however late it is: this process may have stood still itself.
+            for _ in range(_MOST_STRAY):
+                left_s = max(deadline - time.monotonic(), 0.0)
                 if not select.select((ear,), (), (), left_s)[0]:
                     return None
                 size = ear.recv_into(scrap, 0, socket.MSG_DONTWAIT)
@@ -303,7 +308,8 @@ def _lock(interface: str) -> socket.socket:
         lock.close()
         raise Busy(
             f"another servodeck already uses the interface {interface}",
-            remedy="close it first: two masters on one segment disturb each other",
+            remedy="ask that one, as with --server on the command line, or close it first:"
+            " two masters on one segment disturb each other",
         ) from error
     return lock
 

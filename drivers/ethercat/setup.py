@@ -22,6 +22,9 @@ WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x400, 0x420
 _MANAGERS, _OUTPUTS, _SM_WATCHDOG = 4, 0x04, 0x40
 """Control byte of a sync manager (ETG.1000.4 clause 6.7): three buffers, written by the master."""
 
+_PROCESS_MEMORY = 0x1000
+"""Registers end there (ETG.1000.4 clause 6.1)."""
+
 _DC_SYSTEM_TIME, _DC_OFFSET, _DC_DELAY = 0x910, 0x920, 0x928
 _DC_ACTIVATE, _DC_START, _DC_CYCLE = 0x981, 0x990, 0x9A0
 _ASSIGN = {"rx": 0x1C12, "tx": 0x1C13}
@@ -55,6 +58,7 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
     Raises:
         NotAllowed: the drive refuses the mapping; the message says which object and why.
     """
+    station.forget_void()
     assign = yield from _assignments(station)
     for direction, pdo in (("rx", setup.rx), ("tx", setup.tx)):
         try:
@@ -221,6 +225,28 @@ def _watch_outputs() -> Steps[int]:
             return 0
         watching += 1
     return watching
+
+
+def check_places(station: Station, setup: StationSetup) -> Steps[None]:
+    """The process data lie in the slave's process memory, as its EEPROM must tell.
+
+    Raises:
+        NotAllowed: they do not; outputs would be written nowhere, or into registers.
+    """
+    managers = yield from read_again(SYNC_MANAGERS, 8 * _MANAGERS)
+    if managers is None:
+        raise ProtocolError(f"station {station.number} stopped answering while it was being set up")
+    placed = 0
+    for number in range(2, _MANAGERS):
+        start, length = struct.unpack_from("<HH", managers, 8 * number)
+        active = managers[8 * number + 6] & 1
+        placed += bool(active and length and start >= _PROCESS_MEMORY)
+    if placed < bool(setup.rx.size) + bool(setup.tx.size):
+        raise NotAllowed(
+            f"station {station.number}: its EEPROM does not tell where its process data are",
+            remedy="it can be read and written, but not moved through cyclic data;"
+            " its maker has an EEPROM file for it",
+        )
 
 
 def take_snapshot() -> Steps[Snapshot]:

@@ -49,6 +49,17 @@ def checksum(words: bytes) -> int:
     return crc
 
 
+def identity(clock: Callable[[], float]) -> Steps[tuple[int | None, bool]]:
+    """Serial number (None where there is none), and whether the checksum is right.
+
+    Errors as `read`.
+    """
+    words = yield from read(0, CONFIG_WORDS + 1, clock)
+    serial = yield from read(SERIAL_WORD, 2, clock)
+    right = words[2 * CHECKSUM_WORD] == checksum(words)
+    return int.from_bytes(serial, "little") or None, right
+
+
 def read(word: int, count: int, clock: Callable[[], float]) -> Steps[bytes]:
     """``count`` words from ``word``; two at a time, as every controller can.
 

@@ -21,6 +21,9 @@ STATE_TIMEOUT_S = {
     AlState.OP: 10.0,
 }  # fmt: skip
 
+_LISTS = frozenset((*range(0x1600, 0x1C00), *range(0x1C10, 0x1C30)))
+"""PDO mappings and their assignments."""
+
 Item = tuple[int, int, int | None]
 """Index, subindex and length in bytes (None for text)."""
 
@@ -52,6 +55,9 @@ class Station:
     to_prove: dict[int, bytes] = field(default_factory=dict)
     proven: dict[int, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     """Layouts of whole objects that were found equal to single reads, with their lengths."""
+    void: dict[int, tuple[dict[int, bytes], dict[int, bytes]]] = field(default_factory=dict)
+    """Process-data lists as they were read whole, with what was told of entries beyond their count:
+    nothing. See `_void_of`."""
     describes: bool = True
     """It has the SDO information service, as far as is known."""
     notes: list[str] = field(default_factory=list)
@@ -76,6 +82,13 @@ class Station:
         if self.mailbox is None:
             raise NotAllowed(f"station {self.number} ({self.name}) has no mailbox: no parameters")
         return self.mailbox
+
+    def forget_void(self, index: int | None = None) -> None:
+        """A list was written, or, without ``index``, the drive may be another one now."""
+        if index is None:
+            self.void.clear()
+        else:
+            self.void.pop(index, None)
 
     def require_parameters(self) -> None:
         """Its state is one in which a drive answers for parameters.
@@ -197,8 +210,11 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
     if (yield from read_ports(station)):
         station.wiring = station.ports
     try:
-        serial = yield from sii.read(sii.SERIAL_WORD, 2, clock)
-        station.serial = int.from_bytes(serial, "little") or None
+        station.serial, right = yield from sii.identity(clock)
+        if not right:
+            station.notes.append(
+                "the checksum of its EEPROM is wrong: after the next start it may ignore it"
+            )
     except DriveError as error:
         station.notes.append(error.message)
     if station.mailbox is None:
@@ -318,10 +334,12 @@ def read_items(
     dead: DriveError | None = None
     for index, members in groups.items():
         sizes = _sizes_of_whole(station, index, members) if dead is None else {}
+        whole: dict[int, bytes] = {}
         if sizes:
             yield Gap()
             whole = yield from _read_whole(station, index, sizes)
-            results.update({item: whole[item[1]] for item in members if item[1] in whole})
+            known = whole | _void_of(station, index, whole)
+            results.update({item: known[item[1]] for item in members if item[1] in known})
         for item in members:
             if item in results:
                 continue
@@ -335,10 +353,12 @@ def read_items(
                 results[item] = error
                 if isinstance(error, LinkLost | LinkTimeout):
                     dead = error
+        read = {item[1]: results[item] for item in members}
+        good = {sub: value for sub, value in read.items() if isinstance(value, bytes)}
         if index in station.to_prove:
-            read = {item[1]: results[item] for item in members}
-            good = {sub: value for sub, value in read.items() if isinstance(value, bytes)}
             _prove(station, index, sizes, good)
+        elif sizes and whole:
+            _remember_void(station, index, whole, good)
         on_progress(len(results))
     return [results[item] for item in items]
 
@@ -376,6 +396,24 @@ def _read_whole(station: Station, index: int, sizes: dict[int, int]) -> Steps[di
     else:
         station.to_prove[index] = data
     return {}
+
+
+def _void_of(station: Station, index: int, whole: dict[int, bytes]) -> dict[int, bytes]:
+    """Entries of a process-data list beyond its count, as told when it last read just the same.
+
+    They mean nothing (ETG.1000.6 clause 5.6.7.4) and can only be read one by one, so they are not
+    asked for every time. `Station.forget_void` where somebody writes the list.
+    """
+    before, void = station.void.get(index, ({}, {}))
+    return void if whole and whole == before else {}
+
+
+def _remember_void(
+    station: Station, index: int, whole: dict[int, bytes], read: dict[int, bytes]
+) -> None:
+    beyond = {sub: value for sub, value in read.items() if sub not in whole}
+    if index in _LISTS and beyond and not any(map(any, beyond.values())):
+        station.void[index] = (whole, beyond)
 
 
 def _is_all_there_is(station: Station, index: int, sizes: dict[int, int]) -> Steps[bool]:

@@ -9,6 +9,9 @@ imports nothing of servodeck, and its slaves have the oddities that real ones ha
              and 3; mails without numbers, aborts as responses with odd command bits, no complete
              access, no SDO information, emergencies that come before answers, slow states and an
              error left over from before, which must be acknowledged
+``bare``     a drive whose EEPROM has a wrong checksum and no category: no strings, no general part,
+             no FMMUs, sync managers or PDOs. Its dictionary is told in fragments that end in the
+             middle of a number, and with names longer than its mailbox
 """
 
 from __future__ import annotations
@@ -150,6 +153,7 @@ class Servo(Slave):
         self.memory[0x130], self.memory[0x134] = 0x11, 0x11
         self.full_out = self.full_in = False
         self.queue: list[bytes] = []
+        self.last, self.repeat = b"", 0
         self.answers = 0
         self.last_counter = 0
         self.state = 0x0250
@@ -182,16 +186,18 @@ class Servo(Slave):
         if at == IN_BOX and size == BOX:
             if not self.full_in:
                 return None
-            mail, self.full_in = bytes(self.memory[at : at + size]), False
+            self.last, self.full_in = bytes(self.memory[at : at + size]), False
             self.put()
-            return mail
+            return self.last
         self.memory[0x805] = 8 if self.full_out else 0
         self.memory[0x80D] = 8 if self.full_in else 0
         return super().read(at, size)
 
     def write(self, at: int, data: bytes) -> bool:
         if at != OUT_BOX or len(data) != BOX:
-            return super().write(at, data)
+            super().write(at, data)
+            self.repeated()
+            return True
         counter = data[5] >> 4
         if counter and counter == self.last_counter:
             return True
@@ -199,6 +205,19 @@ class Servo(Slave):
         length = int.from_bytes(data[:2], "little")
         self.mail(data[5] & 0x0F, data[6 : 6 + length])
         return True
+
+    def repeated(self) -> None:
+        """The repeat request has been toggled (ETG.1000.4 clause 6.7.3): the last mail again."""
+        asked = self.memory[0x80E] & 2
+        if asked != self.repeat and self.last:
+            # What lies in the mailbox has not been read: it comes after the repeated one.
+            if self.full_in:
+                self.queue.insert(0, bytes(self.memory[IN_BOX : IN_BOX + BOX]))
+                self.full_in = False
+            self.queue.insert(0, self.last)
+            self.put()
+        self.repeat = asked
+        self.memory[0x80F] = self.memory[0x80F] & ~2 | asked
 
     def put(self) -> None:
         if self.queue and not self.full_in:
@@ -260,7 +279,58 @@ class Servo(Slave):
         struct.pack_into("<Hi", self.memory, self.inputs_at, self.state, self.position)
 
 
-KINDS = {"coupler": Coupler, "outputs": Outputs, "servo": Servo}
+LONG = "Thing of the maker, told at length and of little use, " * 9
+"""Longer than three mailboxes."""
+
+FRAGMENT = 103
+
+
+class Bare(Servo):
+    product, name = 0x0B0B, b"?"
+    body = b""
+
+    def __init__(self) -> None:
+        super().__init__()
+        for n in range(300):
+            self.objects[0x3000 + n, 0] = struct.pack("<H", n)
+        self.sent = 0
+
+    def post(self, payload: bytes, kind: int = 3) -> None:
+        """With a number, so that a repeated mail is known as such."""
+        self.sent = self.sent % 7 + 1
+        self.queue.append(struct.pack("<HHBB", len(payload), 0, 0, kind | self.sent << 4) + payload)
+        self.put()
+
+    def mail(self, kind: int, payload: bytes) -> None:
+        if kind != 3 or payload[1] >> 4 != 8:
+            super().mail(kind, payload)
+            return
+        opcode, data = payload[2], payload[6:]
+        index = int.from_bytes(data[:2], "little")
+        known = sorted({i for i, _ in self.objects})
+        if opcode == 1:
+            self.tell(2, data[:2] + b"".join(struct.pack("<H", i) for i in known))
+            return
+        subs = [s for i, s in self.objects if i == index]
+        if not subs or (opcode == 5 and data[2] not in subs):
+            self.post(struct.pack("<HBBHI", 0x8000, 7, 0, 0, 0x06020000))
+        elif opcode == 3:
+            told = struct.pack("<HHBB", index, 6, max(subs), 9 if len(subs) > 1 else 7)
+            self.tell(4, told + f"{index:04X} {LONG}".encode())
+        else:
+            value = self.objects[index, data[2]]
+            told = struct.pack("<HBBHHH", index, data[2], 0, 6, 8 * len(value), 0x3F)
+            self.tell(6, told + f"entry {data[2]} {LONG}".encode())
+
+    def tell(self, opcode: int, data: bytes) -> None:
+        """Fragments, each with the number of those that follow (ETG.1000.6 clause 5.6.3.2)."""
+        parts = [data[at : at + FRAGMENT] for at in range(0, len(data), FRAGMENT)]
+        for left, part in zip(range(len(parts) - 1, -1, -1), parts, strict=True):
+            more = 0x80 if left else 0
+            self.post(struct.pack("<HBBH", 0x8000, opcode | more, 0, left) + part)
+
+
+KINDS = {"coupler": Coupler, "outputs": Outputs, "servo": Servo, "bare": Bare}
 
 
 def station(slave: Slave) -> int:

@@ -206,6 +206,22 @@ def test_information_service() -> None:
     assert slave.requests[0] == bytes.fromhex("0080 01 00 0000 0100")
 
 
+def test_a_missing_part_of_a_description_is_not_passed_over() -> None:
+    """The parts that follow are counted down (ETG.1000.6 clause 5.6.3.2): 2, then 0."""
+
+    def react(_request: bytes) -> list[bytes]:
+        return [
+            coe(8, b"\x82\0\x02\0" + b"\x01\0\x00\x10"),
+            coe(8, b"\x02\0\x00\0" + b"\x18\x10"),
+        ]
+
+    slave = ScriptedSlave(react)
+    box = slave.box()
+    with pytest.raises(ProtocolError, match="a part of the drive's description of itself"):
+        slave.run(sdo.list_objects(box))
+    assert box.unsettled, "the next question is asked after what may still come"
+
+
 def test_information_service_abort() -> None:
     slave = ScriptedSlave(lambda _: [coe(8, bytes.fromhex("07 00 0000 00000206"))])
     with pytest.raises(Rejected, match="no such object"):
@@ -295,3 +311,28 @@ def test_the_drives_own_dictionary_proves_the_layout_of_a_whole_object(
         assert slave.run(read_items(station, items, lambda _n: None)) == list(entries.values())
         asked = len(slave.requests) - before
         assert asked == (1 if again else reads + (last == 4)), "the proof is kept"
+
+
+def test_entries_beyond_the_count_of_a_list_are_asked_for_once_until_it_changes() -> None:
+    """1600h with 2 of 4 entries in use: the others hold nothing, and only single reads tell."""
+    count = 2
+
+    def react(request: bytes) -> list[bytes]:
+        mux = request[3:6]
+        if request[2] == 0x50:
+            whole = struct.pack("<BB", count, 0) + struct.pack("<2I", 0x60400010, 0x607A0020)
+            return [coe(3, b"\x51" + mux + struct.pack("<I", len(whole)) + whole)]
+        return [coe(3, b"\x43" + mux + bytes(4))]
+
+    slave = ScriptedSlave(react)
+    station = Station(1, mailbox=slave.box())
+    items = [(0x1600, 0, 1), *((0x1600, sub, 4) for sub in range(1, 5))]
+    told = [b"\x02", b"\x10\x00\x40\x60", b"\x20\x00\x7a\x60", bytes(4), bytes(4)]
+    asked = []
+    for step in ("first", "again", "written", "again"):
+        if step == "written":
+            station.forget_void(0x1600)
+        before = len(slave.requests)
+        assert slave.run(read_items(station, items, lambda _n: None)) == told
+        asked.append(len(slave.requests) - before)
+    assert asked == [3, 1, 3, 1]

@@ -13,23 +13,25 @@ import pytest
 
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, Rejected
+from drivers.ethercat.coe import EntryDescription, ObjectInfo
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
 from drivers.virtual.wires.netns import Namespace
 from profiles.schema import PdoSet, PdoSpec, Profile
 from tests.wire.ethercat_host.conftest import Bus, until
+from tests.wire.ethercat_host.plain_slaves import LONG
 from tests.wire.ethercat_host.servo_device import servo_profile
 
 HERE = Path(__file__).parent
-SERVO = 3
+SERVO, BARE = 3, 4
 RECORD = [Address(0x2000, 0, "UINT8"), Address(0x2000, 1, "UINT16"), Address(0x2000, 2, "UINT16")]
 
 
 @pytest.fixture(scope="module")
 def wire(namespace: Namespace) -> Iterator[Namespace]:
-    """Coupler, digital outputs, and a servo drive behind them."""
+    """Coupler, digital outputs, a servo drive behind them, and one with a bare EEPROM."""
     process = namespace.popen(
-        [sys.executable, str(HERE / "plain_slaves.py"), "ec0s", "coupler,outputs,servo"],
+        [sys.executable, str(HERE / "plain_slaves.py"), "ec0s", "coupler,outputs,servo,bare"],
         stdout=subprocess.PIPE,
     )
     assert process.stdout is not None
@@ -42,7 +44,8 @@ def wire(namespace: Namespace) -> Iterator[Namespace]:
 
 @pytest.fixture
 async def bus(wire: Namespace) -> Bus:
-    return Bus(EthercatLink("ec0m", launcher=wire.command([])))
+    # Replies are awaited: these slaves repeat no mail, and a busy machine is no trouble of theirs.
+    return Bus(EthercatLink("ec0m", launcher=wire.command([]), lockstep=1.0))
 
 
 def odd_profile() -> Profile:
@@ -63,7 +66,7 @@ def odd_profile() -> Profile:
 async def test_couplers_and_plain_slaves_share_the_segment_with_a_drive(bus: Bus) -> None:
     await bus.link.open()
     try:
-        coupler, outputs, servo = await bus.link.scan(lambda _s, _t: None)
+        coupler, outputs, servo, _ = await bus.link.scan(lambda _s, _t: None)
         assert [f.vendor_id for f in (coupler, outputs, servo)] == [0xBAD] * 3
         for plain in (coupler, outputs):
             assert any("no mailbox" in note for note in plain.notes)
@@ -126,5 +129,30 @@ async def test_its_fixed_process_data_on_swapped_sync_managers_move_it(bus: Bus)
         assert max(positions) == 495
         assert positions == sorted(positions)
         await cyclic.stop()
+    finally:
+        await bus.link.close()
+
+
+async def test_a_drive_with_a_bare_eeprom_is_read_whole_and_moved_by_nobody(bus: Bus) -> None:
+    await bus.link.open()
+    try:
+        bare = (await bus.link.scan(lambda _s, _t: None))[BARE - 1]
+        assert (bare.name, bare.serial, bare.state) == ("ODD-1 drive", 0xC0FFEE, "PREOP")
+        assert any("checksum of its EEPROM is wrong" in note for note in bare.notes)
+        described = await bus.link.enumerate(BARE, lambda _s, _t: None)
+        objects = {d.index: d for d in described if isinstance(d, ObjectInfo)}
+        entries = {(d.index, d.subindex): d for d in described if isinstance(d, EntryDescription)}
+        assert [i for i in objects if 0x3000 <= i < 0x4000] == list(range(0x3000, 0x3000 + 300))
+        assert objects[0x3123].name == f"3123 {LONG}".strip()
+        assert entries[0x1018, 4].name == f"entry 4 {LONG}".strip()
+        assert entries[0x1018, 4].bit_length == 32
+        assert await bus.link.read(BARE, Address(0x3123, 0, "UINT16")) == b"\x23\x01"
+        bus.link.know(BARE, odd_profile())
+        with pytest.raises(NotAllowed, match="EEPROM does not tell where its process data are"):
+            await bus.link.process_data.configure(
+                [CyclicSignal(BARE, Address(0x6064, 0, "INT32"), "position")],
+                [CyclicSignal(BARE, Address(0x607A, 0, "INT32"), "target")],
+                0.004,
+            )
     finally:
         await bus.link.close()
