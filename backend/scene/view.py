@@ -16,7 +16,10 @@ import viser
 from backend.mechanics_calc import Mechanics
 from backend.scene.geometry import HALF_TRACK, Track, Travel, turn
 
+#: Distance of two axes; the page's camera knows it too (webui/src/pages/scene/SceneFrame.tsx).
 _SPACING = 0.9
+#: Less than this is not seen: 0.007°, ten times the noise of an encoder.
+LEAST_REV = 2e-5
 _MOTOR_X = -1.25
 _HEIGHT = 0.2
 _DARK, _STEEL, _MARK = (60, 64, 72), (150, 158, 168), (235, 120, 30)
@@ -43,8 +46,13 @@ class _Parts:
     root: viser.FrameHandle
     turning: list[tuple[viser.FrameHandle, str, float]] = field(default_factory=list)
     sliding: viser.FrameHandle | None = None
+    shown_rev: float | None = None
     colour: Callable[[tuple[int, int, int]], None] = lambda _: None
     label: Callable[[str], None] = lambda _: None
+
+
+def _same(shown_rev: float | None, revolutions: float) -> bool:
+    return shown_rev is not None and abs(revolutions - shown_rev) < LEAST_REV
 
 
 class SceneView:
@@ -85,12 +93,13 @@ class SceneView:
             }
 
     def move(self, positions_rev: dict[str, float]) -> None:
-        """Put the parts of these axes where the motors stand."""
+        """Put the parts of these axes where the motors stand; who stands still sends nothing."""
         with self._server.atomic():
             for drive, revolutions in positions_rev.items():
                 parts = self._axes.get(drive)
-                if parts is None:
+                if parts is None or _same(parts.shown_rev, revolutions):
                     continue
+                parts.shown_rev = revolutions
                 for node, axis, ratio in parts.turning:
                     node.wxyz = turn(revolutions * ratio, axis)
                 if parts.sliding is not None:
