@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import yaml
@@ -30,12 +31,34 @@ def import_file(
         ImportFailed: not such a file, or nothing usable in it.
     """
     report = ImportReport()
+    _refuse_what_is_known(data, name)
     if is_xml(data):
         number = _choose(data, name, report, product_code, revision)
         description = read_esi(data, name, report, number)
     else:
         description = read_eds(data, name, report)
     return build_profile(description, report, drive=drive)
+
+
+#: How files begin that are handed in for a description, and what they are.
+_OTHER_FILES = (
+    (rb"PK\x03\x04|\x1f\x8b|Rar!|7z\xbc\xaf", "an archive", "unpack it and choose the file in it"),
+    (rb"%PDF", "a PDF document", "ask the maker for the ESI or EDS file"),
+    (
+        rb"(?is)\s*(<!doctype html|<html)", "a web page",
+        "the download did not give the file: log in there, or ask the maker",
+    ),
+    (
+        rb"(?s).{0,600}<ISO15745ProfileContainer", "an XDD or XDC file (CiA 311)",
+        "choose the EDS file, which makers of such drives offer as well",
+    ),
+)  # fmt: skip
+
+
+def _refuse_what_is_known(data: bytes, name: str) -> None:
+    for begins, what, remedy in _OTHER_FILES:
+        if re.match(begins, data[:1000].lstrip(b"\xef\xbb\xbf")):
+            raise ImportFailed(f"{name} is {what}, not an ESI, EDS or DCF file: {remedy}")
 
 
 def is_xml(data: bytes) -> bool:

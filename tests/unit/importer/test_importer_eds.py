@@ -160,3 +160,20 @@ def test_an_imported_profile_is_written_and_loaded_like_any_other(tmp_path: Path
     assert parse_profile({"profile.yaml": target.read_text("utf-8")}) == profile
     with pytest.raises(ImportFailed, match="exists"):
         write_profile(profile, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("data", "what"),
+    [
+        (b"PK\x03\x04\x14\0", "an archive"),
+        (b"%PDF-1.7", "a PDF document"),
+        (b"\n<!DOCTYPE html><html><body>404</body></html>", "a web page"),
+        (
+            b'\xef\xbb\xbf<?xml version="1.0"?>\n<ISO15745ProfileContainer xmlns="x"/>',
+            "an XDD or XDC file",
+        ),
+    ],
+)
+def test_files_that_are_mistaken_for_a_description_are_named(data: bytes, what: str) -> None:
+    with pytest.raises(ImportFailed, match=rf"drive is {what}.*not an ESI, EDS or DCF file: "):
+        import_file(data, "drive")

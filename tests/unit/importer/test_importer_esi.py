@@ -129,7 +129,7 @@ def test_oddities_are_understood_and_reported(
     ("data", "says"),
     [
         (b"<EtherCATConfig/>", "network configuration"),
-        (b"<html/>", "not an ESI file"),
+        (b"<html/>", "a web page, not an ESI"),
         (b"<EtherCATInfo><Vendor/></EtherCATInfo>", "describes no device"),
         (b"<EtherCATInfo>", "not well-formed"),
         (b"<", "not well-formed"),
