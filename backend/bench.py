@@ -321,6 +321,7 @@ class Bench:
         self.members[drive_id] = member
         drive.listen(lambda readings: self._readings(drive_id, readings))
         drive.listen_writes(self._witness.wrote)
+        drive.listen_commands(self._witness.commanded)
         monitor.start()
         self._save()
         self.journal.add(f"connected {drive.name} ({drive.profile.title})", drive=drive_id)

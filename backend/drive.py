@@ -67,6 +67,18 @@ class WriteRecord:
 
 
 @dataclass(frozen=True, slots=True)
+class CommandRecord:
+    """A motion object that was sent without reading back; ``problem`` empty where it arrived."""
+
+    drive: str
+    name: str
+    key: str
+    parameter: str
+    raw: int
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Port:
     """One way to reach a drive."""
 
@@ -130,6 +142,7 @@ class Drive:
         self._changes = _Changes()
         self._listeners: list[Callable[[list[Reading]], None]] = []
         self._write_listeners: list[Callable[[WriteRecord], None]] = []
+        self._command_listeners: list[Callable[[CommandRecord], None]] = []
         self._transient = {
             signal.key for signal in profile.signals if signal.role in _COMMAND_ROLES
         } | {step.key for proc in profile.procedures for step in proc.steps if step.do == "write"}
@@ -151,6 +164,10 @@ class Drive:
     def listen_writes(self, listener: Callable[[WriteRecord], None]) -> None:
         """Call ``listener`` after everything that `write` sent, whatever came of it."""
         self._write_listeners.append(listener)
+
+    def listen_commands(self, listener: Callable[[CommandRecord], None]) -> None:
+        """Call ``listener`` after everything that `command` sent, whatever came of it."""
+        self._command_listeners.append(listener)
 
     def parameter(self, key: str) -> Parameter:
         """The parameter of this key or maker's number.
@@ -532,8 +549,19 @@ class Drive:
         port = self.port_for(parameter)
         try:
             await port.link.write(port.station, address_of(parameter), encode(parameter.type, raw))
-        except DriveError as error:
-            raise self._named(error, parameter, raw) from error
+        except BaseException as error:
+            # A cancelled command may have reached the drive as well.
+            problem = error.message if isinstance(error, DriveError) else "interrupted"
+            self._tell_command(parameter, raw, problem)
+            if isinstance(error, DriveError):
+                raise self._named(error, parameter, raw) from error
+            raise
+        self._tell_command(parameter, raw)
+
+    def _tell_command(self, parameter: Parameter, raw: int, problem: str = "") -> None:
+        record = CommandRecord(self.id, self.name, parameter.key, parameter.name, raw, problem)
+        for listener in self._command_listeners:
+            listener(record)
 
     async def _send(self, port: Port, parameter: Parameter, value: Raw) -> None:
         """Write; a time-out is unknown, so it is read back and never blindly repeated."""

@@ -63,7 +63,9 @@ def recompute(measurement: Measurement) -> dict[str, object]:
                 return inertia_tool.as_json(inertia_tool.reevaluate(arrays, meta))
             case "step":
                 return _step(measurement)
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+    except (
+        ValueError, KeyError, TypeError, IndexError, AttributeError, ArithmeticError, MemoryError,
+    ) as error:  # fmt: skip
         raise BadMeasurement(
             f"the measurement is not complete: {error}", value=measurement.kind,
             remedy="get an undamaged copy of the file, or measure again",

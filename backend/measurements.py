@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from tokenize import TokenError
 
 import numpy as np
 import numpy.typing as npt
@@ -130,6 +131,8 @@ def unpack(data: bytes, name: str = "the file") -> Measurement:
         arrays: Arrays = {}
         for member in archive.namelist():
             values = np.load(io.BytesIO(archive.read(member)), allow_pickle=False)
+            if values.dtype.kind not in "biuf":
+                raise ValueError(f"{member} holds no numbers")
             arrays[member.removesuffix(".npy").replace(".", "/")] = values
         return Measurement(_head(arrays.pop("meta"), name), arrays)
 
@@ -165,7 +168,8 @@ def _told(name: str) -> Iterator[None]:
         yield
     except (
         zipfile.BadZipFile, zlib.error, struct.error, KeyError, ValueError, TypeError, EOFError,
-        OSError, NotImplementedError,
+        OSError, NotImplementedError, MemoryError, OverflowError, SyntaxError, RecursionError,
+        TokenError,
     ) as error:  # fmt: skip
         raise BadMeasurement(
             f"{name} is damaged, or no measurement: {error}", value=name,

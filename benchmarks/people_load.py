@@ -184,10 +184,14 @@ def report(station: Station, drives: list[str], *, cyclic: bool) -> None:
     """Measure without and with viewers and print the table."""
     figures = {}
     late = {}
+    busy = {}
     for count in (0, VIEWERS):
         url = f"ws://127.0.0.1:{station.port}/api/v1/live"
         with looking(url, drives, count):
+            began, used = time.perf_counter(), time.process_time()
             figures[count] = measure(station, drives[0])
+            # The viewers are a process of their own; here are the server and this benchmark.
+            busy[count] = (time.process_time() - used) / (time.perf_counter() - began) * 100
             late[count] = lateness(station) if cyclic else {}
     print(f"{'':28}{'no viewer':>20}{f'{VIEWERS} viewers':>20}   (median / worst, ms)")
     for name in figures[0]:
@@ -196,6 +200,7 @@ def report(station: Station, drives: list[str], *, cyclic: bool) -> None:
             for f in figures.values()
         ]
         print(f"{name:28}{cells[0]:>20}{cells[1]:>20}")
+    print(f"{'server, % of a core':28}{busy[0]:>20.0f}{busy[VIEWERS]:>20.0f}")
     for name in sorted(late[0]):
         if isinstance(late[0][name], (int, float)) and not isinstance(late[0][name], bool):
             print(f"cyclic {name:21}{late[0][name]:>20.1f}{late[VIEWERS].get(name, 0):>20.1f}")

@@ -1,27 +1,68 @@
 """Changes through the interface and the audit: none is forgotten, none is told before it is safe.
 
-What changes a drive, control, people or the library is told where it happens, with values. Every
-other change of files or of the station is told here, by what the request's route needs (see
-backend.api.rights), so that a new route cannot forget it.
+What changes a drive's parameters, control, people or the library is told where it happens, with
+values. Every other change is told here, so that a new route cannot forget it: what it asked for,
+and what was there before where the route says so (`backend.audit.asked.note_before`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from urllib.parse import parse_qsl
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from backend.api.rights import API, Policy
+from backend.api.rights import API, Matched, Policy
 from backend.audit import AuditLog, Fact
+from backend.audit.asked import MOST_BYTES, Asked, asked, fields_of
+from backend.audit.facts import Kind
 from backend.people.rights import Right
 
 #: Longest that an answer waits. The change itself never does.
 WAIT_S = 1.0
 _ACTIONS = {"POST": "made", "PUT": "changed", "PATCH": "changed", "DELETE": "deleted"}
+_DRIVE = "/drives/{drive_id}"
+#: Routes whose changes are told where they happen: value by value, or as jobs, or as what people
+#: do. `tests/security/test_every_change_is_told.py` asks each of them.
+TOLD_THERE = frozenset(
+    f"{method} {API}{path}"
+    for method, paths in {
+        "POST": (
+            "/stop", "/session", "/setup", "/guests", "/tokens", "/accounts", "/invitations",
+            "/scan", "/search-line", "/descriptions/from-drive", "/sets/list",
+            f"{_DRIVE}/sets", f"{_DRIVE}/transition", f"{_DRIVE}/fault-reset",
+            f"{_DRIVE}/procedures/{{name}}", f"{_DRIVE}/jobs/load_set", f"{_DRIVE}/jobs/move",
+            f"{_DRIVE}/jobs/sequence", f"{_DRIVE}/jobs/generate", f"{_DRIVE}/jobs/home",
+            f"{_DRIVE}/jobs/identify", f"{_DRIVE}/jobs/sweep", f"{_DRIVE}/jobs/inertia",
+            f"{_DRIVE}/jobs/step", f"{_DRIVE}/jobs/autotune", f"{_DRIVE}/jobs/firmware",
+            f"{_DRIVE}/io/forcing/{{name}}", f"{_DRIVE}/tune/undo",
+        ),
+        "PUT": (
+            "/session/password", "/invitations/{invitation_id}/grant", "/sets/{file}",
+            f"{_DRIVE}/parameters", f"{_DRIVE}/parameters/{{key}}",
+            f"{_DRIVE}/io/forcing/{{name}}", f"{_DRIVE}/io/probes/{{number}}",
+            f"{_DRIVE}/notches", f"{_DRIVE}/gains",
+        ),
+        "PATCH": ("/accounts/{account_id}", "/library/{entry_id}"),
+        "DELETE": (
+            "/session", "/sessions/{session_id}", "/tokens/{token_id}", "/accounts/{account_id}",
+            "/invitations/{invitation_id}", "/invitations/{invitation_id}/grant",
+            "/sets/{file}", "/library/{entry_id}",
+        ),
+    }.items()
+    for path in paths
+)  # fmt: skip
+#: Routes that compute or read, and change nothing that stays. (Some records of faults are read
+#: through a selector, which is written and put back; each such write is told as a write.)
+CHANGES_NOTHING = frozenset(
+    f"POST {API}{path}"
+    for path in (
+        "/calculate/braking", f"{_DRIVE}/gear/plan", f"{_DRIVE}/notches/preview",
+        f"{_DRIVE}/tune/candidates", f"{_DRIVE}/tune/predict", f"{_DRIVE}/tune/excitation",
+        f"{_DRIVE}/jobs/read_all", f"{_DRIVE}/fault-history/read",
+    )
+)  # fmt: skip
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
-#: Below these paths every change is told where it happens: with versions, or as a job.
-_TOLD = (f"{API}/sets", f"{API}/library", f"{API}/scan", f"{API}/jobs")
-_TOLD_OF_DRIVE = ("sets", "jobs", "parameters", "procedures")
 
 
 class AuditedAnswers:
@@ -45,35 +86,58 @@ class AuditedAnswers:
         if not changes or scope["path"] == self._stop_path:
             await self._app(scope, receive, send)
             return
+        matched = next(iter(self._policy.needs(scope["method"], scope["path"])), None)
         # The name may be gone when the answer comes: a drive that was taken off the bench.
-        fact = self._fact(scope["method"], scope["path"])
+        axis = self._name_of(matched.drive) if matched and matched.drive else ""
+        body = _Body(receive)
+        query = dict(parse_qsl(scope["query_string"].decode("latin-1")))
+        said = Asked(lambda: query | dict(fields_of(body.start)))
 
         async def when_safe(message: Message) -> None:
             if message["type"] == "http.response.start":
-                if fact is not None and message["status"] < 400:
-                    self._audit.add(fact)
+                if matched is not None and message["status"] < 400:
+                    self._tell(matched, scope, axis, said)
                 # While the audit has a problem everybody is told of it; waiting would not help.
                 if not self._audit.problem:
                     await self._audit.settled(WAIT_S)
             await send(message)
 
-        await self._app(scope, receive, when_safe)
+        token = asked.set(said)
+        try:
+            await self._app(scope, body.receive, when_safe)
+        finally:
+            asked.reset(token)
 
-    def _fact(self, method: str, path: str) -> Fact | None:
-        """What to record of a change that nobody else tells; None for the others."""
-        if path.startswith(_TOLD):
-            return None
-        for matched in self._policy.needs(method, path) if method in _ACTIONS else []:
-            if matched.need.right not in (Right.FILES, Right.STATION):
-                continue
-            drive = matched.drive
-            inner = path.removeprefix(f"{API}/drives/{drive}/").split("/")[0]
-            if drive is not None and inner in _TOLD_OF_DRIVE:
-                return None
-            return Fact(
-                "file" if matched.need.right is Right.FILES else "station",
-                _ACTIONS[method],
-                axis=self._name_of(drive) if drive is not None else "",
+    def _tell(self, matched: Matched, scope: Scope, axis: str, said: Asked) -> None:
+        """Record a change that nobody else tells."""
+        if matched.route in TOLD_THERE or matched.route in CHANGES_NOTHING:
+            return
+        path: str = scope["path"]
+        kind: Kind = "file" if matched.need.right is Right.FILES else "station"
+        if path.startswith(f"{API}/jobs/"):
+            kind = "job"
+        self._audit.add(
+            Fact(
+                kind,
+                _ACTIONS[scope["method"]],
+                axis=axis,
                 target=path.removeprefix(API),
+                old=said.old,
+                new=said.new,
             )
-        return None
+        )
+
+
+class _Body:
+    """The receiving side of a request, of which the start is kept in case it is a small JSON."""
+
+    def __init__(self, receive: Receive) -> None:
+        self._receive = receive
+        self.start = b""
+
+    async def receive(self) -> Message:
+        """The next message for the application."""
+        message = await self._receive()
+        if message["type"] == "http.request" and len(self.start) <= MOST_BYTES:
+            self.start += message.get("body", b"")[: MOST_BYTES + 1]
+        return message

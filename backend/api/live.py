@@ -11,7 +11,6 @@ import contextlib
 import itertools
 import math
 import time
-from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import partial
 
@@ -47,8 +46,10 @@ from backend.api.live_messages import (
 from backend.api.live_people import PeopleLive
 from backend.api.live_people_messages import PeopleRequest
 from backend.api.live_scope import ScopeStreams
+from backend.api.live_shared import Shared, only
 from backend.api.security_messages import require_message
 from backend.api.security_socket import OpenSockets
+from backend.audit.asked import Asked, asked
 from backend.axis import Axis
 from backend.bench import Bench
 from backend.drive import Reading
@@ -113,26 +114,34 @@ class LiveHub:
         return list(self.connections.values())
 
     def _snapshot(self, drive: str, snapshot: Snapshot) -> None:
+        state = Shared(partial(_state, self.bench, drive, snapshot))
         for connection in self._each():
             if drive in connection.watched:
-                connection.later("state", drive, partial(_state, self.bench, drive, snapshot))
+                connection.later("state", drive, state)
 
     def _readings(self, drive: str, readings: list[Reading]) -> None:
+        keys = frozenset(reading.key for reading in readings)
+        values = Shared(partial(_values, self.bench, drive, keys))
         for connection in self._each():
-            connection.fresh_values(drive, readings)
+            connection.fresh_values(drive, keys, values)
 
     def _job(self, job: Job) -> None:
+        changed = Shared(partial(_job, job))
         for connection in self._each():
-            connection.later("job", job.id, partial(_job, job))
+            connection.later("job", job.id, changed)
 
     def _drives(self) -> None:
+        # Who holds nothing sees the same list.
+        others = Shared(partial(_drive_list, self.bench, None))
         for connection in self._each():
-            connection.later("drives", "", connection.drive_list)
+            holds = self.bench.leases.held_by(connection.id)
+            connection.later("drives", "", connection.drive_list() if holds else others)
             connection.scopes.bench_changed()
 
     def _logged(self, entry: Entry) -> None:
+        logged = Shared(lambda: Logged(entry=convert.log_entry(entry)))
         for connection in self._each():
-            connection.send(Logged(entry=convert.log_entry(entry)))
+            connection.send(logged)
 
 
 def _state(bench: Bench, drive: str, snapshot: Snapshot) -> BaseModel | None:
@@ -140,6 +149,19 @@ def _state(bench: Bench, drive: str, snapshot: Snapshot) -> BaseModel | None:
     if member is None:
         return None
     return StateChanged(state=convert.axis_state(bench, member, snapshot))
+
+
+def _values(bench: Bench, drive: str, keys: frozenset[str]) -> BaseModel | None:
+    member = bench.members.get(drive)
+    if member is None or not keys:
+        return None
+    rows = convert.readings(member.drive, sorted(keys))
+    return ValuesChanged.model_construct(drive=drive, values=rows)
+
+
+def _drive_list(bench: Bench, connection: str | None) -> BaseModel:
+    members = bench.members.values()
+    return DrivesChanged(drives=[convert.drive_summary(bench, m, connection) for m in members])
 
 
 def _job(job: Job) -> BaseModel:
@@ -167,9 +189,9 @@ class Connection:
         self._people, self._known = people, known
         self._socket = socket
         self._bench = bench
-        self._queue: asyncio.Queue[BaseModel] = asyncio.Queue(QUEUE)
-        self._latest: dict[tuple[str, str], Callable[[], BaseModel | None]] = {}
-        self._values: dict[str, set[str]] = {}
+        self._queue: asyncio.Queue[Shared] = asyncio.Queue(QUEUE)
+        self._latest: dict[tuple[str, str], Shared] = {}
+        self._values: dict[str, tuple[frozenset[str], Shared]] = {}
         self._wake = asyncio.Event()
         self._holds: dict[str, Hold] = {}
         self.scopes = ScopeStreams(bench, name, self.send, socket.send_bytes)
@@ -179,7 +201,7 @@ class Connection:
     async def run(self) -> None:
         """Until the page is gone."""
         self.send(Hello(connection=self.id, version=backend.__version__))
-        self.later("drives", "", self.drive_list)
+        self.later("drives", "", self.drive_list())
         self._people.changed()
         sender = asyncio.create_task(self._sender(), name=f"live-{self.id}")
         receiver = asyncio.create_task(self._receiver(), name=f"hear-{self.id}")
@@ -220,31 +242,31 @@ class Connection:
 
     # --- out --------------------------------------------------------------------------
 
-    def send(self, message: BaseModel) -> None:
+    def send(self, message: BaseModel | Shared) -> None:
         """Queue a message that must not be lost; a page that never reads is cut off."""
         try:
-            self._queue.put_nowait(message)
+            self._queue.put_nowait(message if isinstance(message, Shared) else only(message))
         except asyncio.QueueFull:
             self._overflow = True
         self._wake.set()
 
-    def later(self, kind: str, which: str, make: Callable[[], BaseModel | None]) -> None:
+    def later(self, kind: str, which: str, message: Shared) -> None:
         """Send the newest state of something; older ones not yet sent are replaced."""
-        self._latest[kind, which] = make
+        self._latest[kind, which] = message
         self._wake.set()
 
-    def fresh_values(self, drive: str, readings: list[Reading]) -> None:
+    def fresh_values(self, drive: str, keys: frozenset[str], values: Shared) -> None:
         """New readings of a drive; only the newest of each parameter is sent."""
-        waiting = self._values.setdefault(drive, set())
-        waiting.update(reading.key for reading in readings)
+        waiting = self._values.get(drive)
+        if waiting is not None and not waiting[0] <= keys:
+            keys |= waiting[0]
+            values = Shared(partial(_values, self._bench, drive, keys))
+        self._values[drive] = keys, values
         self._wake.set()
 
-    def drive_list(self) -> BaseModel:
+    def drive_list(self) -> Shared:
         """The bench as this connection sees it."""
-        members = self._bench.members.values()
-        return DrivesChanged(
-            drives=[convert.drive_summary(self._bench, m, self.id) for m in members]
-        )
+        return Shared(partial(_drive_list, self._bench, self.id))
 
     async def _sender(self) -> None:
         while not self._overflow:
@@ -253,22 +275,19 @@ class Connection:
             while not self._queue.empty():
                 await self._text(self._queue.get_nowait())
             latest, self._latest = self._latest, {}
-            for make in latest.values():
-                if (message := make()) is not None:
-                    await self._text(message)
+            for message in latest.values():
+                await self._text(message)
             values, self._values = self._values, {}
-            for drive, keys in values.items():
-                member = self._bench.members.get(drive)
-                if member is not None and keys:
-                    rows = convert.readings(member.drive, sorted(keys))
-                    await self._text(ValuesChanged.model_construct(drive=drive, values=rows))
+            for _, message in values.values():
+                await self._text(message)
             # States need not come faster than a screen shows them.
             await asyncio.sleep(0.03)
         await self._socket.close(code=1013, reason="the page does not read")
 
-    async def _text(self, message: BaseModel) -> None:
-        async with asyncio.timeout(SEND_TIMEOUT_S):
-            await self._socket.send_text(message.model_dump_json())
+    async def _text(self, message: Shared) -> None:
+        if (text := message.text) is not None:
+            async with asyncio.timeout(SEND_TIMEOUT_S):
+                await self._socket.send_text(text)
 
     # --- in ---------------------------------------------------------------------------
 
@@ -295,6 +314,7 @@ class Connection:
         try:
             self.identity = self._known.admit(self.identity, request.type)
             acting.set(Actor(self.identity, self.id))
+            asked.set(Asked(request.model_dump))
             require_message(self._known, self.identity, request)
             if isinstance(request, PeopleRequest):
                 await self._people.act(self, self.identity, request)

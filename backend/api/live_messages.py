@@ -80,7 +80,7 @@ class JogStop(Message):
 
     type: Literal["jog_stop"] = "jog_stop"
     drive: str
-    reason: str = ""
+    reason: str = Field(default="", max_length=200)
 
 
 class StopAll(Message):

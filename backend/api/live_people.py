@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Coroutine, Mapping
 from datetime import UTC, datetime
+from functools import partial
 from typing import Protocol
 
 from pydantic import BaseModel
@@ -34,20 +35,25 @@ from backend.api.live_people_messages import (
     PointerMoved,
     Where,
 )
+from backend.api.live_shared import Shared, only
 from backend.api.people_record import PeopleRecord
 from backend.bench import Bench
 from backend.jobs import Job
-from backend.people.errors import Forbidden
+from backend.people.errors import Forbidden, TooOften
 from backend.people.identity import Identity
 from backend.people.rights import GRANTABLE, Right
 from backend.people.station import People
 from backend.people.support import Invitation, Said
+from backend.people.throttle import Bucket
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
 
-#: With the quarter second between looks, a silent connection loses control within 2 s.
+#: With the quarter second between looks, a silent connection loses control within 2 s, and what
+#: moves by its command ends.
 SILENCE_S = 1.7
 _LOOK_S, _HOLD_LOOK_S, _TEND_S = 0.25, 0.02, 5.0
+#: Lines of a page's chat at once, and a second: nobody talks the log full.
+_TALK = (10.0, 1.0)
 
 
 class Page(Protocol):
@@ -60,10 +66,10 @@ class Page(Protocol):
     #: Monotonic time of the last message; infinite while one is being carried out.
     heard: float
 
-    def send(self, message: BaseModel) -> None:
+    def send(self, message: BaseModel | Shared) -> None:
         """Queue a message that must not be lost."""
 
-    def later(self, kind: str, which: str, make: Callable[[], BaseModel | None]) -> None:
+    def later(self, kind: str, which: str, message: Shared) -> None:
         """Send the newest state of something."""
 
     def release(self, drive: str | None, reason: str) -> None:
@@ -78,6 +84,8 @@ class PeopleLive:
         self._support = people.support
         self._record = PeopleRecord(bench)
         self._tasks: set[asyncio.Task[object]] = set()
+        self._ending: set[str] = set()
+        self._talk: dict[str, Bucket] = {}
         self._hold_pressed = asyncio.Event()
         bench.leases.on_notice.append(self._notice)
         bench.on_drives.append(self.changed)
@@ -90,7 +98,7 @@ class PeopleLive:
     def changed(self) -> None:
         """Who is here, or what a guest may do, has changed."""
         for page in list(self._pages.values()):
-            page.later("people", "", lambda page=page: self.view(page))  # type: ignore[misc]
+            page.later("people", "", Shared(partial(self.view, page)))
 
     def view(self, page: Page) -> PeopleHere:
         """People and invitations as this page may see them."""
@@ -155,18 +163,38 @@ class PeopleLive:
     def left(self, page: Page) -> None:
         """A page is gone: what it moved stops, what it held is free."""
         self._support.release_all(page.id, "the connection on site closed")
-        for job in self._bench.jobs.all():
-            own = job.actor is not None and job.actor.connection == page.id
-            # A jog ends by its own dead-man, with its ramp.
-            if own and _moves(job) and job.kind != "jog":
-                self._bench.journal.add(
-                    f"{job.title}: ended, the page that began it is gone",
-                    level="warning",
-                    drive=job.drive,
-                )
-                self._spawn(self._bench.jobs.cancel(job))
+        self._end_motions(page, "is gone")
+        self._talk.pop(page.id, None)
         self._bench.leases.drop(page.id)
         self.changed()
+
+    def _fell_silent(self, page: Page) -> None:
+        """A page says nothing any more, though its line may look open for some seconds yet."""
+        if self._bench.leases.held_by(page.id):
+            page.release(None, "the page fell silent")
+            self._bench.leases.lose(page.id)
+        self._end_motions(page, "fell silent")
+
+    def _end_motions(self, page: Page, what: str) -> None:
+        for job in self._bench.jobs.all():
+            own = job.actor is not None and job.actor.connection == page.id
+            # A jog ends by its own dead-man, with its ramp; and a second cancelling would disturb
+            # the cleanup of the first.
+            if not own or not _moves(job) or job.kind == "jog" or job.id in self._ending:
+                continue
+            self._bench.journal.add(
+                f"{job.title}: ended, the page that began it {what}",
+                level="warning",
+                drive=job.drive,
+            )
+            self._ending.add(job.id)
+            self._spawn(self._end(job))
+
+    async def _end(self, job: Job) -> None:
+        try:
+            await self._bench.jobs.cancel(job)
+        finally:
+            self._ending.discard(job.id)
 
     # --- requests ---------------------------------------------------------------------
 
@@ -187,7 +215,7 @@ class PeopleLive:
                 why = request.reason or "the enabling button was let go"
                 self._support.release(request.invitation, page.id, why)
             case Chat():
-                self._say(identity, request.text)
+                self._say(page, identity, request.text)
             case Where():
                 page.page = request.page
                 self.changed()
@@ -208,15 +236,19 @@ class PeopleLive:
 
     def _to_others(self, page: Page, kind: str, message: BaseModel) -> None:
         """Pointers coalesce: only where it is now is of interest."""
+        shared = only(message)
         for other in list(self._pages.values()):
             if other.id != page.id:
-                other.later(kind, page.id, lambda: message)
+                other.later(kind, page.id, shared)
 
-    def _say(self, identity: Identity, text: str) -> None:
+    def _say(self, page: Page, identity: Identity, text: str) -> None:
+        if not self._talk.setdefault(page.id, Bucket(*_TALK)).take():
+            raise TooOften("too many lines at once", 1.0)
         line = self._support.say(identity, text)
         self._bench.journal.add(f"“{line.text}”", person=identity.person)
-        for page in list(self._pages.values()):
-            page.send(chat_line(line))
+        shared = only(chat_line(line))
+        for each in list(self._pages.values()):
+            each.send(shared)
 
     # --- control ----------------------------------------------------------------------
 
@@ -353,9 +385,8 @@ class PeopleLive:
         while True:
             now = time.monotonic()
             for page in list(self._pages.values()):
-                if now - page.heard > SILENCE_S and leases.held_by(page.id):
-                    page.release(None, "the page fell silent")
-                    leases.lose(page.id)
+                if now - page.heard > SILENCE_S:
+                    self._fell_silent(page)
             leases.tick(lambda drive: self._bench.jobs.moving(drive) is not None)
             self._support.tick()
             await asyncio.sleep(_LOOK_S)

@@ -26,10 +26,14 @@ class PeopleRecord:
         drive: str | None = None,
         level: Level = "info",
         outcome: str = "",
+        old: str | None = None,
+        new: str | None = None,
     ) -> None:
-        """``text`` is for the log; the audit keeps ``action``, ``target`` and ``outcome``."""
+        """``text`` is for the log; the audit keeps the rest."""
         self._bench.journal.add(text, level=level, drive=drive, person=person or "")
         member = self._bench.members.get(drive) if drive else None
         axis = member.drive.name if member else ""
-        fact = Fact(kind, action, axis=axis, target=target, outcome=outcome, person=person)
+        fact = Fact(
+            kind, action, axis=axis, target=target, old=old, new=new, outcome=outcome, person=person
+        )
         self._bench.audit.add(fact)

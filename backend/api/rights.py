@@ -175,6 +175,8 @@ _API: dict[str, Need] = {
     "GET /library/{entry_id}/versions": _LOOK,
     "GET /library/{entry_id}/content": _LOOK,
     "PATCH /library/{entry_id}": _FILES,
+    "POST /library/{entry_id}/share": _FILES,
+    "POST /library/{entry_id}/fetch": _FILES,
     "DELETE /library/{entry_id}": _FILES,
     "GET /recordings": _LOOK,
     "POST /recordings": _FILES,
@@ -239,16 +241,18 @@ class Matched:
 
     need: Need
     drive: str | None
+    route: str
+    """As it stands in `ROUTES`."""
 
 
 class Policy:
     """Finds what a request needs. Several patterns may fit a path: all of them must be met."""
 
     def __init__(self, routes: dict[str, Need] | None = None) -> None:
-        self._patterns: list[tuple[str, re.Pattern[str], Need]] = []
+        self._patterns: list[tuple[str, re.Pattern[str], Need, str]] = []
         for key, need in (ROUTES if routes is None else routes).items():
             method, _, path = key.partition(" ")
-            self._patterns.append((method, compile_path(path)[0], need))
+            self._patterns.append((method, compile_path(path)[0], need, key))
 
     def needs(self, method: str, path: str) -> list[Matched]:
         """Everything that this request must meet; nothing where no route is declared."""
@@ -256,8 +260,8 @@ class Policy:
         if not _plain(path):
             return []
         return [
-            Matched(need, found.groupdict().get("drive_id"))
-            for known, pattern, need in self._patterns
+            Matched(need, found.groupdict().get("drive_id"), route)
+            for known, pattern, need, route in self._patterns
             if known == method and (found := pattern.match(path))
         ]
 
@@ -265,7 +269,7 @@ class Policy:
         """HTTP methods that are declared for a path."""
         if not _plain(path):
             return []
-        return sorted({m for m, pattern, _ in self._patterns if m != "WS" and pattern.match(path)})
+        return sorted({m for m, pattern, *_ in self._patterns if m != "WS" and pattern.match(path)})
 
 
 def _plain(path: str) -> bool:

@@ -28,6 +28,7 @@ from backend.api.models import (
     StopResult,
 )
 from backend.api.security import require_right
+from backend.audit.asked import note_before
 from backend.bench import Bench
 from backend.jobs import Job, JobResult, Progress
 from backend.people.rights import Right
@@ -169,6 +170,7 @@ async def update_drive(
     bench: TheBench, member: Controlled, change: DriveUpdate, connection: Connection = None
 ) -> DriveSummary:
     """Change name or notes, or accept an exchanged drive."""
+    note_before(name=member.drive.name, notes=member.drive.notes)
     bench.rename(member.drive.id, change.name, change.notes)
     if change.accept_identity:
         await bench.accept_identity(member.drive.id)

@@ -25,6 +25,7 @@ from backend.api.models_functions import (
     PastFaultInfo,
     WatchUpdate,
 )
+from backend.audit.asked import note_before
 from backend.axis import Envelope
 from backend.axis_store import AxisRecord, AxisStore
 from backend.bench import Member
@@ -162,6 +163,7 @@ async def keep_mechanics(
     if request.mechanics is not None:
         request.mechanics.travel_per_load_turn()
     old = store.get(member.drive.id)
+    note_before(mechanics=None if old.mechanics is None else old.mechanics.model_dump())
     return _record(
         store.put(member.drive.id, old.model_copy(update={"mechanics": request.mechanics}))
     )
@@ -182,6 +184,7 @@ async def keep_watch(member: Controlled, store: TheStore, request: WatchUpdate) 
         if parameter.key not in keys:
             keys.append(parameter.key)
     old = store.get(member.drive.id)
+    note_before(keys=old.watch)
     return _record(store.put(member.drive.id, old.model_copy(update={"watch": tuple(keys)})))
 
 

@@ -24,7 +24,7 @@ from backend.api.models_library import (
 from backend.api.routes_recordings import TheRecordings
 from backend.api.times import in_utc
 from backend.bench import Bench
-from backend.library import NotInLibrary
+from backend.library import NotInLibrary, sharing
 from backend.library.entries import Entry
 from backend.library.entries import Query as LibraryQuery
 from backend.recording.service import Recordings
@@ -61,6 +61,8 @@ def _page(bench: Bench, recordings: Recordings, query: LibraryQuery) -> LibraryP
         entries=[convert_library.entry(entry, records.station) for entry in entries],
         total=total,
         problems=problems,
+        # A file has one station; a database server may have many.
+        shared=records.store.sqlite_file is None,
     )
 
 
@@ -144,6 +146,46 @@ async def library_content(
     except NotInLibrary as error:
         raise NotFound(error.message, value=version, remedy=error.remedy) from error
     return Response(data, media_type=kind, headers=headers)
+
+
+@router.post("/{entry_id}/share", status_code=201)
+async def share_library_entry(
+    bench: TheBench, recordings: TheRecordings, entry_id: int
+) -> LibraryEntry:
+    """Copy a recording, measurement or report of this station into the shared library."""
+
+    def work() -> Entry:
+        records, entry = bench.records, _entry(bench, entry_id)
+        if entry.station != records.station or entry.name in recordings.running:
+            raise NotAllowed(
+                f"{entry.name} is no finished file of this station",
+                value=entry.name,
+                remedy="share it on its station, when it has ended",
+            )
+        return sharing.share(records.library, records.index, entry)
+
+    return convert_library.entry(await bench.records.store.call(work), bench.records.station)
+
+
+@router.post("/{entry_id}/fetch", status_code=201)
+async def fetch_library_entry(
+    bench: TheBench, recordings: TheRecordings, entry_id: int
+) -> LibraryEntry:
+    """Copy shared contents into this station's folder, where they are opened like its own."""
+
+    def work() -> Entry:
+        records, entry = bench.records, _entry(bench, entry_id)
+        name = sharing.fetch(records.library, records.index, entry)
+        records.index.refresh(recordings.running)
+        query = LibraryQuery(words=name, kinds=(entry.kind,))
+        found = [
+            each
+            for each in records.library.search(query)[0]
+            if (each.name, each.station) == (name, records.station)
+        ]
+        return found[0] if found else entry
+
+    return convert_library.entry(await bench.records.store.call(work), bench.records.station)
 
 
 @router.patch("/{entry_id}")

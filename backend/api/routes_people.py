@@ -282,6 +282,7 @@ async def make_token(people: ThePeople, record: TheRecord, me: Me, body: NewToke
         "token made",
         f"{me.person} made the token {token.name} ({', '.join(sorted(token.scopes))})",
         target=token.name,
+        new=", ".join(sorted(token.scopes)),
         person=me.person,
     )
     return MadeToken(token=_token(people.accounts, token), secret=secret)
@@ -339,6 +340,7 @@ async def add_account(
         "made",
         f"{me.person} made the account {made.name} ({made.role})",
         target=made.name,
+        new=made.role,
         person=me.person,
     )
     return _account(people.accounts, made, me)
@@ -350,13 +352,16 @@ async def change_account(
 ) -> AccountInfo:
     """Change role or password; with the password all sessions of the account end."""
     known = people.accounts.account(account_id)
+    before = known.role
     if body.role is not None:
         known = await people.accounts.set_role(account_id, body.role)
         record.note(
             "account",
             "role changed",
             f"{me.person} made {known.name} {known.role}",
-            target=f"{known.name}: {known.role}",
+            target=known.name,
+            old=before,
+            new=known.role,
             person=me.person,
         )
     if body.password is not None:
@@ -456,7 +461,8 @@ async def invite(
         "invitation",
         "made",
         f"{me.person} invited {made.guest} for {body.minutes:g} min ({allowed})",
-        target=f"{made.guest}: {allowed}",
+        target=made.guest,
+        new=f"{allowed}, {body.minutes:g} min",
         level="warning",
         person=me.person,
     )
@@ -503,7 +509,8 @@ async def grant(
         "invitation",
         "granted",
         f"{me.person} granted {granted.guest} {rights}",
-        target=f"{granted.guest}: {rights}",
+        target=granted.guest,
+        new=rights,
         level="warning",
         drive=body.drive,
         person=me.person,

@@ -29,6 +29,8 @@ from backend.api.recording_models import (
     RetentionBounds,
     StartRecording,
 )
+from backend.audit.asked import note_before
+from backend.people.identity import acting_person
 from backend.recording.capture import AFTER_S, BEFORE_S, FaultCapture
 from backend.recording.library import Retention, Stored
 from backend.recording.reader import RecordingReader
@@ -204,7 +206,7 @@ async def start_recording(recordings: TheRecordings, request: StartRecording) ->
             else Trigger(trigger.kind, trigger.drive, trigger.key, trigger.level, trigger.mask),
             notes=request.notes,
             tags=tuple(request.tags),
-            person="local user",
+            person=acting_person(),
         )
     )
     return _running(recordings, recorder)
@@ -213,6 +215,8 @@ async def start_recording(recordings: TheRecordings, request: StartRecording) ->
 @router.put("/recordings/retention")
 async def set_retention(recordings: TheRecordings, request: RetentionBounds) -> RetentionBounds:
     """Set when the oldest recordings are deleted."""
+    before = recordings.library.retention
+    note_before(max_total_bytes=before.max_total_bytes, keep_days=before.keep_days)
     recordings.library.set_retention(
         Retention(max_total_bytes=request.max_total_bytes, keep_days=request.keep_days)
     )
@@ -333,6 +337,7 @@ async def list_bundles(capture: TheCapture) -> BundleList:
 @router.put("/bundles/armed")
 async def arm_capture(capture: TheCapture, request: ArmRequest) -> ArmRequest:
     """Say whether a fault freezes the last seconds."""
+    note_before(armed=capture.armed)
     capture.armed = request.armed
     return request
 

@@ -268,6 +268,7 @@ class Gate:
                 raise NotFound(f"there is nothing at {scope['path']}")
             for matched in needs:
                 self._require(matched, identity, None)
+            self._sockets.require_room("" if identity is None else identity.session)
         except DriveError as refusal:
             # Before it is accepted, this becomes an HTTP answer with status 403.
             await send({"type": "websocket.close", "code": 1008, "reason": refusal.message[:100]})

@@ -1,9 +1,11 @@
-"""Connections that send their request too slowly, or are too many from one address, are closed."""
+"""Connections that send or read too slowly, or are too many from one address, are closed."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import ipaddress
+import socket
 from collections import Counter
 
 import h11
@@ -11,6 +13,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 #: Time for the head of a request, from the connection or the first byte on.
 HEAD_S = 10.0
+#: An answer that has filled all buffers must get on within this time: 48 KiB, whoever reads.
+DRAIN_S = 60.0
 #: Connections from one address that is not this machine. A page needs about eight.
 MOST_PER_ADDRESS = 100
 
@@ -21,11 +25,13 @@ class PatientProtocol(H11Protocol):
     """HTTP/1.1 with a deadline for request heads and a bound on connections per address."""
 
     _head_timer: asyncio.TimerHandle | None = None
+    _drain_timer: asyncio.TimerHandle | None = None
     _address: str | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Count the connection; one too many is closed before it says anything."""
         super().connection_made(transport)
+        _give_up_unread(transport)
         address = self.client[0] if self.client else ""
         if not _is_loopback(address):
             if _open[address] >= MOST_PER_ADDRESS:
@@ -38,8 +44,22 @@ class PatientProtocol(H11Protocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Uncount it."""
         self._disarm()
+        self.resume_writing()
         self._uncount()
         super().connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        """The other side does not read: nobody keeps a connection busy that way."""
+        super().pause_writing()
+        if self._drain_timer is None:
+            self._drain_timer = self.loop.call_later(DRAIN_S, self.transport.abort)
+
+    def resume_writing(self) -> None:
+        """It reads again."""
+        if self._drain_timer is not None:
+            self._drain_timer.cancel()
+            self._drain_timer = None
+        super().resume_writing()
 
     def data_received(self, data: bytes) -> None:
         """While the head of a request is incomplete, its time runs."""
@@ -76,6 +96,14 @@ class PatientProtocol(H11Protocol):
         self._head_timer = None
         if not self.transport.is_closing():
             self.transport.close()
+
+
+def _give_up_unread(transport: asyncio.Transport) -> None:
+    """Let the system drop a connection whose other side takes nothing, where it can."""
+    line = transport.get_extra_info("socket")
+    if line is not None and hasattr(socket, "TCP_USER_TIMEOUT"):
+        with contextlib.suppress(OSError):
+            line.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, int(DRAIN_S * 1000))
 
 
 def _is_loopback(address: str) -> bool:

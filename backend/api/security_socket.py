@@ -8,12 +8,15 @@ from contextlib import contextmanager
 
 from starlette.types import Message, Receive, Send
 
+from backend.people.errors import TooOften
 from backend.people.throttle import Bucket
 
 #: Close codes of ours: the session is over; the page sends more than a person can cause.
 OVER, FLOODED = 4401, 4429
 #: Messages at once and a second. A held button sends 25, pointer and cursor 20 each.
 _FLOOD = (600.0, 200.0)
+#: Websockets of one log-in: ten pages with plots, recordings and the axis in 3D.
+MOST_PER_SESSION = 40
 
 
 class GuardedSocket:
@@ -78,6 +81,15 @@ class OpenSockets:
     def __init__(self) -> None:
         self._open: set[GuardedSocket] = set()
         self._owners: dict[str, str] = {}
+
+    def require_room(self, session: str) -> None:
+        """One session does not take the places of all others.
+
+        Raises:
+            TooOften: it has as many as it may.
+        """
+        if session and sum(each.session == session for each in self._open) >= MOST_PER_SESSION:
+            raise TooOften(f"{MOST_PER_SESSION} connections of one log-in are open", 1.0)
 
     @contextmanager
     def open(self, socket: GuardedSocket) -> Iterator[None]:

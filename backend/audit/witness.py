@@ -3,16 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 from backend.access import Holder
+from backend.audit.asked import settings_now
 from backend.audit.facts import Fact, Kind, Value
 from backend.audit.log import AuditLog
-from backend.drive import WriteRecord
+from backend.drive import CommandRecord, WriteRecord
 from backend.jobs import Job
 
 #: Jobs that only read what the pages show anyway.
 _UNREMARKABLE = frozenset({"reread", "read_all"})
 _KINDS: dict[str, Kind] = {"procedure": "procedure", "load_set": "job"}
+
+
+@dataclass(slots=True)
+class _Sent:
+    """Commands of one parameter while something moves: how many, the first and the last."""
+
+    first: int
+    last: int
+    count: int = 1
+    problem: str = ""
+
+    def __str__(self) -> str:
+        span = str(self.first) if self.count == 1 else f"{self.first} → {self.last}"
+        times = "" if self.count == 1 else f" ({self.count}×)"
+        return f"{span}{times}{', ' + self.problem if self.problem else ''}"
+
+
+@dataclass(slots=True)
+class _Running:
+    """A job that was told to have begun. ``drive`` is the axis that it moves, None for others."""
+
+    drive: str | None
+    sent: dict[str, _Sent] = field(default_factory=dict)
 
 
 class Witness:
@@ -22,7 +47,9 @@ class Witness:
         self._audit = audit
         self._name_of = name_of
         self._holders: dict[str, str] = {}
-        self._running: set[str] = set()
+        self._running: dict[str, _Running] = {}
+        #: By drive and parameter the last command that no motion had sent.
+        self._commanded: dict[tuple[str, str], tuple[int, str]] = {}
 
     def wrote(self, record: WriteRecord) -> None:
         """A parameter was written, or may have been."""
@@ -46,33 +73,74 @@ class Witness:
             )
         )
 
+    def commanded(self, record: CommandRecord) -> None:
+        """A control word or set-point was sent, or may have been.
+
+        What a motion sends, many a second, is told with its end. Anything else is told at once,
+        and again only when it changes: words that STOP repeats are one event.
+        """
+        motion = next((j for j in self._running.values() if j.drive == record.drive), None)
+        if motion is not None:
+            sent = motion.sent.get(record.key)
+            if sent is None:
+                motion.sent[record.key] = _Sent(record.raw, record.raw, problem=record.problem)
+            else:
+                sent.last, sent.count = record.raw, sent.count + 1
+                sent.problem = record.problem or sent.problem
+            return
+        place, what = (record.drive, record.key), (record.raw, record.problem)
+        before = self._commanded.get(place)
+        if before == what:
+            return
+        self._commanded[place] = what
+        self._audit.add(
+            Fact(
+                "motion",
+                "commanded",
+                axis=record.name,
+                target=record.key,
+                old=None if before is None else before[0],
+                new=record.raw,
+                outcome=record.problem,
+                detail={"drive": record.drive, "parameter": record.parameter},
+            )
+        )
+
     def job_changed(self, job: Job) -> None:
         """A job began or ended; progress between is not kept."""
         if job.kind in _UNREMARKABLE:
             return
-        if job.state == "running":
-            if job.id in self._running:
-                return
-            self._running.add(job.id)
-        elif job.id not in self._running:
-            return
-        else:
-            self._running.discard(job.id)
-        kind: Kind = _KINDS.get(job.kind, "motion" if job.motion else "job")
-        action = "started" if job.state == "running" else job.state
         detail: dict[str, Value] = {"title": job.title}
         if job.drive is not None:
             detail["drive"] = job.drive
+        if job.state == "running":
+            if job.id in self._running:
+                return
+            self._running[job.id] = _Running(job.drive if job.motion else None)
+            detail = settings_now() | detail
+        elif (ended := self._running.pop(job.id, None)) is None:
+            return
+        else:
+            detail |= {key: str(sent) for key, sent in sorted(ended.sent.items())}
+            reason = (job.result or {}).get("reason")
+            if isinstance(reason, str):
+                detail["reason"] = reason
+            self._forget_commands(job.drive)
         self._audit.add(
             Fact(
-                kind,
-                action,
+                _KINDS.get(job.kind, "motion" if job.motion else "job"),
+                "started" if job.state == "running" else job.state,
                 axis=self._name_of(job.drive) if job.drive else "",
                 target=job.id,
                 outcome=str(job.error) if job.error else "",
                 detail=detail,
             )
         )
+
+    def _forget_commands(self, drive: str | None) -> None:
+        """A motion has commanded since; what comes next is new, whatever it was before."""
+        for place in [place for place in self._commanded if place[0] == drive]:
+            del self._commanded[place]
 
     def lease_changed(self, drive: str, holder: Holder | None) -> None:
         """Control of an axis may have changed hands."""

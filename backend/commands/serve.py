@@ -23,6 +23,9 @@ from drivers.errors import NotAllowed
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 #: Messages of the page are small; what is larger is an attack or a defect.
 WS_MAX_BYTES = 64 << 10
+#: A line that is dead but not closed (lid shut, cable pulled) is given up after both together.
+#: Control, jog and enabling button do not wait for that: they end by their own silence.
+PING_S, PONG_S = 5.0, 8.0
 #: Connections at once, over all. STOP comes by those that are open already.
 MOST_CONNECTIONS = 500
 
@@ -134,6 +137,8 @@ def _config(
         http=PatientProtocol,
         ws_per_message_deflate=False,
         ws_max_size=WS_MAX_BYTES,
+        ws_ping_interval=PING_S,
+        ws_ping_timeout=PONG_S,
         limit_concurrency=MOST_CONNECTIONS,
         timeout_graceful_shutdown=3,
         server_header=False,

@@ -8,10 +8,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from backend import measurements
-from backend.library.entries import Addition, AxisIdentity
+from backend.library.entries import Addition, AxisIdentity, Kind
 from backend.library.index import Described, Folder
 from backend.recording.chunks import SUFFIX as RECORDING
 from backend.recording.library import RecordingLibrary
+from backend.recording.reader import RecordingReader
 
 _REPORT = re.compile(r"^\d{8}-\d{6}-report-(?P<axis>.+?)(-\d+)?\.\w+$")
 
@@ -27,6 +28,19 @@ def folders(state: Path) -> list[Folder]:
         Folder("measurement", state / "measurements", (measurements.SUFFIX,), _measurement),
         Folder("report", state / "reports", (".html", ".pdf"), _report),
     ]  # fmt: skip
+
+
+def require_usable(kind: Kind, path: Path) -> None:
+    """A file from elsewhere is what its kind says.
+
+    Raises:
+        NotAllowed: it is damaged, or something else. OSError: it cannot be read.
+    """
+    if kind == "measurement":
+        measurements.unpack(path.read_bytes(), path.name)
+    elif kind == "recording":
+        with RecordingReader(path) as reader:
+            reader.summary()
 
 
 def _recording(library: RecordingLibrary, path: Path) -> Described:

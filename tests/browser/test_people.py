@@ -9,9 +9,10 @@ import time
 from collections.abc import Callable, Iterator
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Dialog, Locator, Page, expect
 
 from backend.people.rights import Right, Role
 from backend.people.station import People
@@ -166,6 +167,73 @@ def test_a_viewer_moves_nothing_and_can_stop(opened: Open, bench: Bench) -> None
     olaf.mouse.up()
 
 
+# --- markup ---------------------------------------------------------------------------
+
+MARKUP = "<img src=x onerror=alert(1)>"
+#: What is alive if a text was taken for markup: elements that no page of ours has.
+ALIVE = """() => [...document.querySelectorAll('img[src="x"], svg[onload], a[href^="javascript"]')]
+                 .map((each) => each.outerHTML)"""
+#: Pages, and whether one of the texts is to be read there.
+PAGES = {
+    "connect": True, "files": True, "audit": True, "people": True, "scope": False,
+    "axis/{drive}/overview": True, "axis/{drive}/parameters": True, "axis/{drive}/motion": True,
+    "axis/{drive}/alarms": True, "axis/{drive}/tune": True, "axis/{drive}/response": True,
+    "axis/{drive}/gains": True, "axis/{drive}/setup": True, "axis/{drive}/io": True,
+}  # fmt: skip
+
+
+def write_markup_everywhere(station: Station, bench: Bench) -> None:
+    """Into every free text of the interface, as somebody with all rights would."""
+    quoted, ask = f"\"'>{MARKUP}", station.http
+    drive = f"/drives/{bench.drive}"
+    setup = {"traces": [], "maths": [{"id": "m1", "name": MARKUP, "unit": "<b>",
+                                      "expression": "1"}]}  # fmt: skip
+    kept: dict[str, Any] = {}
+    for method, path, body in (
+        ("PATCH", drive, {"name": MARKUP, "notes": quoted}),
+        ("POST", f"{drive}/sets", {"file": "marked", "author": MARKUP, "notes": quoted}),
+        ("POST", f"{drive}/reports", {"format": "html", "person": MARKUP, "machine": quoted,
+                                      "notes": quoted}),
+        ("POST", "/accounts", {"name": MARKUP, "role": "viewer", "password": PASSWORD}),
+        ("POST", "/bundles", {"reason": quoted}),
+        ("PUT", "/scope/setups/marked", setup),
+    ):  # fmt: skip
+        kept[path] = station.ok(ask.request(method, path, json=body))
+    entries = station.ok(ask.get("/library"))["entries"]
+    entry = next(each["id"] for each in entries if each["kind"] == "set")
+    station.ok(ask.patch(f"/library/{entry}", json={"notes": quoted, "tags": [MARKUP]}))
+    # What is refused is quoted in the refusal, in the log and in the audit.
+    ask.post("/session", json={"name": MARKUP, "password": MARKUP})
+    ask.delete(f"/scope/setups/{MARKUP.replace(' ', '%20')}")
+
+
+def test_markup_stays_text_on_every_page(opened: Open, station: Station, bench: Bench) -> None:
+    write_markup_everywhere(station, bench)
+    page = log_in(opened(""), Role.ADMINISTRATOR)
+    spoken: list[str] = []
+
+    def heard(dialog: Dialog) -> None:
+        spoken.append(dialog.message)
+        dialog.dismiss()
+
+    page.on("dialog", heard)
+    for address, shown in PAGES.items():
+        where = address.format(drive=bench.drive)
+        page.evaluate("(where) => { location.hash = '#/' + where }", where)
+        page.get_by_role("heading", level=1).first.wait_for()
+        if shown:
+            expect(page.get_by_text(MARKUP).first).to_be_attached()
+        assert page.evaluate(ALIVE) == [], address
+    report = station.ok(station.http.get("/reports"))[0]["file"]
+    page.goto(f"{station.url}/api/v1/reports/{report}")
+    expect(page.get_by_text(MARKUP).first).to_be_attached()
+    assert page.evaluate(ALIVE) == []
+    # An address that is none opens the page all the same: a guest's place is followed by a click.
+    page.goto(f"{station.url}/#/axis/%E0%A4%A/motion")
+    expect(page.locator(".stop").first).to_be_visible()
+    assert spoken == []
+
+
 # --- a guest --------------------------------------------------------------------------
 
 
@@ -217,12 +285,25 @@ def test_a_guest_looks_and_is_seen_and_nothing_more(opened: Open, bench: Bench) 
         }""",
         arg=[410, 420],
     )
-    # Chat stays text, whatever is in it.
+    # And the guest's cursor on the scope, at the same time of the samples, whatever is in sight.
     for page in (olaf, guest):
-        page.evaluate("location.hash = '#/people'")
-    guest.get_by_placeholder("A line for everybody here").fill("<img src=x onerror=alert(1)> ok")
+        page.evaluate("location.hash = '#/scope'")
+    over = guest.locator(".time-plot .u-over")
+    over.hover()
+    guest.mouse.wheel(0, -1)  # stands still from here on, and shows another stretch
+    over.hover()
+    cursor = olaf.locator(".shared-cursor", has_text="Gert (guest)")
+    expect(cursor).to_be_visible()
+    guest.mouse.move(5, 5)  # where there is no plot
+    expect(cursor).to_have_count(0)
+    over.hover()
+    expect(cursor).to_be_visible()
+    # Chat stays text, whatever is in it.
+    olaf.evaluate("location.hash = '#/people'")
+    guest.evaluate("location.hash = '#/people'")
+    guest.get_by_placeholder("A line for everybody here").fill(MARKUP)
     button(guest, "Send").click()
-    expect(olaf.get_by_text("<img src=x onerror=alert(1)> ok")).to_be_visible()
+    expect(olaf.get_by_text(MARKUP)).to_be_visible()
     end_visit(olaf)
     expect(guest.get_by_role("heading", name="Log in")).to_be_visible(timeout=3_000)
 

@@ -94,6 +94,7 @@ class GuardedServer:
         self.bench: Bench
         self.member: Member
         self.app: Any = None
+        self.config: uvicorn.Config
         self.port = 0
         self._loop: asyncio.AbstractEventLoop
         self._server: uvicorn.Server
@@ -102,6 +103,11 @@ class GuardedServer:
     @property
     def url(self) -> str:
         return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def connections(self) -> set[Any]:
+        """HTTP connections and websockets as the server has them."""
+        return set(self._server.server_state.connections)
 
     def start(self) -> GuardedServer:
         listening = _listen("127.0.0.1", 0)
@@ -113,7 +119,7 @@ class GuardedServer:
             self.bench, self.member = await bench_with(self.servo, self.folder)
             serving = Serving(accounts=self.people.accounts_needed)
             config = _config(self.bench, self.people, serving, None)
-            self.app = config.app
+            self.app, self.config = config.app, config
             self._server = uvicorn.Server(config)
             task = asyncio.create_task(self._server.serve(sockets=[listening]))
             while not self._server.started:  # noqa: ASYNC110 - uvicorn has no event for it

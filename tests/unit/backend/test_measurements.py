@@ -155,6 +155,27 @@ def test_a_file_made_to_fill_the_memory_is_refused(monkeypatch: pytest.MonkeyPat
         unpack(out.getvalue())
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (35184372088832,), }",  # 256 TiB
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (-5,), }",
+        "{'descr': '|O', 'fortran_order': False, 'shape': (1,), }",
+        "{'descr': '<U4', 'fortran_order': False, 'shape': (1,), }",
+        "(" * 900,
+    ],
+)
+def test_a_signal_that_is_made_to_do_harm_is_refused(drive: Drive, head: str) -> None:
+    """The head of an array is text that numpy evaluates (NEP 1)."""
+    text = head.encode().ljust(((len(head) + 10) // 64 + 1) * 64 - 11) + b"\n"
+    array = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + bytes(64)
+    data = io.BytesIO(_file(drive))
+    with zipfile.ZipFile(data, "a") as archive:
+        archive.writestr("more.npy", array)
+    with pytest.raises(BadMeasurement):
+        unpack(data.getvalue())
+
+
 def test_a_missing_file_is_no_damage(tmp_path: Path) -> None:
     store = MeasurementStore(tmp_path)
     for ask in (store.load, store.head, store.delete):

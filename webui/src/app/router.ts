@@ -34,13 +34,22 @@ let lastDrive: string | null = null
 let route: Route = read()
 
 function read(): Route {
-  const parts = window.location.hash.replace(/^#\/?/, '').split('/').map(decodeURIComponent)
+  const parts = window.location.hash.replace(/^#\/?/, '').split('/').map(decoded)
   if (parts[0] === 'axis' && parts[1]) {
     lastDrive = parts[1]
     const page = AXIS_PAGES.find((name) => name === parts[2]) ?? 'overview'
     return { page, drive: lastDrive }
   }
   return { page: BENCH_PAGES.find((name) => name === parts[0]) ?? 'connect', drive: lastDrive }
+}
+
+/** A guest's place is followed by a click: what is no address must not keep the page from opening. */
+function decoded(part: string): string {
+  try {
+    return decodeURIComponent(part)
+  } catch {
+    return part
+  }
 }
 
 export const isAxisPage = (page: Page): page is AxisPage =>

@@ -18,7 +18,7 @@ import { useLibrary } from './useLibrary'
 export function FilesPage() {
   const t = useT()
   const [filters, setFilters] = useState<Filters>(NO_FILTERS)
-  const { entries, total, tags, problems, problem, refresh, more } = useLibrary(filters)
+  const { entries, total, tags, problems, shared, problem, refresh, more } = useLibrary(filters)
   const drives = useDrives() ?? []
   const { drive: chosen } = useRoute()
   const drive = useDrive(chosen ?? drives[0]?.id ?? null)
@@ -65,7 +65,13 @@ export function FilesPage() {
           <p className="empty">{t(filters === NO_FILTERS ? 'library.empty' : 'library.none')}</p>
         )}
         {entries?.map((entry) => (
-          <LibraryRow key={entry.id} entry={entry} onCompare={compare} onChanged={changed} />
+          <LibraryRow
+            key={entry.id}
+            entry={entry}
+            shared={shared}
+            onCompare={compare}
+            onChanged={changed}
+          />
         ))}
         {entries && total > 0 && (
           <div className="row wrap middle">

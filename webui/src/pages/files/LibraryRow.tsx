@@ -44,10 +44,13 @@ export function factsOf(t: T, entry: LibraryEntry): string {
 /** One entry of the library. */
 export function LibraryRow({
   entry,
+  shared,
   onCompare,
   onChanged,
 }: {
   entry: LibraryEntry
+  /** Other stations may have the same library. */
+  shared: boolean
   onCompare: (entry: LibraryEntry, version?: number) => void
   onChanged: () => void
 }) {
@@ -56,6 +59,19 @@ export function LibraryRow({
   const [deleting, setDeleting] = useState(false)
   const problem = entry.latest.facts.problem
   const { name } = entry
+  // Shared contents are everybody's to download; to be opened they lie in the station's folder.
+  const opens = entry.kind === 'recording' || entry.kind === 'measurement'
+  const path = { params: { path: { entry_id: entry.id } } }
+  const copy = (to: 'share' | 'fetch') =>
+    act
+      .run(() =>
+        ask(
+          to === 'share'
+            ? api.POST('/api/v1/library/{entry_id}/share', path)
+            : api.POST('/api/v1/library/{entry_id}/fetch', path),
+        ),
+      )
+      .then((done) => done && onChanged())
   const takeBack = () =>
     act
       .run(() =>
@@ -110,6 +126,24 @@ export function LibraryRow({
                   onClick={() => onCompare(entry)}
                 >
                   {t('library.compare')}
+                </Button>
+              )}
+              {shared && entry.kind !== 'set' && entry.here && entry.station && (
+                <Button
+                  loading={act.busy}
+                  aria-label={t('library.shareNamed', { name })}
+                  onClick={() => void copy('share')}
+                >
+                  {t('library.share')}
+                </Button>
+              )}
+              {opens && !entry.station && (
+                <Button
+                  loading={act.busy}
+                  aria-label={t('library.fetchNamed', { name })}
+                  onClick={() => void copy('fetch')}
+                >
+                  {t('library.fetch')}
                 </Button>
               )}
               {entry.here && (

@@ -13,6 +13,7 @@ export function useLibrary(filters: Filters) {
   const [total, setTotal] = useState(0)
   const [tags, setTags] = useState<TagCount[]>([])
   const [problems, setProblems] = useState<string[]>([])
+  const [shared, setShared] = useState(false)
   const [problem, setProblem] = useState<Problem | null>(null)
   const [limit, setLimit] = useState(PAGE)
   const key = JSON.stringify([filters, limit])
@@ -24,6 +25,7 @@ export function useLibrary(filters: Filters) {
       setEntries(page.entries)
       setTotal(page.total)
       setProblems(page.problems)
+      setShared(page.shared)
       setTags(await ask(api.GET('/api/v1/library/tags')))
       setProblem(null)
     } catch (error) {
@@ -36,5 +38,5 @@ export function useLibrary(filters: Filters) {
     return () => clearTimeout(timer)
   }, [open, refresh])
   const more = () => setLimit((before) => Math.min(500, before + PAGE))
-  return { entries, total, tags, problems, problem, refresh, more }
+  return { entries, total, tags, problems, shared, problem, refresh, more }
 }

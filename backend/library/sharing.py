@@ -1,0 +1,100 @@
+"""Files of one station's folders for the other stations of a shared library, and back.
+
+Sharing copies: into the library's contents, from which any station takes a copy into its own
+folder, where it is opened like any other. Both copies are compared with their SHA-256 on the way.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from backend.files import StorageFailed, write_atomically
+from backend.library.catalogue import Library
+from backend.library.described import require_usable
+from backend.library.entries import Addition, Entry
+from backend.library.index import Index
+from drivers.errors import NotAllowed
+
+#: Contents pass through the memory on their way to and from the store.
+MOST_BYTES = 256 << 20
+#: Kept by the index for itself; of a copy it would be wrong.
+_STAMP = "stamp"
+
+
+def shared_name(station: str, name: str) -> str:
+    """Two stations may have files of one name: in the library each has its station's before it."""
+    plain = re.sub(r"[^\w.\-]", "-", station).strip(".-")[:30] or "station"
+    return f"{plain} {name}"
+
+
+def share(library: Library, index: Index, entry: Entry) -> Entry:
+    """Copy a file of this station into the library. What is there already makes no new version.
+
+    Raises:
+        NotAllowed: it is shared by itself, is gone, or too large. StorageFailed: the store.
+    """
+    path = index.path(entry.kind, entry.name) if entry.station else None
+    if path is None:
+        raise NotAllowed(
+            f"{entry.name} is no file of this station",
+            value=entry.name,
+            remedy="every station of this library has it already, or it was deleted",
+        )
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise NotAllowed(
+            f"{entry.name} is too large for the library",
+            value=size,
+            limit=f"{MOST_BYTES} bytes",
+            remedy="download it and copy it by hand, or record fewer signals",
+        )
+    latest = entry.latest
+    facts = {name: value for name, value in latest.facts.items() if name != _STAMP}
+    facts["words"] = f"{facts.get('words', '')} {entry.station}".strip()
+    return library.add(
+        entry.kind,
+        shared_name(entry.station, entry.name),
+        path.read_bytes(),
+        Addition(latest.axis, latest.author, latest.notes, latest.saved, facts, entry.tags),
+    )
+
+
+def fetch(library: Library, index: Index, entry: Entry) -> str:
+    """Copy shared contents into this station's folder; returns the file's name.
+
+    Raises:
+        NotAllowed: nothing that opens from a folder, damaged, or another file has this name.
+        StorageFailed: store or disk.
+    """
+    folder = index.folders.get(entry.kind)
+    if folder is None or entry.station:
+        raise NotAllowed(
+            f"{entry.name} is not shared contents of a recording, measurement or report",
+            value=entry.name,
+            remedy="share it on its station first",
+        )
+    if Path(entry.name).name != entry.name or not entry.name.endswith(folder.suffixes):
+        raise NotAllowed(f"{entry.name!r} is no file name of this kind", value=entry.name)
+    path = folder.path / entry.name
+    data = library.content(entry.id)
+    if path.exists():
+        if path.read_bytes() == data:
+            return entry.name
+        raise NotAllowed(
+            f"another {entry.name} is on this station already",
+            value=entry.name,
+            remedy="delete that one first",
+        )
+    # Looked at under a name that no list shows, so that nobody opens what is damaged.
+    waiting = path.with_name(f".{path.name}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(waiting, data)
+        require_usable(entry.kind, waiting)
+        waiting.rename(path)
+    except OSError as error:
+        raise StorageFailed(f"{entry.name} cannot be kept: {error}", value=str(path)) from error
+    finally:
+        waiting.unlink(missing_ok=True)
+    return entry.name
