@@ -24,7 +24,9 @@ export function SceneHere({ drive }: { drive: string }) {
       title={t('scene.axis')}
       tools={
         <>
-          <a href={href('scene', drive)}>{t('scene.all')}</a>
+          <Button component="a" href={href('scene', drive)}>
+            {t('scene.all')}
+          </Button>
           <Button aria-expanded={shown} onClick={toggle}>
             {t(shown ? 'scene.hide' : 'scene.show')}
           </Button>

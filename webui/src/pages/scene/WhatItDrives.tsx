@@ -90,7 +90,9 @@ function MechanicsForm({ drive }: { drive: string }) {
         >
           {t('scene.keep')}
         </Button>
-        <a href={href('setup', drive)}>{t('scene.gear')}</a>
+        <Button component="a" href={href('setup', drive)}>
+          {t('scene.gear')}
+        </Button>
       </div>
       <p className="dim">{t('scene.keepHelp')}</p>
       <ProblemNote problem={act.problem} onClose={act.clear} />
