@@ -147,7 +147,7 @@ def test_what_a_full_disk_does_not_take_is_held_until_it_does(
         assert armed.names() == []
         free[0] = 1 << 40
         async with asyncio.timeout(5):
-            while not any(written in entry.text for entry in journal.entries()):
+            while not any(written in entry.text for entry in journal.entries()):  # noqa: ASYNC110 - it has no event
                 await asyncio.sleep(0.01)
         await armed.close()
         assert armed.names() == ["2023-11-14 22-13-20 X 0x3210.zip"], "the first cause"
