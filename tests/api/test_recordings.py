@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from backend.recording import capture
 from tests.support.station import Station, until
 
 POSITION, VELOCITY, STATUS = "6064:00", "606C:00", "6041:00"
@@ -256,3 +257,29 @@ def test_bundle_by_hand(station: Station, x: str) -> None:
     assert "<h1>&lt;b&gt;odd noise&lt;/b&gt;</h1>" in page
     assert station.http.delete(f"/bundles/{made['name']}").status_code == 204
     assert station.http.get(f"/bundles/{made['name']}").status_code == 404
+
+
+def test_bundle_of_a_mute_drive(station: Station, x: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is not waited for without end; what was known before goes in, with its time."""
+    monkeypatch.setattr(capture, "READ_TIMEOUT_S", 0.5)
+    read = "6083:00"
+    known = station.ok(station.http.get(f"/drives/{x}/parameters/{read}"))
+    station.drives.command(do="mute", wire="mlink://virtual0", on=True)
+    try:
+        until(lambda: not station.state(x)["fresh"], 15, "its silence is noticed")
+        made = station.ok(station.http.post("/bundles", json={"reason": "mute"}))
+    finally:
+        station.drives.command(do="mute", wire="mlink://virtual0", on=False)
+    data = station.http.get(f"/bundles/{made['name']}").raise_for_status().content
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        facts = json.loads(archive.read("facts.json"))
+        rows = list(csv.DictReader(io.StringIO(archive.read(f"parameters/{x}.csv").decode())))
+    (axis,) = facts["axes"]
+    assert not axis["state"]["fresh"]
+    assert axis["state"]["problem"]
+    (row,) = [row for row in rows if row["key"] == read]
+    assert row["raw"] == str(known["raw"])
+    assert any(row["error"] for row in rows), "what was never read says so"
+    assert facts["links"][0]["timeouts"] > 0
+    station.ok(station.http.delete(f"/bundles/{made['name']}"))
+    until(lambda: station.state(x)["fresh"], 15, "it answers again")

@@ -38,9 +38,28 @@ def entities(path: Path) -> dict[str, int]:
     return rows
 
 
-def test_feed_is_what_reruns_own_reader_reads(feed: ClientConnection, tmp_path: Path) -> None:
+def words(path: Path) -> list[str]:
+    from rerun.chunk import RrdReader
+
+    found: list[str] = []
+    for chunk in RrdReader(path).stream().to_chunks():
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            if name.endswith("TextLog:text"):
+                found += [str(cell) for cell in batch.column(name).to_pylist()]
+    return found
+
+
+def test_feed_is_what_reruns_own_reader_reads(
+    station: Station, x: str, feed: ClientConnection, tmp_path: Path
+) -> None:
     blobs: list[bytes] = []
-    until(lambda: blobs.extend(pull(feed)[2]) or len(blobs) > 10, 20, "samples come")
+    station.ok(station.http.get(f"/drives/{x}/parameters/6083:00"))
+    until(lambda: blobs.extend(pull(feed)[2]) or len(blobs) > 5, 20, "samples come")
+    station.ok(station.http.put(f"/drives/{x}/parameters/6083:00", json={"value": 2345}))
+    enough = len(blobs) + 8
+    until(lambda: blobs.extend(pull(feed)[2]) or len(blobs) > enough, 20, "more of them")
+    log: list[str] = []
     seen: dict[str, int] = {}
     for number, blob in enumerate(blobs):
         assert blob.startswith(b"RRF2"), "each is a stream of its own, so that any may be dropped"
@@ -51,10 +70,12 @@ def test_feed_is_what_reruns_own_reader_reads(feed: ClientConnection, tmp_path: 
 
             assert len(RrdReader(path).blueprints()) == 1, "the arrangement comes first"
             continue
+        log += words(path)
         for entity, rows in entities(path).items():
             seen[entity] = seen.get(entity, 0) + rows
     assert {"x/inc", "x/inc_s"} <= set(seen), seen
     assert seen["x/inc"] > 5
+    assert any("is now 2345" in text for text in log), log
 
 
 def test_feed_begins_anew_when_the_bench_changes(station: Station, feed: ClientConnection) -> None:

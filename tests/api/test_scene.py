@@ -49,7 +49,7 @@ class Seen:
             except TimeoutError:
                 return
             assert isinstance(data, bytes)
-            for message in _messages(data):
+            for message in messages(data):
                 node = self.nodes.setdefault(message.get("name", ""), {})
                 node.update({k: v for k, v in message.items() if v is not None})
 
@@ -57,7 +57,7 @@ class Seen:
         return next((n for name, n in self.nodes.items() if name.endswith(part)), {})
 
 
-def _messages(data: bytes) -> list[dict[str, Any]]:
+def messages(data: bytes) -> list[dict[str, Any]]:
     """viser's frames: two 64-bit lengths, then MessagePack packed by zstd, then arrays."""
     packed = int.from_bytes(data[8:16], "little")
     found = msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed]))
