@@ -178,6 +178,8 @@ def chain_of_modes(
     order = np.argsort(frequency_hz)
     poles = np.concatenate([[0.0], (TURN * frequency_hz[order]) ** 2])
     weights = np.concatenate([[gain], residue[order]])
+    if np.any(weights <= 0):
+        raise ValueError("a mode without any part in the response")
     v = np.sqrt(weights / np.sum(weights))
     inertia = 1.0 / float(np.sum(weights))
     before, beta, stiffness = np.zeros_like(v), 0.0, 0.0

@@ -40,6 +40,12 @@ from backend.analysis.sampling import (
 Quantity = Literal["torque_mode", "torque_injection", "closed_loop"]
 
 
+#: No line is weighed as if its noise were less than this share of an ordinary line's.
+_LEAST_NOISE = 0.1
+#: Friction is taken out where that leaves less than this share of the scatter.
+_WORTH_TAKING = 0.9
+
+
 @dataclass(frozen=True)
 class Record:
     """One played excitation: ``excitation.samples`` are the sent values in units of the injection.
@@ -337,20 +343,42 @@ def _estimate_coulomb(s: _Spectra, path: SignalPath, quantity: Quantity) -> floa
     if len(s.sent) < 2:
         return 0.0
     plain = _continuous_input(s, path, quantity)
-
-    def scatter(coulomb_nm: float) -> float:
-        inputs = [u - coulomb_nm * d for u, d in zip(plain, s.direction, strict=True)]
-        g, _, _ = _instrument_estimate(s, inputs)
-        errors = np.array(
-            [y.mean(axis=0) / g - u.mean(axis=0) for y, u in zip(s.response, inputs, strict=True)]
-        )
-        return float(np.sum(np.abs(errors) ** 2))
-
     limit = float(
         max(np.median(np.abs(u)) for u in plain) / s.samples * 2.0 * np.sqrt(s.lines.size)
     )
-    found = minimize_scalar(scatter, bounds=(0.0, limit), method="bounded")
-    return float(found.x) if found.fun < 0.9 * scatter(0.0) else 0.0
+    # Alike first, since friction shows best where its lines are many; behind a coarse encoder
+    # the upper lines are mostly noise, and drown it.
+    for weight in (np.ones(s.frequency_hz.size), _torque_weight(s, plain)):
+        found = minimize_scalar(
+            _scatter, bounds=(0.0, limit), method="bounded", args=(s, plain, weight)
+        )
+        if found.fun < _WORTH_TAKING * _scatter(0.0, s, plain, weight):
+            return float(found.x)
+    return 0.0
+
+
+def _scatter(
+    coulomb_nm: float, s: _Spectra, plain: list[ComplexArray], weight: FloatArray
+) -> float:
+    """What no linear mechanics explain with this friction taken out, as torque."""
+    inputs = [u - coulomb_nm * d for u, d in zip(plain, s.direction, strict=True)]
+    g, _, _ = _instrument_estimate(s, inputs)
+    errors = np.array(
+        [y.mean(axis=0) / g - u.mean(axis=0) for y, u in zip(s.response, inputs, strict=True)]
+    )
+    return float(np.sum(np.abs(errors) ** 2 * weight))
+
+
+def _torque_weight(s: _Spectra, inputs: list[ComplexArray]) -> FloatArray:
+    """One over the noise variance of each line as a torque; alike where one period tells none."""
+    g, _, _ = _instrument_estimate(s, inputs)
+    errors = [y / g - u for y, u in zip(s.response, inputs, strict=True)]
+    freedom = s.used - len(errors)
+    if freedom == 0:
+        return np.ones(g.size)
+    noise = np.sum([np.sum(np.abs(e - e.mean(axis=0)) ** 2, axis=0) for e in errors], axis=0)
+    noise = _neighbour_mean(noise / freedom, 3)
+    return np.asarray(1.0 / (noise + _LEAST_NOISE * np.median(noise)))
 
 
 def _neighbour_mean(x: FloatArray, reach: int) -> FloatArray:
@@ -392,9 +420,9 @@ def estimate_periodic(
         coulomb_nm = 0.0 if quantity == "closed_loop" else _estimate_coulomb(s, path, quantity)
     inputs = _continuous_input(s, path, quantity, coulomb_nm, position=position)
     g, _, s_ur = _instrument_estimate(s, inputs)
-    # What friction did to the answer is known to about a fifth only; that is charged to the band.
+    # What friction did to the answer is known to about a third only; that is charged to the band.
     plain = _instrument_estimate(s, _continuous_input(s, path, quantity, position=position))[0]
-    doubt = 0.2 * np.log(g / plain)
+    doubt = 0.35 * np.log(g / plain)
     power = np.asarray(sum(np.abs(r.mean(axis=0)) ** 2 for r in s.sent))
     noise_var, total_var, freedom = _variances(s, inputs, g, smooth_lines)
     relative = total_var * power / np.abs(g * s_ur) ** 2
@@ -576,6 +604,30 @@ def empty_line_levels(record: Record) -> tuple[float, float]:
         return float(np.sqrt(np.mean(selected**2))) if selected.size else float("nan")
 
     return rms(level[empty % 2 == 0]), rms(level[empty % 2 == 1])
+
+
+def mean_spectra(
+    records: tuple[Record, ...],
+) -> tuple[FloatArray, FloatArray, ComplexArray, ComplexArray]:
+    """Lines in Hz, and cross spectra with the injection of itself, the torque and the velocity.
+
+    Sums over the records' means; torque as reported, nothing taken from it.
+    """
+    parts = []
+    for record in records:
+        e = record.excitation
+        good, _ = _good_periods(record)
+        if not good or record.torque is None:
+            continue
+        r, t, v = (
+            _period_spectra(signal, e, good).mean(axis=0)
+            for signal in (e.samples, record.torque, record.response)
+        )
+        parts.append(np.array([r, t, v]) * r.conj())
+    if not parts:
+        raise ValueError("every period has a gap; nothing is left to evaluate")
+    r, t, v = np.sum(parts, axis=0)
+    return records[0].excitation.line_hz, np.asarray(r.real), np.asarray(t), np.asarray(v)
 
 
 def loop_spectra(

@@ -8,6 +8,7 @@ the ratio between what sampling shows and what is there.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,9 +22,12 @@ from backend.analysis.frf import (
     loop_spectra,
     valid_band_hz,
 )
-from backend.analysis.model_fit import fit_loop, fit_sampled_model
+from backend.analysis.loop_fit import fit_loop
+from backend.analysis.model_fit import fit_sampled_model
+from backend.analysis.path_fit import find_paths
 from backend.analysis.sampled_model import LoopModel, SampledFit
 from backend.analysis.sampling import SignalPath, delay_response, lag_response
+from backend.analysis.settling import settled
 
 #: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
 SYSTEMATIC_DB = 0.05
@@ -32,8 +36,8 @@ SYSTEMATIC_DEG = 0.35
 #: A model whose median relative misfit is larger, and larger than the noise, corrects nothing.
 TRUSTED_ERROR = 0.03
 
-#: At most this many rounds of refining loop and mechanics against each other.
-LOOP_PASSES = 3
+#: At most this many rounds of refining loop, path and mechanics against each other.
+_PASSES = 4
 
 
 @dataclass(frozen=True)
@@ -66,15 +70,102 @@ def identify_mechanics(
     ``quantity`` is *torque_mode* or *torque_injection*; ``path`` holds the known delays, what is
     left is found by the fit. ``coulomb_nm`` as in :func:`estimate_periodic`, None estimates it.
     """
-    if quantity == "closed_loop":
-        raise ValueError("mechanics are identified from torque, not from a loop's reference")
-    views = _views(records, path, quantity, coulomb_nm, jitter_s)
-    if quantity == "torque_mode":
+    task = _Task(settled(records), quantity, max_modes, jitter_s)
+    first = task.trial(path, coulomb_nm)
+    return _identification(task.refined(first, lambda _: path), jitter_s)
+
+
+def identify_with_path(
+    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, *, hold_known: bool
+) -> Identification:
+    """As `identify_mechanics`, with what ``path`` does not tell found from the recording.
+
+    The torque alone cannot always tell whether set-points are interpolated; the motion can: a
+    wrong answer leaves a delay that is negative, or a roll-off that no mechanics have. Beside a
+    closed loop, path and mechanics need each other, and are refined in turn.
+    """
+    closed = quantity == "torque_injection"
+    records = settled(records)
+    task = _Task(records, quantity)
+    paths = find_paths(records, path, loop_closed=closed, hold_known=hold_known)
+    trials = [task.trial(each) for each in paths]
+    best = min(trials, key=lambda t: t.fit.score + _implausible(t.fit))
+
+    def again(fit: SampledFit) -> SignalPath:
+        return find_paths(records, path, loop_closed=True, hold_known=hold_known, motion=fit)[0]
+
+    return _identification(task.refined(best, again), 0.0)
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A fit, and the estimates and the path that it was made with."""
+
+    views: _Views
+    path: SignalPath
+    fit: SampledFit
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What stays the same from trial to trial."""
+
+    records: tuple[Record, ...]
+    quantity: Quantity
+    max_modes: int = 4
+    jitter_s: float = 0.0
+
+    def trial(
+        self, path: SignalPath, coulomb_nm: float | None = None, motion: SampledFit | None = None
+    ) -> _Trial:
+        """Estimates and fit with one path; ``motion`` is a fit before, which tells the images."""
+        if self.quantity == "closed_loop":
+            raise ValueError("mechanics are identified from torque, not from a loop's reference")
+        views = _views(self.records, path, self.quantity, coulomb_nm, self.jitter_s)
         fit = fit_sampled_model(
-            views.velocity, path, from_position=views.position, max_modes=max_modes
-        )
-    else:
-        fit = _fit_with_loop(views, records, path, max_modes)
+            views.velocity, path, from_position=views.position, loop=self._loop(path, motion),
+            max_modes=self.max_modes,
+        )  # fmt: skip
+        return _Trial(views, path, fit)
+
+    def refined(self, first: _Trial, path_of: Callable[[SampledFit], SignalPath]) -> _Trial:
+        """Loop, path and mechanics in turn: each is needed to take the images out of the others."""
+        last = first
+        for _ in range(_PASSES if self.quantity == "torque_injection" else 0):
+            path = path_of(last.fit)
+            change = abs(self._loop(path, last.fit).c0 / last.fit.loop.c0 - 1.0)
+            if _alike(path, last.path) and change < 0.003:
+                break
+            last = self.trial(path, last.views.velocity.coulomb_nm, last.fit)
+        return last
+
+    def _loop(self, path: SignalPath, motion: SampledFit | None) -> LoopModel:
+        """The controller that is closed meanwhile."""
+        if self.quantity == "torque_mode":
+            return LoopModel()
+        own, velocity = loop_spectra(self.records, path)
+        lines = self.records[0].excitation.line_hz
+        if motion is not None:
+            own = own / motion.loop_image_factor(lines)
+        return fit_loop(lines, own, velocity, path)
+
+
+def _alike(one: SignalPath, other: SignalPath) -> bool:
+    """Whether another fit of the mechanics would give the same."""
+    apart = abs(one.command_delay_s - other.command_delay_s) * one.sample_rate_hz
+    corners = (one.current_bandwidth_hz or 1.0) / (other.current_bandwidth_hz or 1.0)
+    return one.hold == other.hold and apart < 0.01 and abs(np.log(corners)) < 0.03
+
+
+def _implausible(fit: SampledFit) -> float:
+    """A drive does not report what has not happened yet."""
+    cycles = -fit.delay_s * fit.path.sample_rate_hz
+    return 1e3 * max(cycles - 0.1, 0.0)
+
+
+def _identification(trial: _Trial, jitter_s: float) -> Identification:
+    """The estimates with what the fit found taken out."""
+    views, path, fit = trial.views, trial.path, trial.fit
     if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
         # No model explains what was sampled, so neither delay nor images are known.
         raw = views.velocity
@@ -141,29 +232,6 @@ def _pooled(parts: list[Frf]) -> Frf:
         noise=first.noise * share + second.noise * (1.0 - share),
         distortion=first.distortion * share + second.distortion * (1.0 - share),
     )
-
-
-def _fit_with_loop(
-    views: _Views, records: tuple[Record, ...], path: SignalPath, max_modes: int
-) -> SampledFit:
-    """Loop and mechanics in turn: each is needed to take the images out of the other."""
-    own, velocity = loop_spectra(records, path)
-    lines = records[0].excitation.line_hz
-
-    def fitted(loop: LoopModel) -> SampledFit:
-        return fit_sampled_model(
-            views.velocity, path, from_position=views.position, loop=loop, max_modes=max_modes
-        )
-
-    fit = fitted(fit_loop(lines, own, velocity, path))
-    for _ in range(LOOP_PASSES):
-        clean = own / fit.loop_image_factor(lines)
-        loop = fit_loop(lines, clean, velocity, path)
-        change = abs(loop.c0 / fit.loop.c0 - 1.0)
-        if change < 0.003:
-            break
-        fit = fitted(loop)
-    return fit
 
 
 def _widened(frf: Frf, factor: ComplexArray, share: float) -> Frf:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from backend.analysis.arrays import ComplexArray, FloatArray
 from backend.analysis.mechanical_model import MechanicalModel
@@ -87,6 +88,14 @@ class Sampler:
             filtered, controller * filtered, seen_as, command, told,
         )  # fmt: skip
 
+    def thinned(self, lines: npt.NDArray[np.int64]) -> Sampler:
+        """Some of the lines."""
+        return Sampler(
+            self.frequency_hz[:, lines], self.true, self.torque[:, lines],
+            self.reported[:, lines], self.controller[:, lines], self.seen_as[:, lines],
+            self.command[lines], self.told[lines],
+        )  # fmt: skip
+
     def seen(
         self, plant: ComplexArray, further: ComplexArray | None = None
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
@@ -135,7 +144,8 @@ class SampledFit:
 
     ``delay_s`` [s] was found beyond the delays that the estimate already had, to the velocity and
     (``position_delay_s``) to the position; each has a standard deviation. ``error`` is the median
-    relative misfit of the fitted lines, ``noise`` their median relative deviation.
+    relative misfit of the fitted lines, ``noise`` their median relative deviation; ``score`` is
+    the information criterion, less is better, comparable between fits of the same recording.
     """
 
     model: MechanicalModel
@@ -147,6 +157,7 @@ class SampledFit:
     position_delay_std_s: float
     error: float
     noise: float
+    score: float
     valid_band_hz: tuple[float, float]
 
     def image_factor(self, frequency_hz: FloatArray, *, integrated: bool = False) -> ComplexArray:

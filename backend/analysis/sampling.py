@@ -8,12 +8,10 @@ back above half the sample rate is not, see :mod:`backend.analysis.sampled_model
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
-from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from backend.analysis.arrays import ComplexArray, FloatArray
@@ -26,8 +24,6 @@ MODEL_SHARE = 0.4
 
 #: A drive interpolates in the steps of its own loop (50 µs) and so is half a step ahead of a line.
 STEP_LEAD_S = 25e-6
-#: Set-points are in force after this many cycles at most.
-_MOST_CYCLES = 3
 
 
 @dataclass(frozen=True)
@@ -98,6 +94,21 @@ def sampled_command(sent: FloatArray, path: SignalPath) -> FloatArray:
     Exact for a first-order current loop, any delay and both holds. With no delay and a
     zero-order hold it is u[k] = a·u[k-1] + (1-a)·r[k-1], a = exp(-2π·f_c·T).
     """
+    numerator, a, whole = _difference_equation(path)
+    filtered = np.asarray(lfilter(numerator, [1.0, -a], sent)) * path.direct_gain
+    return np.concatenate([np.zeros(whole), filtered])[: filtered.size]
+
+
+def sampled_command_response(frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
+    """Response of `sampled_command`, from the spectrum of what was sent to that of the samples."""
+    numerator, a, whole = _difference_equation(path)
+    z = np.exp(-2j * np.pi * np.asarray(frequency_hz) / path.sample_rate_hz)
+    top = np.polyval(numerator[::-1], z) * z**whole
+    return np.asarray(path.direct_gain * top / (1.0 - a * z), dtype=np.complex128)
+
+
+def _difference_equation(path: SignalPath) -> tuple[FloatArray, float, int]:
+    """Numerator, the one pole, and whole cycles of delay before them."""
     period_s = 1.0 / path.sample_rate_hz
     whole, part = divmod(path.command_delay_s, period_s)
     wc = None if path.current_bandwidth_hz is None else 2 * np.pi * path.current_bandwidth_hz
@@ -114,101 +125,4 @@ def sampled_command(sent: FloatArray, path: SignalPath) -> FloatArray:
     if path.hold == "linear":
         impulse = (impulse - after(t - period_s) + after(t - 2 * period_s)) / period_s
     a = 0.0 if wc is None else float(np.exp(-wc * period_s))
-    numerator = impulse - a * np.concatenate([[0.0], impulse[:-1]])
-    filtered = np.asarray(lfilter(numerator, [1.0, -a], sent)) * path.direct_gain
-    return np.concatenate([np.zeros(int(whole)), filtered])[: filtered.size]
-
-
-def fit_path(
-    commands: tuple[FloatArray, ...],
-    torques: tuple[FloatArray, ...],
-    lines: tuple[npt.NDArray[np.int64], ...],
-    path: SignalPath,
-    *,
-    loop_closed: bool,
-    hold_known: bool = False,
-) -> SignalPath:
-    """Hold and delay from the sent values to the torque, and an unknown current loop's corner.
-
-    ``commands`` and ``torques`` [n] are whole periods that follow the same period (steady state),
-    ``lines`` the excited bins.
-    """
-    judge = _PathJudge(commands, torques, lines, loop_closed)
-    holds: tuple[Hold, ...] = (path.hold,) if hold_known else ("linear", "zero")
-    tried = [judge.whole_cycles(replace(path, hold=hold)) for hold in holds]
-    best = min(tried, key=lambda found: found[1])[0]
-    if loop_closed or path.current_bandwidth_hz is None:
-        # A corner and a fraction of a cycle are hardly told apart: the mechanics' fit finds it.
-        return best
-    return judge.refined(best, corner=False, delay=True)[0]
-
-
-@dataclass(frozen=True)
-class _PathJudge:
-    """How well a path explains the reported torque, on the upper lines.
-
-    There a closed loop adds about a/s of what is injected, which is fitted along. That leaves no
-    more than whole cycles to be told apart in a closed loop, less the `STEP_LEAD_S` of
-    interpolation.
-    """
-
-    commands: tuple[FloatArray, ...]
-    torques: tuple[FloatArray, ...]
-    lines: tuple[npt.NDArray[np.int64], ...]
-    loop_closed: bool
-
-    def whole_cycles(self, path: SignalPath) -> tuple[SignalPath, float]:
-        """The best number of cycles, and corner where unknown, with what is left unexplained.
-
-        Half a cycle and a hold look like none and an interpolation, as far as samples tell.
-        """
-        period_s = 1.0 / path.sample_rate_hz
-        lead_s = STEP_LEAD_S if path.hold == "linear" else 0.0
-        known = path.current_bandwidth_hz
-        corners = np.geomspace(150.0, 6000.0, 7) if known is None else np.array([known])
-        trials = [
-            replace(path, command_delay_s=max(c * period_s - lead_s, 0.0),
-                    current_bandwidth_hz=float(b))
-            for c in range(_MOST_CYCLES + 1) for b in corners
-        ]  # fmt: skip
-        costs = [float(np.sum(self._rest(trial) ** 2)) for trial in trials]
-        start = trials[int(np.argmin(costs))]
-        return self.refined(start, corner=known is None, delay=False)
-
-    def refined(self, start: SignalPath, *, corner: bool, delay: bool) -> tuple[SignalPath, float]:
-        """Gauss-Newton from a start; microseconds matter here."""
-        period_s = 1.0 / start.sample_rate_hz
-
-        def path_of(x: FloatArray) -> SignalPath:
-            late = start.command_delay_s
-            if delay:
-                late = max(late + float(np.clip(x[0], -0.2, 0.2)) * period_s, 0.0)
-            bandwidth = start.current_bandwidth_hz
-            if corner:
-                bandwidth = float(np.exp(np.clip(x[1], 3.0, 10.0)))
-            return replace(start, command_delay_s=late, current_bandwidth_hz=bandwidth)
-
-        x0 = np.array([start.command_delay_s / period_s, np.log(start.current_bandwidth_hz or 1.0)])
-        if not corner and not delay:
-            return start, float(np.sum(self._rest(start) ** 2))
-
-        def rest(x: FloatArray) -> FloatArray:
-            return self._rest(path_of(x))
-
-        found = least_squares(rest, x0, x_scale=[0.05, 0.1], max_nfev=25)
-        return path_of(found.x), 2.0 * float(found.cost)
-
-    def _rest(self, path: SignalPath) -> FloatArray:
-        """What the path leaves unexplained, real and imaginary parts."""
-        parts = []
-        for sent, torque, bins in zip(self.commands, self.torques, self.lines, strict=True):
-            upper = bins[(3 * bins.size) // 4 :]
-            twice = np.concatenate([sent, sent])
-            u = np.fft.rfft(sampled_command(twice, path)[sent.size :])[upper]
-            error = np.fft.rfft(torque)[upper] - u
-            if self.loop_closed:
-                column = u / (1j * upper)
-                share = np.vdot(column, error).real / np.vdot(column, column).real
-                error = error - column * share
-            parts += [error.real, error.imag]
-        return np.concatenate(parts)
+    return impulse - a * np.concatenate([[0.0], impulse[:-1]]), a, int(whole)

@@ -12,10 +12,10 @@ from backend.analysis import excitation as signals
 from backend.analysis.arrays import ComplexArray, FloatArray
 from backend.analysis.fit import Resonance
 from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
-from backend.analysis.identify import Identification, identify_mechanics
+from backend.analysis.identify import Identification, identify_with_path
 from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
 from backend.analysis.mechanical_model import MechanicalModel
-from backend.analysis.sampling import STEP_LEAD_S, Hold, SignalPath, fit_path, sampled_command
+from backend.analysis.sampling import STEP_LEAD_S, Hold, SignalPath, sampled_command
 from backend.axis import Envelope
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
@@ -28,8 +28,6 @@ Loop = Literal["auto", "none", "speed", "position"]
 #: Weak modes below this are artefacts of friction more often than mechanics.
 _LOWEST_MODE_HZ = 15.0
 _WEAK_DB, _LEAST_DB, _LEAST_SHARE = 3.0, 1.0, 0.2
-#: Share of the distance of two lines that a mode's half width must have.
-_NARROWEST = 0.15
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +112,9 @@ def evaluate(
         for s, r in records
     )
     quantity: Quantity = "torque_mode" if loop == "none" else "torque_injection"
-    path = _found_path(taken, path, quantity == "torque_injection")
-    found = identify_mechanics(taken, path, quantity)
+    known = settings.hold is not None or facts.interpolates
+    found = identify_with_path(taken, path, quantity, hold_known=known)
+    path = found.fit.path
     limit = settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm
     saturated = _saturated(taken, path, quantity, limit)
     warnings = _warnings(found, saturated, facts)
@@ -150,33 +149,6 @@ def completed(facts: AxisFacts, result: SweepResult) -> AxisFacts:
         current_bandwidth_hz=facts.current_bandwidth_hz or result.current_bandwidth_hz,
         speed_filter_hz=facts.speed_filter_hz or result.speed_filter_hz,
     )
-
-
-def _found_path(records: tuple[Record, ...], path: SignalPath, closed: bool) -> SignalPath:
-    """Delay between a set-point and its torque, from the last period of the reported torque."""
-    commands, torques, lines = [], [], []
-    for r in records:
-        e = r.excitation
-        if r.torque is None:
-            continue
-        last = e.first_sample + (e.periods - 1) * e.period_samples
-        cut, bins = slice(last, last + e.period_samples), e.lines
-        if e.segments:
-            # From rest to rest: the whole of it is one period of a longer signal.
-            cut = slice(0, e.samples.size)
-            ends_hz = e.line_hz[[0, -1]] * (e.samples.size / e.sample_rate_hz)
-            bins = np.arange(round(ends_hz[0]), round(ends_hz[1]), dtype=np.int64)
-        if r.valid is not None and not np.all(r.valid[cut]):
-            continue
-        commands.append(e.samples[cut])
-        torques.append(r.torque[cut])
-        lines.append(bins)
-    if not commands:
-        return path
-    return fit_path(
-        tuple(commands), tuple(torques), tuple(lines), path, loop_closed=closed,
-        hold_known=path.hold == "linear",
-    )  # fmt: skip
 
 
 def _saturated(
@@ -223,18 +195,19 @@ def resonance_table(
 ) -> tuple[Resonance, ...]:
     """Resonances and antiresonances that the lines show, ascending; heights are local, in dB.
 
-    A mode that hardly rises, or that is narrower than what lies between two lines, explains noise.
+    A mode that hardly rises, or that no line shows because it is narrower than what lies between
+    two of them, explains noise.
     """
     rows: list[Resonance] = []
     for mode in model.modes:
         height = model.height_db(mode)
-        place = int(np.clip(np.searchsorted(lines_hz, mode.frequency_hz), 1, lines_hz.size - 1))
-        gap_hz = float(lines_hz[place] - lines_hz[place - 1])
         low = mode.frequency_hz < _LOWEST_MODE_HZ
-        shown = height > _WEAK_DB if low else model.prominence(mode) > _LEAST_SHARE
-        wide = mode.damping * mode.frequency_hz > _NARROWEST * gap_hz
+        nearest_hz = float(np.min(np.abs(lines_hz - mode.frequency_hz)))
+        half_width_hz = mode.damping * mode.frequency_hz
+        seen = model.prominence(mode) / np.hypot(1.0, nearest_hz / half_width_hz)
+        shown = height > _WEAK_DB if low else seen > _LEAST_SHARE
         inside = lines_hz[0] < mode.frequency_hz <= highest_hz
-        if shown and wide and inside and mode.damping < 1.0:
+        if shown and inside and mode.damping < 1.0:
             rows.append(Resonance("resonance", mode.frequency_hz, mode.damping, height))
     kept = [row.frequency_hz for row in rows]
     for frequency, damping in model.antiresonances():

@@ -73,7 +73,12 @@ class Mechanics:
 
 @dataclass(frozen=True)
 class Drive:
-    """Loops and sensors of the simulated drive."""
+    """Loops and sensors of the simulated drive.
+
+    ``command_late_steps`` and ``told_late_steps`` are delays in steps of 50 µs: of a torque until
+    it acts, and of all signals until the bus samples them. ``interpolates``: torques are reached
+    linearly from cycle to cycle (60C2h).
+    """
 
     rated_nm: float = 1.27
     limit_nm: float = 3.8
@@ -82,6 +87,9 @@ class Drive:
     ki_nm: float = 0.0
     position_gain: float = 0.0
     speed_filter_hz: float = 0.0
+    command_late_steps: int = 0
+    told_late_steps: int = 0
+    interpolates: bool = False
     counts_per_rev: int = 2**23
     noise_counts: float = 0.5
     torque_step: float = 1e-3
@@ -101,7 +109,7 @@ class Run:
 @numba.njit(cache=True)
 def _simulate(
     steps, m, a, b_ref, b_dist, coulomb, gravity, limit, mode, kp, ki, kv, alpha,
-    torque_in, velocity_in, position_in, counts, noise, out,
+    torque_in, velocity_in, position_in, counts, noise, told_late, out,
 ):  # fmt: skip
     n = a.shape[0]
     x = np.zeros(n)
@@ -117,11 +125,12 @@ def _simulate(
         raw = (theta - previous) / dt if i > 0 else 0.0
         previous = theta
         filtered += alpha * (raw - filtered)
-        if i % m == 0:
-            out[k, 0] = x[n - 1]
-            out[k, 1] = filtered
-            out[k, 2] = theta
-        ref = torque_in[k]
+        told = (i + told_late) // m
+        if (i + told_late) % m == 0 and told < out.shape[0]:
+            out[told, 0] = x[n - 1]
+            out[told, 1] = filtered
+            out[told, 2] = theta
+        ref = torque_in[i]
         if mode == 0:
             ref += gravity
         else:
@@ -147,6 +156,17 @@ def _simulate(
             new = new - b_dist * friction
         x = new
     return x
+
+
+def _per_step(torque, m, drive):
+    """The torque command at every step of the loop: held or interpolated, and late."""
+    if drive.interpolates:
+        before = np.concatenate([[0.0], torque[:-1]])
+        part = (np.arange(m) + 1) / m
+        steps = (before[:, None] + part * (torque - before)[:, None]).ravel()
+    else:
+        steps = np.repeat(torque, m)
+    return np.concatenate([np.zeros(drive.command_late_steps), steps])[: steps.size]
 
 
 def simulate(mechanics, drive, sample_rate_hz, *, torque=None, velocity=None, position=None):
@@ -184,10 +204,11 @@ def simulate(mechanics, drive, sample_rate_hz, *, torque=None, velocity=None, po
         steps, m, np.ascontiguousarray(step[:size, :size]), step[:size, tau + 1].copy(),
         step[:size, tau + 2].copy(), mechanics.coulomb_nm, mechanics.gravity_nm, drive.limit_nm,
         mode, drive.kp_nms, drive.ki_nm, drive.position_gain, alpha,
-        zero if torque is None else np.asarray(torque, float),
+        _per_step(zero if torque is None else np.asarray(torque, float), m, drive),
         zero if velocity is None else np.asarray(velocity, float),
         zero if position is None else np.asarray(position, float),
-        float(drive.counts_per_rev), rng.normal(0, max(drive.noise_counts, 1e-12), steps), out,
+        float(drive.counts_per_rev), rng.normal(0, max(drive.noise_counts, 1e-12), steps),
+        drive.told_late_steps, out,
     )  # fmt: skip
     lsb = drive.torque_step * drive.rated_nm
     return Run(

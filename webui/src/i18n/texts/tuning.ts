@@ -32,6 +32,27 @@ export const tuning = {
   'sweep.loop.speed': ['speed', '速度'],
   'sweep.loop.position': ['position', '位置'],
   'sweep.highHelp': ['empty: as far as the bus rate allows', '留空：总线频率允许的最高值'],
+  'sweep.excitation': ['Signal', '激励信号'],
+  'sweep.excitation.multisine': ['multisine', '多正弦'],
+  'sweep.excitation.chirp': ['chirp', '扫频（chirp）'],
+  'sweep.excitation.prbs': ['PRBS', '伪随机二进制（PRBS）'],
+  'sweep.excitation.stepped': ['stepped sine', '步进正弦'],
+  'sweep.excitation.help.multisine': [
+    'All frequencies at once, like noise that repeats: best for nearly every axis.',
+    '所有频率同时出现，像重复的噪声：几乎适合所有轴。',
+  ],
+  'sweep.excitation.help.chirp': [
+    'A tone that glides upwards: you hear where the machine resonates.',
+    '频率逐渐升高的单音：可以听出机器在何处共振。',
+  ],
+  'sweep.excitation.help.prbs': [
+    'Full torque, switched to and fro at random: the most energy, but also the roughest for the mechanics.',
+    '转矩全幅随机正反切换：能量最大，对机械的冲击也最大。',
+  ],
+  'sweep.excitation.help.stepped': [
+    'One tone after another, beside a closed loop: few points, each measured for longer. Slow; for a second opinion on a peak.',
+    '闭环下逐个频率测量：点数少，每点测量时间长。较慢；适合复核某个谐振峰。',
+  ],
   'sweep.share': ['Excitation', '激励幅值'],
   'sweep.shareHelp': ['of the torque limit', '占转矩限制'],
   'sweep.count': ['Realisations', '重复次数'],

@@ -14,12 +14,14 @@ import { LimitFields, useLimits } from './limits'
 
 const KINDS = ['mechanics', 'speed_loop', 'position_loop'] as const
 const LOOPS = ['auto', 'none', 'speed', 'position'] as const
+const SIGNALS = ['multisine', 'chirp', 'prbs', 'stepped'] as const
 
 /** What to measure, within which limits, and what will move. */
 export function SweepForm({ drive, state }: { drive: string; state: AxisState | null }) {
   const t = useT()
   const [kind, setKind] = useState<SweepRequest['kind']>('mechanics')
   const [loop, setLoop] = useState<SweepRequest['loop']>('auto')
+  const [signal, setSignal] = useState<SweepRequest['excitation']>('multisine')
   const [low, setLow] = useRemembered(drive, 'sweep.low', 5)
   const [high, setHigh] = useState<number | null>(null)
   const [share, setShare] = useRemembered(drive, 'sweep.share', 35)
@@ -35,6 +37,7 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
       : {
           ...limits.limits,
           kind,
+          excitation: signal,
           loop: kind === 'mechanics' ? loop : 'auto',
           f_min_hz: low,
           f_max_hz: high,
@@ -67,6 +70,13 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
       <LimitFields of={limits} />
       <details>
         <summary>{t('sweep.more')}</summary>
+        <NativeSelect
+          label={t('sweep.excitation')}
+          value={signal}
+          onChange={(event) => setSignal(event.currentTarget.value as typeof signal)}
+          data={SIGNALS.map((each) => ({ value: each, label: t(`sweep.excitation.${each}`) }))}
+        />
+        <p className="dim">{t(`sweep.excitation.help.${signal}`)}</p>
         <div className="fields">
           {kind === 'mechanics' && (
             <NativeSelect

@@ -1,0 +1,262 @@
+"""One fit of mechanics and delays to several views of one motion, as least squares.
+
+What is fitted is the logarithm of what sampling shows of a model (`sampled_model`), over what was
+measured; how mechanics are written down in parameters is a `Form`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray
+from backend.analysis.chain_model import (
+    LOAD_PARAMETERS,
+    chain_response_and_slopes,
+    loads_of,
+    model_of_chain,
+)
+from backend.analysis.frf import Frf
+from backend.analysis.mechanical_model import (
+    MODE_PARAMETERS,
+    RIGID_PARAMETERS,
+    TURN,
+    MechanicalModel,
+    model_of,
+    response_and_slopes,
+)
+from backend.analysis.robust_fit import minimise
+from backend.analysis.sampled_model import LoopModel, Sampler
+from backend.analysis.sampling import SignalPath, delay_response, lag_response
+
+#: Delays that no path tells are small: this one standard deviation, in s, beside the lines.
+_USUAL_DELAY_S = 60e-6
+#: A speed filter that nobody tells, log of Hz and its standard deviation.
+USUAL_CORNER, _CORNER_SPREAD = float(np.log(2000.0)), 1.0
+#: β of a mode is this share of ω at most in ordinary machines (one standard deviation).
+_USUAL_ZERO = 0.1
+#: Couplings have about this damping ratio, within a factor of e² (one standard deviation).
+USUAL_DAMPING, _DAMPING_SPREAD = 0.03, 2.0
+#: Lines with a larger relative deviation take no part.
+_NOISE = 0.3
+#: Highest antiresonance that is tried, relative to the highest line.
+HIGHEST_TRIED = 4.0
+
+
+@dataclass(frozen=True)
+class View:
+    """One estimate of the same mechanics: lines, values, weights, and how it came about."""
+
+    f: FloatArray
+    g: ComplexArray
+    weight: FloatArray
+    sampler: Sampler
+    integrated: bool
+    second: bool
+    """Whether another view comes before it."""
+
+    @staticmethod
+    def of(
+        frf: Frf, use: BoolArray, path: SignalPath, loop: LoopModel, floor: float, *,
+        integrated: bool, second: bool,
+    ) -> View:  # fmt: skip
+        """Weights are those of the lines' accuracy, but nothing is better than the floor."""
+        f = frf.frequency_hz[use]
+        relative = np.nan_to_num(frf.std_db, nan=0.0)[use] * np.log(10) / 20
+        # The logarithm of a line that is mostly noise is biased.
+        weight = np.where(relative < _NOISE, 1.0 / np.hypot(relative, floor), 0.0)
+        sampler = Sampler.of(f, path, loop, integrated=integrated)
+        return View(f, frf.response[use], weight, sampler, integrated, second)
+
+    def thinned(self, lines: npt.NDArray[np.int64]) -> View:
+        """Some of the lines."""
+        return replace(
+            self, f=self.f[lines], g=self.g[lines], weight=self.weight[lines],
+            sampler=self.sampler.thinned(lines),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Form:
+    """A way to write mechanics down in parameters: what they mean, their bounds and habits."""
+
+    response: Callable[[FloatArray, FloatArray], tuple[ComplexArray, ComplexArray]]
+    model: Callable[[FloatArray], MechanicalModel]
+    bounds: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+    prior: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    """What is usual: rows that ought to be near zero, and their slopes [rows, parameters]."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """One solution."""
+
+    x: FloatArray
+    jacobian: FloatArray
+    residuals: FloatArray
+    score: float
+    error: float
+    noise: float
+    model: MechanicalModel
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One nonlinear least-squares problem over all views."""
+
+    views: tuple[View, ...]
+    period_s: float
+    form: Form
+    free_filter: bool
+    """Whether the drive's speed filter is unknown."""
+
+    @cached_property
+    def _frequencies(self) -> FloatArray:
+        # All views have the same lines, and so the same images.
+        return self.views[0].sampler.frequency_hz
+
+    def _parts(self, x: FloatArray) -> tuple[list[ComplexArray], list[ComplexArray]]:
+        """Per view log(seen/measured) [lines] and its slopes [parameters, lines]."""
+        f = self._frequencies
+        plant, slopes = self.form.response(x, f)
+        late = delay_response(f, float(x[2]) * self.period_s)
+        plant = plant * late
+        slopes = slopes * late
+        turn = -2j * np.pi * f * self.period_s
+        slopes[2] = turn * plant
+        values, gradients = [], []
+        for view in self.views:
+            corner = np.exp(x[4])
+            further: ComplexArray | None = None
+            if view.integrated:
+                further = delay_response(f, float(x[3] - x[2]) * self.period_s)
+            elif self.free_filter:
+                further = lag_response(f, float(corner))
+            seen, by_plant, by_further = view.sampler.seen(plant, further)
+            gradient = np.einsum("pil,il->pl", slopes, by_plant)
+            if further is not None and view.integrated:
+                by_delay = np.sum(turn * further * by_further, axis=0)
+                gradient[2] -= by_delay
+                gradient[3] += by_delay
+            elif further is not None:
+                by_corner = further * (1j * f / corner) / (1.0 + 1j * f / corner)
+                gradient[4] = np.sum(by_corner * by_further, axis=0)
+            values.append(np.log(seen / view.g))
+            gradients.append(gradient / seen)
+        return values, gradients
+
+    def misfit(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Weighted logarithmic error, peaks and valleys alike, and its slopes [n, parameters]."""
+        values, gradients = self._parts(x)
+        return self._rows(x, values), self._slopes(x, gradients)
+
+    def _rows(self, x: FloatArray, values: list[ComplexArray]) -> FloatArray:
+        rows = [v * view.weight for v, view in zip(values, self.views, strict=True)]
+        path = [*(x[2:4] * self.period_s / _USUAL_DELAY_S), (x[4] - USUAL_CORNER) / _CORNER_SPREAD]
+        usual = [np.array(path), self.form.prior(x)[0]]
+        return np.concatenate([p for e in rows for p in (e.real, e.imag)] + usual)
+
+    def _slopes(self, x: FloatArray, gradients: list[ComplexArray]) -> FloatArray:
+        rows = [g * view.weight for g, view in zip(gradients, self.views, strict=True)]
+        path = np.zeros((3, x.size))
+        path[0, 2] = path[1, 3] = self.period_s / _USUAL_DELAY_S
+        path[2, 4] = 1.0 / _CORNER_SPREAD
+        usual = [path, self.form.prior(x)[1]]
+        return np.concatenate([p.T for e in rows for p in (e.real, e.imag)] + usual)
+
+    def thinned(self, lines: npt.NDArray[np.int64]) -> Problem:
+        """The same with some of the lines, for a first look at many starts."""
+        return replace(self, views=tuple(view.thinned(lines) for view in self.views))
+
+    def solve(self, start: FloatArray, steps: int = 40) -> Found:
+        """Best parameters near ``start``, as far as ``steps`` evaluations lead."""
+        low, high = self.form.bounds(start, self.views[0].f)
+        # A delay that a start brings along is looked for around it.
+        around = start[2:4]
+        low[2:4], high[2:4] = np.maximum(around - 1.0, -0.3), around + 1.0
+        low[4], high[4] = np.log(100.0), np.log(20000.0)
+        fit = minimise(self.misfit, np.clip(start, low + 1e-9, high - 1e-9), low, high, scale=3.0,
+                       steps=steps)  # fmt: skip
+        points = sum(2 * int(np.count_nonzero(view.weight)) for view in self.views)
+        # No data are better than the floor of their weights, whatever synthetic ones are.
+        misfit = max(2 * fit.cost, 1e-6 * points)
+        score = points * np.log(misfit / points) + start.size * np.log(points)
+        values, _ = self._parts(fit.x)
+        errors = [
+            _median(np.abs(np.expm1(v)), w.weight) for v, w in zip(values, self.views, strict=True)
+        ]
+        noise = min(_median(1.0 / np.maximum(v.weight, 1e-9), v.weight) for v in self.views)
+        return Found(fit.x, fit.jacobian, fit.residuals, float(score), min(errors),
+                      noise, self.form.model(fit.x))  # fmt: skip
+
+
+def _median(values: FloatArray, weight: FloatArray) -> float:
+    """Median over the lines that take part; infinite where these are few."""
+    use = weight > 0
+    return float(np.median(values[use])) if np.count_nonzero(use) > 0.3 * use.size else np.inf
+
+
+# --- forms ------------------------------------------------------------------------------
+
+
+def _rigid_bounds(gain: float, f: FloatArray) -> tuple[list[float], list[float]]:
+    """Gain, pole and delays (these are set by the problem)."""
+    highest = float(np.log(0.5 * TURN * np.sqrt(f[0] * f[-1])))
+    lowest = float(np.log(1e-3 * TURN * f[0]))
+    return [gain - 2.5, lowest, 0.0, 0.0, 0.0], [gain + 2.5, highest, 0.0, 0.0, 0.0]
+
+
+def _modal_bounds(x: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Around a start, as far as modes are physical."""
+    low, high = _rigid_bounds(float(x[0]), f)
+    for q in x[RIGID_PARAMETERS:].reshape(-1, MODE_PARAMETERS):
+        low += [q[0] - 0.3, np.log(5e-4), q[2] - 4.0, -0.5]
+        high += [q[0] + 0.3, 0.0, q[2] + 4.0, 0.5]
+    return np.array(low), np.array(high)
+
+
+def _modal_prior(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Modes that are damped alike at both ends."""
+    places = np.arange(RIGID_PARAMETERS + 3, x.size, MODE_PARAMETERS)
+    slopes = np.zeros((places.size, x.size))
+    slopes[np.arange(places.size), places] = 1.0 / _USUAL_ZERO
+    return x[places] / _USUAL_ZERO, slopes
+
+
+def _chain_bounds(x: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Within factors of what the growth starts with."""
+    whole = float(np.log(np.exp(x[0]) + np.sum(loads_of(x)[:, 0])))
+    slow = np.log(1e-3 * TURN * f[0])
+    fast = np.log(0.5 * TURN * np.sqrt(f[0] * f[-1]))
+    low, high = [whole - 6.0, whole + slow], [whole + 1.5, whole + fast]
+    low, high = [*low, 0.0, 0.0, 0.0], [*high, 0.0, 0.0, 0.0]
+    stiffest = 2 * np.log(TURN * 2 * HIGHEST_TRIED * f[-1])
+    softest = 2 * np.log(TURN * f[0])
+    for _ in range((x.size - RIGID_PARAMETERS) // LOAD_PARAMETERS):
+        low += [whole - 7.0, whole - 7.0 + softest, whole - 12.0]
+        high += [whole + 1.5, whole + 1.5 + stiffest, whole + 1.5 + 0.5 * stiffest]
+    return np.array(low), np.array(high)
+
+
+def _chain_prior(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Couplings with an ordinary damping ratio d / 2√(kJ)."""
+    logs = x[RIGID_PARAMETERS:].reshape(-1, LOAD_PARAMETERS)
+    ratio = logs[:, 2] - 0.5 * (logs[:, 0] + logs[:, 1]) - np.log(2 * USUAL_DAMPING)
+    slopes = np.zeros((len(logs), x.size))
+    for i in range(len(logs)):
+        place = RIGID_PARAMETERS + LOAD_PARAMETERS * i
+        slopes[i, place : place + LOAD_PARAMETERS] = np.array([-0.5, -0.5, 1.0]) / _DAMPING_SPREAD
+    return ratio / _DAMPING_SPREAD, slopes
+
+
+CHAIN = Form(chain_response_and_slopes, model_of_chain, _chain_bounds, _chain_prior)
+MODAL = Form(response_and_slopes, model_of, _modal_bounds, _modal_prior)
+
+
+def best_view(views: Sequence[View]) -> View:
+    """The one with the larger weights."""
+    return max(views, key=lambda v: float(np.sum(np.minimum(v.weight, 100.0))))

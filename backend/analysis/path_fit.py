@@ -1,0 +1,152 @@
+"""Hold, delay and current loop between the sent set-points and the torque, from the recording.
+
+The sampled torque is what the set-points cause by a short difference equation, and beside a
+closed loop what that makes of the sampled speed. Both are fitted together, line by line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.frf import Record, mean_spectra
+from backend.analysis.sampled_model import SampledFit
+from backend.analysis.sampling import (
+    STEP_LEAD_S,
+    Hold,
+    SignalPath,
+    delay_response,
+    lag_response,
+    sampled_command_response,
+)
+
+#: Set-points are in force after this many cycles at most.
+_MOST_CYCLES = 3.5
+#: Ordinary current loops, in Hz: log of the middle.
+_USUAL_CORNER = float(np.log(1000.0))
+_SLOWEST, _FASTEST = float(np.log(80.0)), float(np.log(6000.0))
+_CORNERS_HZ = np.geomspace(200.0, 5000.0, 6)
+#: What is usual (whole cycles of delay, an ordinary current loop) weighs this much, relative to
+#: the whole torque: it decides only where nothing else does, for above about the sample rate
+#: corner and a fraction of a cycle look alike.
+_WHOLE_CYCLES, _ORDINARY = 2e-3, 1e-4
+_SCALE = 1e4
+#: Speed and its torque are sampled signals: trusted up to about this share of the sample rate.
+_OWN_SHARE = 0.15
+#: Another hold is worth a trial when it leaves less than this multiple unexplained.
+_ALIKE = 3.0
+#: So much stays unexplained by rounding alone.
+_ROUNDING = 1.5e-7
+
+
+def find_paths(
+    records: tuple[Record, ...],
+    path: SignalPath,
+    *,
+    loop_closed: bool,
+    hold_known: bool,
+    motion: SampledFit | None = None,
+) -> tuple[SignalPath, ...]:
+    """The paths that explain the reported torque, best first; one for each hold that may be.
+
+    ``path`` tells what is known: its hold (``hold_known``), its current loop unless None; its
+    delay is only used where no torque was recorded. Interpolation is recognised by the torque
+    alone where the current loop is known or slow; else the mechanics' fit must tell. ``motion``
+    is such a fit with a path found before: it tells how the samples of a closed loop's own torque
+    and of the speed differ from what they are samples of.
+
+    Raises:
+        ValueError: every period has a gap.
+    """
+    if any(r.torque is None for r in records):
+        return (path,)
+    fit = _Fit.of(records, path, loop_closed, motion)
+    holds: tuple[Hold, ...] = (path.hold,) if hold_known else ("zero", "linear")
+    found = sorted((fit.best(hold) for hold in holds), key=lambda t: t[1])
+    least = max(found[0][1], _ROUNDING)
+    return tuple(p for p, cost in found if cost < _ALIKE * least)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Torque and speed per unit of what was sent, [lines]."""
+
+    f: FloatArray
+    torque: ComplexArray
+    velocity: ComplexArray
+    weight: FloatArray
+    path: SignalPath
+    loop_closed: bool
+
+    @staticmethod
+    def of(
+        records: tuple[Record, ...], path: SignalPath, loop_closed: bool, motion: SampledFit | None
+    ) -> _Fit:
+        f, sent, torque, velocity = mean_spectra(records)
+        size = np.sqrt(np.abs(sent) / np.sum(np.abs(sent)))
+        if loop_closed and motion is None:
+            size = size / (1.0 + (f / (_OWN_SHARE * path.sample_rate_hz)) ** 4)
+        elif loop_closed and motion is not None:
+            velocity = velocity * motion.loop_image_factor(f)
+        return _Fit(f, torque / sent, velocity / sent, size, path, loop_closed)
+
+    def best(self, hold: Hold) -> tuple[SignalPath, float]:
+        """The best delay and corner with this hold, and what they leave unexplained."""
+        cycles = np.arange(0.0, _MOST_CYCLES, 0.25)
+        corners = _CORNERS_HZ if self.path.current_bandwidth_hz is None else [None]
+        starts = []
+        for late in cycles:
+            row = [np.array([late] if c is None else [late, np.log(c)]) for c in corners]
+            costs = [float(np.sum(self._rows(x, hold) ** 2)) for x in row]
+            starts.append((min(costs), row[int(np.argmin(costs))]))
+        order = sorted(range(cycles.size), key=lambda n: starts[n][0])
+        whole = [n for n in order if cycles[n] % 1.0 == 0.0]
+        ends = [self._refined(starts[n][1], hold) for n in {*order[:2], *whole[:1]}]
+        x, cost = min(ends, key=lambda end: end[1])
+        return self._path_of(x, hold), cost
+
+    def _refined(self, x0: FloatArray, hold: Hold) -> tuple[FloatArray, float]:
+        low = np.array([max(x0[0] - 0.4, 0.0) - 1e-9, _SLOWEST])[: x0.size]
+        high = np.array([x0[0] + 0.4, _FASTEST])[: x0.size]
+        scale = np.array([0.05, 0.1])[: x0.size]
+
+        def rows(x: FloatArray) -> FloatArray:
+            # The solver takes small numbers for zero.
+            return self._rows(x, hold) * _SCALE
+
+        end = least_squares(rows, x0, bounds=(low, high), x_scale=scale, max_nfev=30)
+        return end.x, 2.0 * float(end.cost) / _SCALE**2
+
+    def _path_of(self, x: FloatArray, hold: Hold) -> SignalPath:
+        """Parameters are cycles of delay and, where it is not known, the log of the corner."""
+        period_s = 1.0 / self.path.sample_rate_hz
+        lead_s = STEP_LEAD_S if hold == "linear" else 0.0
+        late_s = max(float(x[0]) * period_s - lead_s, 0.0)
+        known = self.path.current_bandwidth_hz
+        corner = float(np.exp(x[1])) if known is None else known
+        return replace(self.path, hold=hold, command_delay_s=late_s, current_bandwidth_hz=corner)
+
+    def _rows(self, x: FloatArray, hold: Hold) -> FloatArray:
+        """What is left unexplained, and how unusual the path is."""
+        usual = [_WHOLE_CYCLES * np.sin(np.pi * x[0]) / np.pi]
+        if x.size == 2:
+            usual.append(_ORDINARY * (x[1] - _USUAL_CORNER))
+        return np.concatenate([self._rest(self._path_of(x, hold)), usual])
+
+    def _rest(self, path: SignalPath) -> FloatArray:
+        """What the path leaves unexplained, real and imaginary parts."""
+        error = (self.torque - sampled_command_response(self.f, path)) * self.weight
+        target = np.concatenate([error.real, error.imag])
+        if not self.loop_closed:
+            return target
+        s = 2j * np.pi * self.f
+        own = self.velocity * lag_response(self.f, path.current_bandwidth_hz)
+        own = own * delay_response(self.f, path.loop_delay_s) * self.weight
+        columns = np.column_stack([own, own / s, own / s**2])
+        matrix = np.concatenate([columns.real, columns.imag])
+        matrix = matrix / np.linalg.norm(matrix, axis=0)
+        q, _ = np.linalg.qr(matrix)
+        return np.asarray(target - q @ (q.T @ target))

@@ -1,0 +1,135 @@
+"""What lies between set-points and torque, found again from simulated recordings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drive_sim import TURN, Drive, Mechanics
+from random_axes import RATED_NM, Case, errors, played, result_of
+from scipy.optimize import least_squares
+
+from backend.analysis.frf import Record, estimate_periodic
+from backend.analysis.identify import identify_with_path
+from backend.analysis.path_fit import find_paths
+from backend.analysis.robust_fit import minimise
+from backend.analysis.sampling import SignalPath, sampled_command, sampled_command_response
+
+ONE = Mechanics(loads=((1e-4, 20.0, 0.002),))
+
+
+def case_of(rate, *, late_steps, current_hz=700.0, interpolates=False, loop_hz=0.0, **drive):
+    kp = TURN * loop_hz * ONE.total_kgm2
+    made = Drive(
+        RATED_NM, 3 * RATED_NM, current_hz, kp_nms=kp, ki_nm=kp * TURN * loop_hz / 8,
+        speed_filter_hz=1000.0, command_late_steps=late_steps, interpolates=interpolates, **drive,
+    )  # fmt: skip
+    return Case("one", ONE, made, rate, loop_hz, known_lag=False)
+
+
+def records_of(case):
+    return tuple(
+        Record(s.excitation, r.velocity_rad_s, r.torque_nm, r.valid, r.position_rad)
+        for s, r in played(case)
+    )
+
+
+@pytest.mark.parametrize(
+    ("cycles", "interpolates"), [(0.0, True), (1.0, False), (1.5, False), (2.4, True)]
+)
+def test_hold_delay_and_corner_are_found_where_no_drive_tells_them(cycles, interpolates):
+    case = case_of(4000.0, late_steps=round(5 * cycles), interpolates=interpolates)
+    records = records_of(case)
+    found = identify_with_path(records, SignalPath(4000.0), "torque_mode", hold_known=False)
+    path = found.fit.path
+    assert path.current_bandwidth_hz == pytest.approx(700.0, rel=0.03)
+    # Behind a slow current loop a straight line looks like a late staircase: their mean is told.
+    period_s = 1 / 4000.0
+    mean_s = path.command_delay_s + period_s * (1.0 if path.hold == "linear" else 0.5)
+    true_s = round(5 * cycles) * 50e-6 + (period_s - 25e-6 if interpolates else 0.5 * period_s)
+    assert mean_s + found.fit.delay_s == pytest.approx(true_s, abs=10e-6)
+    e = errors(found.corrected, ONE, 5.0, 1000.0)
+    assert e.magnitude_db < 0.1
+    assert e.phase_deg < 0.5
+
+
+@pytest.mark.parametrize("interpolates", [False, True])
+def test_a_straight_line_is_told_from_a_staircase(interpolates):
+    case = case_of(1000.0, late_steps=20, interpolates=interpolates, current_hz=1000.0)
+    best = find_paths(records_of(case), SignalPath(1000.0), loop_closed=False, hold_known=False)[0]
+    assert best.hold == ("linear" if interpolates else "zero")
+    late_s = 1e-3 - (25e-6 if interpolates else 0.0)
+    assert best.command_delay_s == pytest.approx(late_s, abs=25e-6)
+
+
+@pytest.mark.parametrize("late_steps", [20, 36])
+def test_beside_a_closed_loop_path_and_mechanics_find_each_other(late_steps):
+    case = case_of(1000.0, late_steps=late_steps, loop_hz=15.0)
+    found = identify_with_path(
+        records_of(case), SignalPath(1000.0), "torque_injection", hold_known=False
+    )
+    assert found.fit.path.hold == "zero"
+    assert found.fit.path.command_delay_s == pytest.approx(late_steps * 50e-6, abs=40e-6)
+    assert found.fit.loop.c0 == pytest.approx(case.drive.kp_nms, rel=0.03)
+    e = errors(found.corrected, ONE, 5.0, 200.0)
+    assert e.magnitude_db < 0.4
+    assert e.phase_deg < 3.0
+
+
+def test_the_torque_alone_is_not_asked_where_it_was_not_recorded():
+    records = tuple(replace(r, torque=None) for r in records_of(case_of(4000.0, late_steps=5)))
+    path = SignalPath(4000.0, command_delay_s=1e-3)
+    assert find_paths(records, path, loop_closed=False, hold_known=False) == (path,)
+
+
+@pytest.mark.parametrize("hold", ["zero", "linear"])
+def test_response_of_the_sampled_command_is_that_of_its_samples(hold):
+    path = SignalPath(1000.0, hold, 300.0, 1.3e-3, direct_gain=0.5)
+    period = np.random.default_rng(1).normal(size=200)
+    out = sampled_command(np.tile(period, 3), path)[-200:]
+    f = np.fft.rfftfreq(200, 1e-3)[1:]
+    expected = (np.fft.rfft(out) / np.fft.rfft(period))[1:]
+    assert np.allclose(sampled_command_response(f, path), expected, atol=1e-6)
+
+
+def test_friction_is_found_behind_a_coarse_encoder():
+    """2500 lines: the speed is in steps of 12 rad/s before it is filtered."""
+    case = case_of(4000.0, late_steps=0, counts_per_rev=10_000)
+    path = SignalPath(4000.0, current_bandwidth_hz=700.0, response_bandwidth_hz=1000.0)
+    found = estimate_periodic(records_of(case), path, "torque_mode", coulomb_nm=None)
+    assert found.coulomb_nm == pytest.approx(ONE.coulomb_nm, rel=0.15)
+
+
+def test_a_delay_of_two_and_a_half_cycles_spoils_nothing():
+    case = case_of(1000.0, late_steps=47, current_hz=1500.0)
+    found = result_of(case, played(case))
+    assert found.trusted
+    assert found.delay_s == pytest.approx(47 * 50e-6, abs=40e-6)
+    for low, high, db, deg in ((5.0, 250.0, 0.3, 2.0), (250.0, 400.0, 0.6, 4.0)):
+        e = errors(found.frf, ONE, low, high)
+        assert e.magnitude_db < db
+        assert e.phase_deg < deg
+        assert e.covered >= 0.9
+
+
+def test_minimum_is_that_of_a_general_solver():
+    t = np.linspace(0.0, 3.0, 60)
+    y = 2.0 * np.exp(-1.3 * t) + 0.3
+    y[::9] += 4.0  # outliers
+
+    def both(x):
+        e = np.exp(-x[1] * t)
+        slopes = np.column_stack([e, -x[0] * t * e, np.ones(t.size)])
+        return x[0] * e + x[2] - y, slopes
+
+    low, high = np.array([0.0, 0.1, -1.0]), np.array([5.0, 1.2, 1.0])
+    for top in (3.0, 1.2):  # free, and held by a bound
+        high[1] = top
+        own = minimise(both, np.array([1.0, 0.5, 0.0]), low, high, scale=0.1, steps=100,
+                       cost_tolerance=1e-10, step_tolerance=1e-9)  # fmt: skip
+        other = least_squares(
+            lambda x: both(x)[0], [1.0, 0.5, 0.0], lambda x: both(x)[1], bounds=(low, high),
+            loss="soft_l1", f_scale=0.1, xtol=1e-12, ftol=1e-12,
+        )  # fmt: skip
+        assert own.cost == pytest.approx(other.cost, rel=1e-4)
+        assert own.x == pytest.approx(other.x, abs=2e-3)
+        assert np.all((own.x >= low) & (own.x <= high))
