@@ -17,6 +17,7 @@ from backend import restoring
 from backend.drive import Drive, Reading
 from backend.power import PowerState
 from backend.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.travel_units import TravelUnit
 from backend.units import AxisUnits, read_units
 from drivers import cia402
 from drivers.cia402 import Mode, State
@@ -26,12 +27,22 @@ from profiles.schema import Raw
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """Limits of one motion, in the axis' units: travel from the start point in rev, rpm, %, s."""
+    """Limits of one motion, in the axis' units: travel from the start point in rev, rpm, %, s.
+
+    ``travel_unit`` and ``travel_per_rev`` are the unit of who asked, for what is told to them.
+    """
 
     travel_rev: float
     speed_rpm: float
     torque_percent: float
     time_s: float
+    travel_unit: str = "rev"
+    travel_per_rev: float = 1.0
+
+    @property
+    def shown(self) -> TravelUnit:
+        """The unit for messages."""
+        return TravelUnit(self.travel_unit, self.travel_per_rev)
 
 
 class Axis(PowerState):

@@ -12,6 +12,7 @@ from pathlib import Path
 from backend.access import Leases
 from backend.audit.witness import Witness
 from backend.axis import Axis
+from backend.axis_store import AxisStore
 from backend.cyclic import CyclicSession
 from backend.drive import Drive, Port, Reading
 from backend.drive_list import DriveList, SavedDrive, SavedPort
@@ -75,6 +76,7 @@ class Bench:
         self.on_job.append(self._witness.job_changed)
         self.scope = ScopeHub(lambda drive: self.member(drive).axis)
         self.state_folder = state_folder
+        self.axis_records = AxisStore(state_folder / "axes")
         self._list = DriveList(state_folder / "bench.json")
         self._opening = asyncio.Lock()
 

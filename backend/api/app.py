@@ -39,7 +39,6 @@ from backend.api.models import Problem
 from backend.api.security import Gate
 from backend.api.security_origin import Addresses
 from backend.api.security_socket import OpenSockets
-from backend.axis_store import AxisStore
 from backend.bench import Bench
 from backend.forcing import ForcingSessions
 from backend.people.station import People
@@ -75,7 +74,7 @@ def make_app(
     known = people or People(bench.state_folder)
     sockets = OpenSockets()
     live = LiveHub(bench, known, sockets)
-    axis_store = AxisStore(bench.state_folder / "axes")
+    axis_store = bench.axis_records
     scene = SceneFeed(bench, lambda drive: axis_store.get(drive).mechanics)
 
     @asynccontextmanager

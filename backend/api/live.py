@@ -19,6 +19,7 @@ from pydantic import BaseModel, ValidationError
 
 import backend
 from backend.api import convert
+from backend.api.convert_motion import jog_settings, unit_of
 from backend.api.errors import problem_of
 from backend.api.live_messages import (
     DriveRequest,
@@ -50,8 +51,7 @@ from backend.api.live_shared import Shared, only
 from backend.api.security_messages import require_message
 from backend.api.security_socket import OpenSockets
 from backend.audit.asked import Asked, asked
-from backend.axis import Axis
-from backend.bench import Bench
+from backend.bench import Bench, Member
 from backend.drive import Reading
 from backend.jobs import Job, JobResult, Progress
 from backend.journal import Entry
@@ -59,7 +59,7 @@ from backend.monitor import Snapshot
 from backend.people.identity import Actor, Identity, acting
 from backend.people.station import People
 from backend.tools.cyclic_motion import jog_cyclic
-from backend.tools.jog import Hold, JogSettings, jog
+from backend.tools.jog import Hold, jog
 from drivers.errors import DriveError
 
 #: Messages that wait for a slow page; states, values and drive lists coalesce and do not count.
@@ -397,18 +397,11 @@ class Connection:
         held_before = bench.leases.holder(request.drive) is not None
         bench.leases.take(request.drive, self.id, self.identity.person)
         hold = Hold()
-        settings = JogSettings(
-            direction=request.direction,
-            speed_rpm=request.speed,
-            acceleration_rpm_s=request.acceleration,
-            travel_rev=request.travel_limit,
-            torque_percent=request.torque_limit,
-        )
         try:
             job = bench.jobs.start(
                 "jog",
                 f"Jog {member.drive.name}",
-                lambda progress: _jog_work(member.axis, settings, hold, progress),
+                lambda progress: _jog_work(bench, member, request, hold, progress),
                 drive=request.drive,
                 motion=True,
             )
@@ -433,8 +426,12 @@ class Connection:
             job.task.add_done_callback(ended)
 
 
-async def _jog_work(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress) -> JobResult:
+async def _jog_work(
+    bench: Bench, member: Member, request: JogStart, hold: Hold, progress: Progress
+) -> JobResult:
     """Through the cyclic exchange where it runs, else as a moving target."""
+    axis = member.axis
+    settings = jog_settings(request, await unit_of(bench, member, request.unit))
     if axis.session is not None and axis.session.running:
         return await jog_cyclic(axis, axis.session, settings, hold, progress)
     return await jog(axis, settings, hold, progress)

@@ -66,6 +66,9 @@ class JogStart(Message):
     acceleration: Positive = Field(description="in the axis' acceleration unit")
     travel_limit: Positive = Field(description="greatest distance from where the jog began")
     torque_limit: float = Field(gt=0, le=400, description="% of rated")
+    unit: Literal["rev", "mm", "°"] = Field(
+        default="rev", description="unit of travel; speed is then rpm, mm/s or °/s"
+    )
 
 
 class JogRenew(Message):

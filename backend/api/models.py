@@ -432,8 +432,12 @@ class LoadSetRequest(Message):
     )
 
 
+#: Unit of travel in a motion request; speeds are then rpm, mm/s or °/s. mm and ° need mechanics.
+TravelName = Literal["rev", "mm", "°"]
+
+
 class MoveRequest(Message):
-    """One move in a profile mode. Engineering units of the axis (see AxisState.units)."""
+    """One move in a profile mode, in units of the axis (see AxisState.units) or of its load."""
 
     mode: Literal["PP", "PV", "PT"]
     target: Finite
@@ -449,6 +453,7 @@ class MoveRequest(Message):
         default=False,
         description="PV/PT without a watchdog in the drive: the user agreed to the text",
     )
+    unit: TravelName = Field(default="rev", description="unit of travel; speeds follow it")
 
 
 class SequenceRequest(Message):
@@ -462,10 +467,11 @@ class SequenceRequest(Message):
     count: int = Field(default=5, ge=1, le=100000)
     travel_limit: Positive
     torque_limit: float = Field(gt=0, le=400)
+    unit: TravelName = Field(default="rev", description="unit of travel; speeds follow it")
 
 
 class GenerateRequest(Message):
-    """A test signal in a cyclic mode; amplitude in rev (CSP), rpm (CSV) or % (CST)."""
+    """A test signal in a cyclic mode; amplitude in rev (CSP), rpm (CSV) or %, or by `unit`."""
 
     mode: Literal["CSP", "CSV", "CST"]
     shape: Literal["step", "ramp", "trapezoid", "sine", "chirp"]
@@ -477,6 +483,7 @@ class GenerateRequest(Message):
     travel_limit: Positive
     speed_limit: Positive
     torque_limit: float = Field(gt=0, le=400)
+    unit: TravelName = Field(default="rev", description="unit of travel; speeds follow it")
 
 
 class HomeRequest(Message):
@@ -490,6 +497,7 @@ class HomeRequest(Message):
     travel_limit: Positive
     torque_limit: float = Field(gt=0, le=400)
     timeout_s: float = Field(default=60, gt=0, le=600)
+    unit: TravelName = Field(default="rev", description="unit of travel; speeds follow it")
 
 
 class SetFileInfo(Message):

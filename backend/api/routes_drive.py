@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 
 from fastapi import APIRouter
 
-from backend.api import convert
+from backend.api import convert, convert_motion
 from backend.api.context import Controlled, TheBench, TheMember
 from backend.api.errors import NotFound, problem_of
 from backend.api.models import (
@@ -29,7 +29,6 @@ from backend.api.models import (
     TransitionRequest,
     WriteResult,
 )
-from backend.axis import Envelope
 from backend.bench import Bench, Member
 from backend.drive import Reading
 from backend.jobs import JobResult, Progress
@@ -38,9 +37,6 @@ from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 
 router = APIRouter(prefix="/drives/{drive_id}")
-
-#: Speed limit of an envelope whose request names no speed: margin over the drive's own limits.
-_SPEED_UNLIMITED_RPM = 20_000.0
 
 
 @router.get("/state")
@@ -296,22 +292,8 @@ async def load_set(bench: TheBench, member: Controlled, request: LoadSetRequest)
 @router.post("/jobs/move", status_code=202)
 async def start_move(bench: TheBench, member: Controlled, request: MoveRequest) -> JobInfo:
     """One move in a profile mode."""
-    speed = request.speed or (abs(request.target) if request.mode == "PV" else None)
-    settings = move.MoveSettings(
-        mode=request.mode,
-        target=request.target,
-        envelope=Envelope(
-            request.travel_limit,
-            speed or _SPEED_UNLIMITED_RPM,
-            request.torque_limit,
-            request.timeout_s,
-        ),
-        relative=request.relative,
-        speed_rpm=request.speed,
-        acceleration_rpm_s=request.acceleration,
-        deceleration_rpm_s=request.deceleration,
-        consent=request.consent,
-    )
+    unit = await convert_motion.unit_of(bench, member, request.unit)
+    settings = convert_motion.move_settings(request, unit)
     job = bench.jobs.start(
         "move",
         f"Move {member.drive.name} ({request.mode})",
@@ -325,15 +307,8 @@ async def start_move(bench: TheBench, member: Controlled, request: MoveRequest) 
 @router.post("/jobs/sequence", status_code=202)
 async def start_sequence(bench: TheBench, member: Controlled, request: SequenceRequest) -> JobInfo:
     """Back and forth between two positions."""
-    settings = move.SequenceSettings(
-        first=request.first,
-        second=request.second,
-        speed_rpm=request.speed,
-        acceleration_rpm_s=request.acceleration,
-        dwell_s=request.dwell_s,
-        count=request.count,
-        envelope=Envelope(request.travel_limit, request.speed, request.torque_limit, 60.0),
-    )
+    unit = await convert_motion.unit_of(bench, member, request.unit)
+    settings = convert_motion.sequence_settings(request, unit)
     job = bench.jobs.start(
         "sequence",
         f"Back and forth: {member.drive.name}",
@@ -354,18 +329,8 @@ async def start_generator(bench: TheBench, member: Controlled, request: Generate
             drive=member.drive.name,
             remedy="start it on the Connect page",
         )
-    settings = cyclic_motion.GeneratorSettings(
-        mode=request.mode,
-        shape=request.shape,
-        amplitude=request.amplitude,
-        duration_s=request.duration_s,
-        envelope=Envelope(
-            request.travel_limit, request.speed_limit, request.torque_limit, request.duration_s
-        ),
-        frequency_hz=request.frequency_hz,
-        frequency_end_hz=request.frequency_end_hz,
-        acceleration=request.acceleration,
-    )
+    unit = await convert_motion.unit_of(bench, member, request.unit)
+    settings = convert_motion.generator_settings(request, unit)
     job = bench.jobs.start(
         "generate",
         f"{request.shape} in {request.mode}: {member.drive.name}",
@@ -388,19 +353,8 @@ async def homing_methods(member: TheMember) -> list[HomingMethodInfo]:
 @router.post("/jobs/home", status_code=202)
 async def start_homing(bench: TheBench, member: Controlled, request: HomeRequest) -> JobInfo:
     """Home the axis."""
-    settings = homing.HomingSettings(
-        method=request.method,
-        envelope=Envelope(
-            request.travel_limit,
-            request.speed_switch or _SPEED_UNLIMITED_RPM,
-            request.torque_limit,
-            request.timeout_s,
-        ),
-        speed_switch_rpm=request.speed_switch,
-        speed_zero_rpm=request.speed_zero,
-        acceleration_rpm_s=request.acceleration,
-        offset_rev=request.offset,
-    )
+    unit = await convert_motion.unit_of(bench, member, request.unit)
+    settings = convert_motion.homing_settings(request, unit)
     if request.method not in {m.method for m in member.drive.profile.homing_methods}:
         raise NotAllowed(
             f"{member.drive.name} has no homing method {request.method}",

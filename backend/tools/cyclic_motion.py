@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Literal
@@ -30,6 +30,7 @@ from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
 _RENEW_S = 0.05
 _STATE_TIMEOUT_S = 5.0
 _MAX_S = 120.0
+_PATIENCE = 10
 
 Signal = npt.NDArray[np.float64]
 
@@ -160,18 +161,20 @@ async def generate(
 
 def _require_inside(drive: Drive, settings: GeneratorSettings) -> None:
     envelope = settings.envelope
-    limit, unit = {
-        "CSP": (envelope.travel_rev, "rev"),
-        "CSV": (envelope.speed_rpm, "rpm"),
-        "CST": (envelope.torque_percent, "%"),
-    }[settings.mode]
+    shown = envelope.shown
+    limits: dict[str, tuple[float, Callable[[float], str]]] = {
+        "CSP": (envelope.travel_rev, shown.say),
+        "CSV": (envelope.speed_rpm, shown.say_speed),
+        "CST": (envelope.torque_percent, lambda percent: f"{percent:g} %"),
+    }
+    limit, say = limits[settings.mode]
     if abs(settings.amplitude) > limit:
         raise OutOfRange(
-            f"{drive.name}: an amplitude of {settings.amplitude:g} {unit} is more than the "
-            f"envelope allows ({limit:g} {unit})",
+            f"{drive.name}: an amplitude of {say(settings.amplitude)} is more than the "
+            f"envelope allows ({say(limit)})",
             drive=drive.name,
-            value=settings.amplitude,
-            limit=f"{limit:g} {unit}",
+            value=say(settings.amplitude),
+            limit=say(limit),
             remedy="lower the amplitude or widen the envelope",
         )
 
@@ -266,13 +269,32 @@ async def _play(
     duration_s: float,
     progress: Progress,
 ) -> None:
+    """Until the last value is out, which a computer that misses cycles plays later.
+
+    Raises:
+        NotAllowed: the loop ended it. LinkTimeout: it takes many times as long as it should.
+    """
+    station = trajectory.station
     await session.cyclic.play([trajectory])
     began = time.monotonic()
-    while (elapsed := time.monotonic() - began) < duration_s:
-        await session.cyclic.renew(trajectory.station)
-        _raise_if_ended(session, trajectory.station)
-        progress(elapsed / duration_s, "playing")
-        await asyncio.sleep(min(_RENEW_S, duration_s - elapsed))
+    while (elapsed := time.monotonic() - began) < duration_s or _plays(session, station):
+        if elapsed > _PATIENCE * duration_s + _STATE_TIMEOUT_S:
+            raise LinkTimeout(
+                f"station {station}: a signal of {duration_s:g} s did not end in {elapsed:.0f} s",
+                remedy="look at the link quality: the computer skips many cycles",
+            )
+        await session.cyclic.renew(station)
+        _raise_if_ended(session, station)
+        progress(min(elapsed / duration_s, 1.0), "playing")
+        left_s = duration_s - elapsed
+        await asyncio.sleep(min(_RENEW_S, left_s) if left_s > 0 else _RENEW_S)
+    _raise_if_ended(session, station)
+
+
+def _plays(session: CyclicSession, station: int) -> bool:
+    """Whether values are still to come, where the loop tells."""
+    power = session.power()
+    return power is not None and power.axis_state(station)[1] == "playing"
 
 
 def _raise_if_ended(session: CyclicSession, station: int) -> None:

@@ -75,6 +75,7 @@ async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobR
 async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) -> None:
     drive, units = axis.drive, await axis.units()
     own = drive.profile.quirk("own_status_word") is not None
+    shown = settings.envelope.shown
     homed_bit = 1 << 8 if own else cia402.STATUS_HOMING_ATTAINED
     began = time.monotonic()
     last, travelled = await axis.position_raw(), 0
@@ -108,9 +109,10 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
             travelled += step
         if units.position(travelled) > 2.5 * settings.envelope.travel_rev:
             raise NotAllowed(
-                f"{drive.name} travelled {units.position(travelled):.4g} rev without finding home",
+                f"{drive.name} travelled {shown.say(units.position(travelled))} without finding "
+                "home",
                 drive=drive.name,
-                limit=f"{settings.envelope.travel_rev:g} rev each way",
+                limit=f"{shown.say(settings.envelope.travel_rev)} each way",
                 remedy="check the switch that the method looks for, or widen the travel limit",
             )
         if elapsed > settings.envelope.time_s:

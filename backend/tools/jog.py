@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
+from backend.travel_units import REVOLUTIONS, TravelUnit
 from backend.units import AxisUnits
 from drivers import cia402
 from drivers.cia402 import Mode, State
@@ -35,6 +36,7 @@ class JogSettings:
     acceleration_rpm_s: float
     travel_rev: float
     torque_percent: float
+    shown: TravelUnit = REVOLUTIONS
 
     @property
     def lead_rev(self) -> float:
@@ -124,9 +126,10 @@ def require_scale(axis: Axis, units: AxisUnits, settings: JogSettings) -> None:
         )
     if units.velocity_raw(settings.speed_rpm) <= 0:
         raise OutOfRange(
-            f"{drive.name}: {settings.speed_rpm:g} rpm is below the resolution of its speed",
+            f"{drive.name}: {settings.shown.say_speed(settings.speed_rpm)} is below the "
+            "resolution of its speed",
             drive=drive.name,
-            value=settings.speed_rpm,
+            value=settings.shown.speed(settings.speed_rpm),
             remedy="choose a higher speed",
         )
 
@@ -149,7 +152,7 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
                 drive=drive.name,
                 remedy="see the Alarms page",
             )
-        _inside(axis, position - start, travel, units.position_raw(TRAVEL_MARGIN_REV))
+        _inside(axis, settings, units.position(position - start))
         ahead = start + settings.direction * travel
         target = position + settings.direction * lead
         target = min(target, ahead) if settings.direction > 0 else max(target, ahead)
@@ -187,11 +190,12 @@ async def _observe(axis: Axis) -> tuple[int, State]:
     return values[1], drive.decode_state(values[0])
 
 
-def _inside(axis: Axis, moved: int, travel: int, margin: int) -> None:
-    if abs(moved) > travel + margin:
+def _inside(axis: Axis, settings: JogSettings, moved_rev: float) -> None:
+    if abs(moved_rev) > settings.travel_rev + TRAVEL_MARGIN_REV:
         raise NotAllowed(
             f"{axis.drive.name} left the travel limit of the jog",
             drive=axis.drive.name,
-            limit=f"{travel} increments from the start",
+            value=settings.shown.travel(moved_rev),
+            limit=f"{settings.shown.say(settings.travel_rev)} from the start",
             remedy="check load and gearing; an external force may move the axis",
         )

@@ -135,15 +135,16 @@ def _require_watchdog_or_consent(axis: Axis, consent: bool) -> None:
 async def _ramps(axis: Axis, settings: MoveSettings) -> dict[str, int]:
     """Profile objects and raw values, checked before anything moves."""
     drive, units = axis.drive, await axis.units()
+    shown = settings.envelope.shown
     values: dict[str, int] = {}
     if settings.speed_rpm is not None:
         if settings.speed_rpm > settings.envelope.speed_rpm:
             raise OutOfRange(
-                f"{drive.name}: {settings.speed_rpm:g} rpm is above the envelope's "
-                f"{settings.envelope.speed_rpm:g} rpm",
+                f"{drive.name}: {shown.say_speed(settings.speed_rpm)} is above the envelope's "
+                f"{shown.say_speed(settings.envelope.speed_rpm)}",
                 drive=drive.name,
-                value=settings.speed_rpm,
-                limit=f"{settings.envelope.speed_rpm:g} rpm",
+                value=shown.speed(settings.speed_rpm),
+                limit=shown.say_speed(settings.envelope.speed_rpm),
                 remedy="lower the speed or widen the envelope",
             )
         if settings.mode == "PP":
@@ -167,14 +168,15 @@ def _require_reachable(
     axis: Axis, units: AxisUnits, target: int, start: int, envelope: Envelope
 ) -> None:
     """The target is inside the travel limit and the drive's number range, before enabling."""
-    drive = axis.drive
+    drive, shown = axis.drive, envelope.shown
     if abs(target - start) > units.position_raw(envelope.travel_rev):
+        away = shown.say(units.position(target - start), "+.4g")
         raise OutOfRange(
-            f"{drive.name}: a target {units.position(target - start):+.4g} rev from the start "
-            f"point is outside the travel limit of {envelope.travel_rev:g} rev",
+            f"{drive.name}: a target {away} from the start point is outside the travel limit of "
+            f"{shown.say(envelope.travel_rev)}",
             drive=drive.name,
-            value=units.position(target),
-            limit=f"{envelope.travel_rev:g} rev from the start",
+            value=shown.travel(units.position(target)),
+            limit=f"{shown.say(envelope.travel_rev)} from the start",
             remedy="choose a nearer target or a wider travel limit",
         )
     drive.check(drive.parameter(drive.require("position_target")), target)
@@ -215,7 +217,8 @@ async def _to(
         if time.monotonic() > deadline:
             raise LinkTimeout(
                 f"{drive.name} did not reach its target within {envelope.time_s:g} s: "
-                f"it stands {units.position(position - target):+.4g} rev from it",
+                f"it stands {envelope.shown.say(units.position(position - target), '+.4g')} "
+                "from it",
                 drive=drive.name,
                 remedy="look for a limit, a blocked axis, too little torque or too short a time",
             )
@@ -241,11 +244,16 @@ def _require_inside(axis: Axis, units: AxisUnits, settings: MoveSettings) -> tup
     velocity = settings.mode == "PV"
     limit = envelope.speed_rpm if velocity else envelope.torque_percent
     if abs(settings.target) > limit:
+        shown = envelope.shown
+        target, allowed = (
+            shown.say_speed(each) if velocity else f"{each:g} %"
+            for each in (settings.target, limit)
+        )
         raise OutOfRange(
-            f"{drive.name}: {settings.target:g} is above the envelope's {limit:g}",
+            f"{drive.name}: {target} is above the envelope's {allowed}",
             drive=drive.name,
-            value=settings.target,
-            limit=f"{limit:g} {'rpm' if velocity else '%'}",
+            value=shown.speed(settings.target) if velocity else settings.target,
+            limit=allowed,
             remedy="lower the target or widen the envelope",
         )
     role = "velocity_target" if velocity else "torque_target"
@@ -292,20 +300,21 @@ async def _still_inside(axis: Axis, start: int, envelope: Envelope) -> int:
             remedy="see the Alarms page",
         )
     moved, speed = abs(units.position(position - start)), abs(units.velocity(velocity))
+    shown = envelope.shown
     if moved > envelope.travel_rev * 1.02 + 0.05:
         raise NotAllowed(
-            f"{drive.name} left the travel limit: {moved:.4g} rev from the start",
+            f"{drive.name} left the travel limit: {shown.say(moved)} from the start",
             drive=drive.name,
-            value=moved,
-            limit=f"{envelope.travel_rev:g} rev",
+            value=shown.travel(moved),
+            limit=shown.say(envelope.travel_rev),
             remedy="check load and limits",
         )
     if speed > envelope.speed_rpm * 1.3 + 30:
         raise NotAllowed(
-            f"{drive.name} is faster than the envelope: {speed:.4g} rpm",
+            f"{drive.name} is faster than the envelope: {shown.say_speed(speed)}",
             drive=drive.name,
-            value=speed,
-            limit=f"{envelope.speed_rpm:g} rpm",
+            value=shown.speed(speed),
+            limit=shown.say_speed(envelope.speed_rpm),
             remedy="check load and limits",
         )
     return status

@@ -175,6 +175,33 @@ def test_move_outside_the_envelope_does_not_start(station: Station, x: str) -> N
     assert position(station, x) == pytest.approx(before, abs=0.001)
 
 
+def test_a_move_and_a_jog_typed_in_millimetres(station: Station, x: str, page: Live) -> None:
+    """A screw of 5 mm behind 2:1: 2.5 mm per motor revolution, and answers in mm."""
+    body = {"mode": "PP", "target": 2.5, "relative": True, "speed": 25, "acceleration": 250,
+            "deceleration": 250, "travel_limit": 5, "torque_limit": 200, "unit": "mm"}  # fmt: skip
+    path = f"/drives/{x}/jobs/move"
+    refused = station.http.post(path, json=body)
+    assert refused.status_code == 409
+    assert "mechanics" in refused.json()["detail"]
+    screw = {"mechanics": {"kind": "screw", "lead_mm": 5, "motor_turns": 2}}
+    station.ok(station.http.put(f"/drives/{x}/mechanics", json=screw))
+    before = position(station, x)
+    station.done(station.http.post(path, json=body))
+    assert position(station, x) - before == pytest.approx(1.0, abs=0.01)
+    job = station.job(station.http.post(path, json=body | {"target": 6}))
+    assert (
+        "+6 mm from the start point is outside the travel limit of 5 mm"
+        in (job["problem"]["detail"])
+    )
+    before = position(station, x)
+    start_jog(page, x, speed=25.0, acceleration=250.0, travel_limit=1.25, unit="mm")
+    hold(page, x, 1.0)
+    assert position(station, x) - before == pytest.approx(0.5, abs=0.02)
+    page.send(type="jog_stop", drive=x)
+    page.wait("jog_ended", drive=x)
+    station.ok(station.http.put(f"/drives/{x}/mechanics", json={"mechanics": None}))
+
+
 def test_velocity_needs_consent_where_the_drive_has_no_watchdog(station: Station, x: str) -> None:
     body = {"mode": "PV", "target": 300, "acceleration": 5000, "deceleration": 5000,
             "travel_limit": 10, "torque_limit": 200, "timeout_s": 0.5}  # fmt: skip

@@ -4115,7 +4115,7 @@ export interface components {
         };
         /**
          * GenerateRequest
-         * @description A test signal in a cyclic mode; amplitude in rev (CSP), rpm (CSV) or % (CST).
+         * @description A test signal in a cyclic mode; amplitude in rev (CSP), rpm (CSV) or %, or by `unit`.
          */
         GenerateRequest: {
             /**
@@ -4153,6 +4153,13 @@ export interface components {
             torque_limit: number;
             /** Travel Limit */
             travel_limit: number;
+            /**
+             * Unit
+             * @description unit of travel; speeds follow it
+             * @default rev
+             * @enum {string}
+             */
+            unit: "rev" | "mm" | "°";
         };
         /**
          * GrantView
@@ -4297,6 +4304,13 @@ export interface components {
             torque_limit: number;
             /** Travel Limit */
             travel_limit: number;
+            /**
+             * Unit
+             * @description unit of travel; speeds follow it
+             * @default rev
+             * @enum {string}
+             */
+            unit: "rev" | "mm" | "°";
         };
         /**
          * HomingMethodInfo
@@ -4660,6 +4674,13 @@ export interface components {
              * @constant
              */
             type: "jog_start";
+            /**
+             * Unit
+             * @description unit of travel; speed is then rpm, mm/s or °/s
+             * @default rev
+             * @enum {string}
+             */
+            unit: "rev" | "mm" | "°";
         };
         /**
          * JogStop
@@ -5173,7 +5194,7 @@ export interface components {
         };
         /**
          * MoveRequest
-         * @description One move in a profile mode. Engineering units of the axis (see AxisState.units).
+         * @description One move in a profile mode, in units of the axis (see AxisState.units) or of its load.
          */
         MoveRequest: {
             /** Acceleration */
@@ -5220,6 +5241,13 @@ export interface components {
              * @description greatest distance from the start point
              */
             travel_limit: number;
+            /**
+             * Unit
+             * @description unit of travel; speeds follow it
+             * @default rev
+             * @enum {string}
+             */
+            unit: "rev" | "mm" | "°";
         };
         /**
          * NamedSetup
@@ -6803,6 +6831,13 @@ export interface components {
             torque_limit: number;
             /** Travel Limit */
             travel_limit: number;
+            /**
+             * Unit
+             * @description unit of travel; speeds follow it
+             * @default rev
+             * @enum {string}
+             */
+            unit: "rev" | "mm" | "°";
         };
         /**
          * SerialPort

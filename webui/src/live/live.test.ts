@@ -11,6 +11,7 @@ const start: JogStart = {
   acceleration: 1,
   travel_limit: 1,
   torque_limit: 10,
+  unit: 'rev',
 }
 
 describe('dead man', () => {

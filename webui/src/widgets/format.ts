@@ -1,7 +1,18 @@
 import type { ParameterInfo, Raw } from './types'
 
 /** Decimals that a measured quantity is shown with, so that digits do not dance. */
-const DECIMALS: Record<string, number> = { rev: 4, rpm: 1, '%': 1, V: 1, '°C': 1, 'rpm/s': 0 }
+const DECIMALS: Record<string, number> = {
+  rev: 4,
+  rpm: 1,
+  '%': 1,
+  V: 1,
+  '°C': 1,
+  'rpm/s': 0,
+  mm: 3,
+  '°': 3,
+  'mm/s': 2,
+  '°/s': 2,
+}
 
 /** A live quantity with as many decimals as its unit deserves. */
 export function quantity(value: number | null | undefined, unit: string): string {

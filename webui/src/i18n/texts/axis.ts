@@ -43,6 +43,7 @@ export const axis = {
   'motion.tab.move': ['Move', '移动'],
   'motion.tab.sequence': ['Back and forth', '往复'],
   'motion.tab.homing': ['Homing', '回零'],
+  'motion.unit': ['Type in', '输入单位'],
   'motion.speed': ['Speed', '速度'],
   'motion.acceleration': ['Acceleration', '加速度'],
   'motion.travelLimit': ['Travel limit', '行程限制'],

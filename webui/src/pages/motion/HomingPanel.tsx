@@ -10,27 +10,34 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
 import { HomingPicture } from './HomingPicture'
-import { startValue, useRemembered } from './remembered'
+import { useRemembered } from './remembered'
+import { placeIn, startIn, type TravelUnit } from './travelUnit'
 
 export function HomingPanel({
   drive,
   state,
+  unit,
   onStarted,
 }: {
   drive: string
   state: AxisState | null
+  unit: TravelUnit
   onStarted: (job: string) => void
 }) {
   const t = useT()
   const { open } = useLink()
-  const units = state?.units ?? {}
+  const { units } = unit
   const [methods, setMethods] = useState<HomingMethodInfo[]>([])
   const [number, setNumber] = useState<number | null>(null)
   const [fast, setFast] = useState<number | null>(null)
   const [slow, setSlow] = useState<number | null>(null)
   const [acceleration, setAcceleration] = useState<number | null>(null)
   const [offset, setOffset] = useState<number | null>(null)
-  const [travel, setTravel] = useRemembered(drive, 'home.travel', startValue(units.position, 10))
+  const [travel, setTravel] = useRemembered(
+    drive,
+    placeIn(unit, 'home.travel'),
+    startIn(unit, 'position', 10),
+  )
   const [torque, setTorque] = useRemembered(drive, 'home.torque', 50)
   const [time, setTime] = useRemembered(drive, 'home.time', 60)
   const load = useAction()
@@ -65,6 +72,7 @@ export function HomingPanel({
             travel_limit: travel,
             torque_limit: torque,
             timeout_s: time,
+            unit: unit.name,
           },
         }),
       )

@@ -7,25 +7,42 @@ import { Icon } from '../../widgets/Icon'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
-import { startValue, useRemembered } from './remembered'
+import { useRemembered } from './remembered'
+import { placeIn, startIn, type TravelUnit } from './travelUnit'
 import { type JogSettings, useJog } from './useJog'
 
 /** Hold to run: by mouse, finger or arrow key; whatever ends the hold stops the axis. */
-export function JogPanel({ drive, state }: { drive: string; state: AxisState | null }) {
+export function JogPanel({
+  drive,
+  state,
+  unit,
+}: {
+  drive: string
+  state: AxisState | null
+  unit: TravelUnit
+}) {
   const t = useT()
   const link = useLink()
-  const units = state?.units ?? {}
-  const [speed, setSpeed] = useRemembered(drive, 'jog.speed', startValue(units.velocity, 60))
+  const { units } = unit
+  const [speed, setSpeed] = useRemembered(
+    drive,
+    placeIn(unit, 'jog.speed'),
+    startIn(unit, 'velocity', 60),
+  )
   const [acceleration, setAcceleration] = useRemembered(
     drive,
-    'jog.acceleration',
-    startValue(units.acceleration, 600),
+    placeIn(unit, 'jog.acceleration'),
+    startIn(unit, 'acceleration', 600),
   )
-  const [travel, setTravel] = useRemembered(drive, 'jog.travel', startValue(units.position, 5))
+  const [travel, setTravel] = useRemembered(
+    drive,
+    placeIn(unit, 'jog.travel'),
+    startIn(unit, 'position', 5),
+  )
   const [torque, setTorque] = useRemembered(drive, 'jog.torque', 50)
   const settings: JogSettings | null =
     speed !== null && acceleration !== null && travel !== null && torque !== null
-      ? { speed, acceleration, travel_limit: travel, torque_limit: torque }
+      ? { speed, acceleration, travel_limit: travel, torque_limit: torque, unit: unit.name }
       : null
   const { direction, ended, hold, press } = useJog(drive, settings)
   const taken = direction === null && state?.moving_job != null
@@ -102,10 +119,12 @@ export function JogPanel({ drive, state }: { drive: string; state: AxisState | n
           pad={pad}
         />
         <div className="jog-live">
-          <span className="big num">{quantity(state?.position, units.position ?? '')}</span>
+          <span className="big num">
+            {quantity(shown(state?.position, unit.travel), units.position ?? '')}
+          </span>
           <span className="unit">{units.position}</span>
           <span className="num">
-            {quantity(state?.velocity, units.velocity ?? '')} {units.velocity}
+            {quantity(shown(state?.velocity, unit.speed), units.velocity ?? '')} {units.velocity}
           </span>
           <strong aria-live="polite">
             {direction === null ? t('jog.idle') : t(direction > 0 ? 'jog.plus' : 'jog.minus')}
@@ -132,6 +151,9 @@ export function JogPanel({ drive, state }: { drive: string; state: AxisState | n
     </Panel>
   )
 }
+
+const shown = (value: number | null | undefined, convert: (value: number) => number) =>
+  value == null ? null : convert(value)
 
 function JogButton({
   towards,

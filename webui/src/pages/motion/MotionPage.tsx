@@ -1,5 +1,5 @@
 import { Button, SegmentedControl } from '@mantine/core'
-import { useState } from 'react'
+import { Fragment, useState } from 'react'
 import { api, ask } from '../../api/client'
 import { known, useT } from '../../i18n'
 import { setState, useAxisState, useDrive, useJob } from '../../live/store'
@@ -14,6 +14,7 @@ import { MovePanel } from './MovePanel'
 import { SequencePanel } from './SequencePanel'
 import { SettingsPanel } from './SettingsPanel'
 import { SignalPanel, useCyclic } from './SignalPanel'
+import { useTravelUnit } from './useTravelUnit'
 
 const TABS = ['jog', 'move', 'sequence', 'homing', 'signal', 'settings'] as const
 
@@ -26,6 +27,7 @@ export function MotionPage({ drive }: { drive: string }) {
   const moving = useJob(state?.moving_job ?? null)
   const mine = jobs[drive] ?? null
   const cyclic = useCyclic(summary, state)
+  const { unit, possible, choose } = useTravelUnit(drive, state)
   if (!summary) return null
   const started = (id: string) => setJobs((old) => ({ ...old, [drive]: id }))
   return (
@@ -50,11 +52,34 @@ export function MotionPage({ drive }: { drive: string }) {
               label: t(`motion.tab.${name}`),
             }))}
           />
-          {tab === 'jog' && <JogPanel drive={drive} state={state} />}
-          {tab === 'move' && <MovePanel drive={summary} state={state} onStarted={started} />}
-          {tab === 'sequence' && <SequencePanel drive={drive} state={state} onStarted={started} />}
-          {tab === 'signal' && <SignalPanel drive={summary} state={state} onStarted={started} />}
-          {tab === 'homing' && <HomingPanel drive={drive} state={state} onStarted={started} />}
+          {possible.length > 1 && tab !== 'settings' && (
+            <div className="travel-unit">
+              <span id="travel-unit">{t('motion.unit')}</span>
+              <SegmentedControl
+                aria-labelledby="travel-unit"
+                value={unit.name}
+                disabled={state?.moving_job != null}
+                onChange={choose}
+                data={possible.map((name) => ({ value: name, label: name }))}
+              />
+            </div>
+          )}
+          {/* A number typed in one unit is never left standing in another. */}
+          <Fragment key={unit.name}>
+            {tab === 'jog' && <JogPanel drive={drive} state={state} unit={unit} />}
+            {tab === 'move' && (
+              <MovePanel drive={summary} {...{ state, unit }} onStarted={started} />
+            )}
+            {tab === 'sequence' && (
+              <SequencePanel drive={drive} {...{ state, unit }} onStarted={started} />
+            )}
+            {tab === 'signal' && (
+              <SignalPanel drive={summary} {...{ state, unit }} onStarted={started} />
+            )}
+            {tab === 'homing' && (
+              <HomingPanel drive={drive} {...{ state, unit }} onStarted={started} />
+            )}
+          </Fragment>
           {tab === 'settings' && <SettingsPanel drive={drive} />}
           {moving && moving.id !== mine && moving.kind !== 'jog' && <JobNote id={moving.id} />}
           <JobNote id={mine} onClose={() => started('')} />

@@ -9,7 +9,8 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
-import { startValue, useRemembered } from './remembered'
+import { useRemembered } from './remembered'
+import { placeIn, startIn, type TravelUnit } from './travelUnit'
 
 /** CiA 402 modes of operation that this panel commands. */
 const MODES = { PP: 1, PV: 3, PT: 4 } as const
@@ -18,25 +19,35 @@ type Mode = keyof typeof MODES
 export function MovePanel({
   drive,
   state,
+  unit,
   onStarted,
 }: {
   drive: DriveSummary
   state: AxisState | null
+  unit: TravelUnit
   onStarted: (job: string) => void
 }) {
   const t = useT()
-  const units = state?.units ?? {}
+  const { units } = unit
   const [mode, setMode] = useState<Mode>('PP')
   const [target, setTarget] = useState<number | null>(null)
   const [relative, setRelative] = useState(true)
   const [consent, setConsent] = useState(false)
-  const [speed, setSpeed] = useRemembered(drive.id, 'move.speed', startValue(units.velocity, 60))
+  const [speed, setSpeed] = useRemembered(
+    drive.id,
+    placeIn(unit, 'move.speed'),
+    startIn(unit, 'velocity', 60),
+  )
   const [acceleration, setAcceleration] = useRemembered(
     drive.id,
-    'move.acceleration',
-    startValue(units.acceleration, 600),
+    placeIn(unit, 'move.acceleration'),
+    startIn(unit, 'acceleration', 600),
   )
-  const [travel, setTravel] = useRemembered(drive.id, 'move.travel', startValue(units.position, 10))
+  const [travel, setTravel] = useRemembered(
+    drive.id,
+    placeIn(unit, 'move.travel'),
+    startIn(unit, 'position', 10),
+  )
   const [torque, setTorque] = useRemembered(drive.id, 'move.torque', 50)
   const [time, setTime] = useRemembered(drive.id, 'move.time', 10)
   const start = useAction()
@@ -48,7 +59,7 @@ export function MovePanel({
   }, [key])
   // A drive's watchdog guards the cyclic exchange only, and profile modes run without it.
   const unwatched = mode !== 'PP'
-  const unit = { PP: units.position, PV: units.velocity, PT: units.torque }[mode] ?? ''
+  const targetUnit = { PP: units.position, PV: units.velocity, PT: units.torque }[mode] ?? ''
   const complete =
     target !== null &&
     travel !== null &&
@@ -75,6 +86,7 @@ export function MovePanel({
             torque_limit: torque,
             timeout_s: time,
             consent,
+            unit: unit.name,
           },
         }),
       )
@@ -95,7 +107,12 @@ export function MovePanel({
       />
       <p className="dim">{t(`move.help.${mode}`)}</p>
       <div className="fields">
-        <NumberField label={t('move.target')} unit={unit} value={target} onChange={setTarget} />
+        <NumberField
+          label={t('move.target')}
+          unit={targetUnit}
+          value={target}
+          onChange={setTarget}
+        />
         {mode !== 'PV' && (
           <Speed
             units={units}

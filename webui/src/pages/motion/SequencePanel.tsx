@@ -9,31 +9,42 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
-import { startValue, useRemembered } from './remembered'
+import { useRemembered } from './remembered'
+import { placeIn, startIn, type TravelUnit } from './travelUnit'
 
 /** Back and forth between two absolute positions. */
 export function SequencePanel({
   drive,
   state,
+  unit,
   onStarted,
 }: {
   drive: string
   state: AxisState | null
+  unit: TravelUnit
   onStarted: (job: string) => void
 }) {
   const t = useT()
-  const units = state?.units ?? {}
+  const { units } = unit
   const [first, setFirst] = useState<number | null>(null)
   const [second, setSecond] = useState<number | null>(null)
   const [dwell, setDwell] = useRemembered(drive, 'sequence.dwell', 0.5)
   const [count, setCount] = useRemembered(drive, 'sequence.count', 5)
-  const [speed, setSpeed] = useRemembered(drive, 'sequence.speed', startValue(units.velocity, 60))
+  const [speed, setSpeed] = useRemembered(
+    drive,
+    placeIn(unit, 'sequence.speed'),
+    startIn(unit, 'velocity', 60),
+  )
   const [acceleration, setAcceleration] = useRemembered(
     drive,
-    'sequence.acceleration',
-    startValue(units.acceleration, 600),
+    placeIn(unit, 'sequence.acceleration'),
+    startIn(unit, 'acceleration', 600),
   )
-  const [travel, setTravel] = useRemembered(drive, 'sequence.travel', startValue(units.position, 5))
+  const [travel, setTravel] = useRemembered(
+    drive,
+    placeIn(unit, 'sequence.travel'),
+    startIn(unit, 'position', 5),
+  )
   const [torque, setTorque] = useRemembered(drive, 'sequence.torque', 50)
   const start = useAction()
   useEffect(() => {
@@ -43,7 +54,8 @@ export function SequencePanel({
       setSecond(null)
     }
   }, [drive])
-  const here = state?.fresh && state.position !== null ? Number(state.position.toFixed(4)) : null
+  const here =
+    state?.fresh && state.position !== null ? Number(unit.travel(state.position).toFixed(4)) : null
   const values = [first, second, dwell, count, speed, acceleration, travel, torque]
   const go = () =>
     start.run(async () => {
@@ -70,6 +82,7 @@ export function SequencePanel({
             count,
             travel_limit: travel,
             torque_limit: torque,
+            unit: unit.name,
           },
         }),
       )

@@ -10,7 +10,8 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { Speed, TorqueLimit, TravelLimit } from './fields'
 import { useBuses } from '../connect/useBuses'
-import { startValue, useRemembered } from './remembered'
+import { useRemembered } from './remembered'
+import { placeIn, startIn, type TravelUnit } from './travelUnit'
 
 /** Cyclic synchronous modes of CiA 402 and the quantity that each commands. */
 const MODES = {
@@ -37,15 +38,17 @@ export function useCyclic(drive: DriveSummary | null, state: AxisState | null): 
 export function SignalPanel({
   drive,
   state,
+  unit,
   onStarted,
 }: {
   drive: DriveSummary
   state: AxisState | null
+  unit: TravelUnit
   onStarted: (job: string) => void
 }) {
   const t = useT()
   const { buses } = useBuses()
-  const units = state?.units ?? {}
+  const { units } = unit
   const possible = (Object.keys(MODES) as Mode[]).filter((mode) =>
     state?.modes.includes(MODES[mode].number),
   )
@@ -56,13 +59,21 @@ export function SignalPanel({
   const [frequency, setFrequency] = useState<number | null>(1)
   const [last, setLast] = useState<number | null>(10)
   const [duration, setDuration] = useState<number | null>(5)
-  const [acceleration, setAcceleration] = useRemembered(drive.id, 'signal.acceleration', 10)
+  const [acceleration, setAcceleration] = useRemembered(
+    drive.id,
+    placeIn(unit, 'signal.acceleration'),
+    unit.name === 'rev' ? 10 : Number(unit.travel(10).toPrecision(2)),
+  )
   const [travel, setTravel] = useRemembered(
     drive.id,
-    'signal.travel',
-    startValue(units.position, 5),
+    placeIn(unit, 'signal.travel'),
+    startIn(unit, 'position', 5),
   )
-  const [speed, setSpeed] = useRemembered(drive.id, 'signal.speed', startValue(units.velocity, 300))
+  const [speed, setSpeed] = useRemembered(
+    drive.id,
+    placeIn(unit, 'signal.speed'),
+    startIn(unit, 'velocity', 300),
+  )
   const [torque, setTorque] = useRemembered(drive.id, 'signal.torque', 50)
   const start = useAction()
   const key = `${drive.id} ${mode}`
@@ -99,6 +110,7 @@ export function SignalPanel({
             travel_limit: travel,
             speed_limit: speed,
             torque_limit: torque,
+            unit: unit.name,
           },
         }),
       )

@@ -1,14 +1,5 @@
 import { useEffect, useState } from 'react'
 
-/** Units in which a usual first value means the same on every axis. */
-const USUAL = ['rev', 'rpm', 'rpm/s']
-
-/** A cautious first value, or none where the unit is the drive's own and a number says nothing. */
-export function startValue(unit: string | undefined, value: number): number | null | undefined {
-  if (unit === undefined) return undefined
-  return USUAL.includes(unit) ? value : null
-}
-
 /** A number kept in this browser for one drive. `start` undefined: not known yet. */
 export function useRemembered(
   drive: string,

@@ -3,12 +3,14 @@ import type { JogEnded } from '../../api/schema'
 import * as live from '../../live/live'
 import { contents, subscribe } from '../../live/store'
 import { JogHold } from './jog-hold'
+import type { TravelName } from './travelUnit'
 
 export interface JogSettings {
   speed: number
   acceleration: number
   travel_limit: number
   torque_limit: number
+  unit: TravelName
 }
 
 /** Hold-to-run for one axis. `settings` null: something is not valid, so nothing starts. */

@@ -1,0 +1,20 @@
+import { useState } from 'react'
+import type { AxisState } from '../../api/schema'
+import { useRecord } from '../../widgets/useFunctions'
+import { possibleUnits, type TravelName, travelUnit } from './travelUnit'
+
+/** The unit of an axis' motions, kept in this browser. */
+export function useTravelUnit(drive: string, state: AxisState | null) {
+  const record = useRecord(drive)
+  const place = `servodeck.${drive}.motion.unit`
+  const [choices, setChoices] = useState<Record<string, string>>({})
+  const chosen = choices[place] ?? localStorage.getItem(place) ?? 'rev'
+  return {
+    unit: travelUnit(chosen, record, state),
+    possible: possibleUnits(record, state),
+    choose: (name: TravelName) => {
+      localStorage.setItem(place, name)
+      setChoices((old) => ({ ...old, [place]: name }))
+    },
+  }
+}
