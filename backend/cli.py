@@ -10,13 +10,25 @@ import signal
 import sys
 import tempfile
 from collections.abc import Awaitable, Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from backend.bench import Bench
-from backend.commands import functions, keep, measure, params, people, profile, report
+from backend.commands import (
+    functions,
+    keep,
+    live,
+    measure,
+    params,
+    people,
+    profile,
+    remote_params,
+    report,
+)
+from backend.commands.remote import Server, server_for
 from backend.commands.serve import Serving, state_folder
 from backend.commands.serve import serve as run_server
 from backend.commands.session import opened, run, show_progress
@@ -39,6 +51,8 @@ app.add_typer(keep.library, name="library")
 app.command("backup")(keep.backup)
 app.command("restore")(keep.restore)
 app.add_typer(people.app, name="people")
+app.command("jog")(live.jog)
+app.command("scope")(live.scope)
 app.command("sweep")(measure.sweep)
 app.command("inertia")(measure.inertia)
 app.command("report")(report.report)
@@ -206,34 +220,46 @@ def virtual(
 def scan(
     url: Annotated[str, typer.Argument(metavar="BUS_URL")],
     as_json: Annotated[bool, typer.Option("--json")] = False,
+    server: Server = None,
 ) -> None:
     """Look for drives on a bus."""
 
     async def work() -> None:
-        async with opened(url) as link:
-            found = await link.scan(show_progress, None)
-            if as_json:
-                rows = [
-                    {
-                        "station": f.station, "vendor_id": f.vendor_id,
-                        "product_code": f.product_code, "revision": f.revision,
-                        "serial": f.serial, "name": f.name, "alias": f.alias,
-                        "firmware": f.firmware, "state": f.state, "notes": list(f.notes),
-                        "profiles": [m.profile.drive for m in match_profiles(link.kind, f)],
-                    }
-                    for f in found
-                ]  # fmt: skip
-                print(json.dumps(rows, indent=1))
-                return
-            for f in found:
-                fits = ", ".join(
-                    f"{m.profile.drive} ({m.confidence})" for m in match_profiles(link.kind, f)
-                )
-                print(f"station {f.station}: {f.name or 'no name'}  serial {f.serial}  {fits}")
-            if not found:
-                print("no drive answers: check power, cable, baud rate, parity and address")
+        rows = await _found(url, server)
+        if as_json:
+            print(json.dumps([row | {"profiles": list(fits)} for row, fits in rows], indent=1))
+            return
+        for row, fits in rows:
+            which = ", ".join(f"{name} ({sure})" for name, sure in fits.items())
+            name = row["name"] or "no name"
+            print(f"station {row['station']}: {name}  serial {row['serial']}  {which}")
+        if not rows:
+            print("no drive answers: check power, cable, baud rate, parity and address")
 
     run(work)
+
+
+_FOUND = {
+    "station", "vendor_id", "product_code", "revision", "serial", "name", "alias", "firmware",
+    "state", "notes",
+}  # fmt: skip
+
+
+async def _found(url: str, server: str | None) -> list[tuple[dict[str, object], dict[str, str]]]:
+    """What answers, and the profiles that fit with how sure that is."""
+    if at := server_for(url, server):
+        return [
+            (f.model_dump(include=_FOUND), {m.profile: m.confidence for m in f.matches})
+            for f in await remote_params.scan(at, url)
+        ]
+    async with opened(url) as link:
+        return [
+            (
+                {name: value for name, value in asdict(f).items() if name in _FOUND},
+                {m.profile.drive: m.confidence for m in match_profiles(link.kind, f)},
+            )
+            for f in await link.scan(show_progress, None)
+        ]
 
 
 def main() -> None:

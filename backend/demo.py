@@ -107,9 +107,11 @@ class DemoBench:
             arguments += ["--nvm", str(folder)]
         self.segments[url] = VirtualSegment.start(slave, arguments, namespace)
         launcher = namespace.command(())
+        # Where time follows the frames, a late reply is awaited.
+        patient = self._steady or "--lockstep" in self._segment_options
         self.addresses[url] = f"interface {master} in the network of process {namespace.pid}"
         self.wires[url] = partial(
-            EthercatLink, master, url=url, launcher=launcher, lockstep=1.0 if self._steady else 0.0
+            EthercatLink, master, url=url, launcher=launcher, lockstep=1.0 if patient else 0.0
         )
 
     def command(self, **command: object) -> object:

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
-import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
-import httpx
 import typer
 
 from backend.axis import Axis, Envelope
-from backend.commands.session import drive_at, run, show_progress
+from backend.commands.remote import remote
+from backend.commands.session import drive_at, progress, run
 from backend.cyclic import CyclicSession
 from backend.files import write_atomically
-from backend.jobs import Progress
 from backend.tools import inertia as inertia_tool
 from backend.tools import sweep as sweep_tool
 from backend.tools import sweep_evaluation
-from drivers.errors import DriveError, LinkLost, NotAllowed
+from drivers.errors import NotAllowed
 
 Url = Annotated[str | None, typer.Argument(metavar="[BUS_URL]")]
 Station = Annotated[int, typer.Option(help="station address on the bus")]
@@ -110,7 +107,7 @@ def sweep(
         )  # fmt: skip
         async with _session(url, station, profile, cycle_ms) as (found, session):
             return sweep_evaluation.as_json(
-                await sweep_tool.sweep(found, session, settings, _progress())
+                await sweep_tool.sweep(found, session, settings, progress())
             )
 
     _measure(out, here, "sweep", server, axis, cycle_ms, limits | more)
@@ -153,15 +150,10 @@ def inertia(
         )  # fmt: skip
         async with _session(url, station, profile, cycle_ms) as (found, session):
             return inertia_tool.as_json(
-                await inertia_tool.inertia(found, session, settings, _progress())
+                await inertia_tool.inertia(found, session, settings, progress())
             )
 
     _measure(out, here, "inertia", server, axis, cycle_ms, request)
-
-
-def _progress() -> Progress:
-    progress = Progress(lambda: show_progress(progress.fraction, progress.step))
-    return progress
 
 
 @asynccontextmanager
@@ -226,44 +218,11 @@ async def _through_server(
     server: str, name: str | None, tool: str, cycle_ms: float, request: dict[str, object]
 ) -> dict[str, object]:
     """Run the job on a server and wait for it; its own bus exchange is started where needed."""
-    base = server.rstrip("/") + "/api/v1"
-    try:
-        token = os.environ.get("SERVODECK_TOKEN")
-        headers = {"Authorization": f"Bearer {token}"} if token else {}
-        async with httpx.AsyncClient(base_url=base, timeout=30.0, headers=headers) as http:
-            drives = (await _ok(await http.get("/drives"))).json()
-            drive = next((d for d in drives if name in (d["name"], d["id"])), None)
-            if drive is None:
-                names = ", ".join(str(d["name"]) for d in drives) or "none"
-                raise NotAllowed(f"{server} has no drive {name!r}", value=name, limit=names,
-                                 remedy="give its name with --axis")  # fmt: skip
-            path = f"/drives/{drive['id']}/jobs/{tool}"
-            body = request | {"cycle_ms": cycle_ms}
-            job = (await _ok(await http.post(path, json=body))).json()
-            while job["state"] == "running":
-                await asyncio.sleep(0.2)
-                job = (await _ok(await http.get(f"/jobs/{job['id']}"))).json()
-                show_progress(float(job["progress"]), str(job["step"]))
-    except httpx.HTTPError as error:
-        raise LinkLost(f"{server} cannot be reached: {error}", remedy="is it running?") from error
-    if job["state"] != "done":
-        problem = job.get("problem") or {}
-        raise NotAllowed(str(problem.get("detail") or f"the job was {job['state']}"),
-                         remedy=problem.get("remedy"))  # fmt: skip
-    result: dict[str, object] = job["result"]
-    return result
-
-
-async def _ok(answer: httpx.Response) -> httpx.Response:
-    if answer.is_success:
-        return answer
-    try:
-        problem = answer.json()
-    except ValueError:
-        problem = {}
-    raise DriveError(
-        str(
-            problem.get("detail") or problem.get("title") or f"the server says {answer.status_code}"
-        ),
-        remedy=problem.get("remedy"),
-    )
+    async with remote(server) as at:
+        drives = await at.drives()
+        drive = next((d for d in drives if name in (d.name, d.id)), None)
+        if drive is None:
+            names = ", ".join(d.name for d in drives) or "none"
+            raise NotAllowed(f"{server} has no drive {name!r}", value=name, limit=names,
+                             remedy="give its name with --axis")  # fmt: skip
+        return await at.result(f"/drives/{drive.id}/jobs/{tool}", request | {"cycle_ms": cycle_ms})

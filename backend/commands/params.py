@@ -1,8 +1,7 @@
-"""``servodeck params``: read, write, dump, compare and load parameters without the server."""
+"""``servodeck params``: read, write, dump, compare and load parameters, here or by a server."""
 
 from __future__ import annotations
 
-import math
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,18 +10,22 @@ from typing import Annotated
 import typer
 
 from backend import parameter_set
-from backend.commands.session import drive_at, run, show_progress
+from backend.axis import Axis
+from backend.commands import remote_params
+from backend.commands.remote import Server, server_for
+from backend.commands.session import drive_at, progress, run, show_progress
+from backend.commands.typed import finite
 from backend.drive import Drive, Reading
 from backend.files import write_atomically
 from backend.library import SetLibrary
 from backend.parameter_list import export_list, import_list
 from backend.parameter_set import SUFFIX, Difference
-from backend.tools import parameters
+from backend.tools import parameters, procedures
 from drivers.errors import NotAllowed
 from profiles import load_profile
 from profiles.schema import Parameter, Raw
 
-app = typer.Typer(help="Read and write parameters on a bus, without the server.")
+app = typer.Typer(help="Read and write parameters on a bus, or by a running server.")
 
 Url = Annotated[str, typer.Argument(metavar="BUS_URL")]
 Station = Annotated[int, typer.Option(help="station address on the bus")]
@@ -31,11 +34,15 @@ Profile = Annotated[str | None, typer.Option(help="drive family; recognised wher
 
 @app.command("get")
 def get(
-    url: Url, keys: list[str], station: Station = 1, profile: Profile = None
+    url: Url, keys: list[str], station: Station = 1, profile: Profile = None,
+    server: Server = None,
 ) -> None:  # fmt: skip
     """Read parameters and print them."""
 
     async def work() -> None:
+        if at := server_for(url, server):
+            await remote_params.get(at, url, keys, station, profile)
+            return
         async with drive_at(url, station, profile) as drive:
             readings = await drive.read_many(keys)
             for key in keys:
@@ -52,10 +59,14 @@ def set_(
     station: Station = 1,
     profile: Profile = None,
     raw: Annotated[bool, typer.Option(help="values are raw, not in the parameter's unit")] = False,
+    server: Server = None,
 ) -> None:
     """Write parameters; each is read back and printed."""
 
     async def work() -> None:
+        if at := server_for(url, server):
+            await remote_params.set_(at, url, assignments, station, profile, raw=raw)
+            return
         async with drive_at(url, station, profile) as drive:
             wanted = [_assignment(drive, text) for text in assignments]
             for parameter, value in wanted:
@@ -80,10 +91,17 @@ def dump(
     motor_individual: Annotated[
         bool, typer.Option(help="include values that belong to one motor")
     ] = False,
+    server: Server = None,
 ) -> None:
     """Read all settings and write them as a parameter set."""
 
     async def work() -> None:
+        if at := server_for(url, server):
+            await remote_params.dump(
+                at, url, station, profile, out,
+                author=author, notes=notes, motor_individual=motor_individual,
+            )  # fmt: skip
+            return
         async with drive_at(url, station, profile) as drive:
             wanted = parameter_set.storable(drive.profile, motor_individual=motor_individual)
             keys = [p.key for p in wanted if not drive.unreachable_why(p)]
@@ -96,6 +114,30 @@ def dump(
             else:
                 write_atomically(out, data)
                 print(f"{out}: {sum(r.raw is not None for r in readings.values())} parameters")
+
+    run(work)
+
+
+@app.command("save")
+def save(
+    url: Url, station: Station = 1, profile: Profile = None, server: Server = None
+) -> None:  # fmt: skip
+    """Store the drive's settings in its own memory, which wears with every storing."""
+
+    async def work() -> None:
+        if at := server_for(url, server):
+            await remote_params.save(at, url, station, profile)
+            return
+        async with drive_at(url, station, profile) as drive:
+            known = drive.profile.procedure("save")
+            if known is None:
+                raise NotAllowed(
+                    f"{drive.name} has no procedure that saves: it keeps what is written",
+                    drive=drive.name,
+                    remedy="nothing needs to be done",
+                )
+            await procedures.run_procedure(Axis(drive), known, True, progress())
+            print(f"{drive.name}: saved in the drive's memory")
 
     run(work)
 
@@ -229,23 +271,8 @@ def _assignment(drive: Drive, text: str) -> tuple[Parameter, Raw]:
     try:
         number: Raw = int(value, 0)
     except ValueError:
-        number = _finite(parameter, value)
+        number = finite(parameter.key, parameter.name, value)
     return parameter, number
-
-
-def _finite(parameter: Parameter, text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise NotAllowed(
-            f"{parameter.key} {parameter.name}: {text!r} is not a number",
-            parameter=parameter.key,
-            value=text,
-            remedy="give a number; hexadecimal with 0x",
-        )
-    return number
 
 
 def _line(parameter: Parameter, reading: Reading) -> str:

@@ -12,6 +12,7 @@ from typing import ParamSpec, TypeVar
 import typer
 
 from backend.drive import Drive, Port
+from backend.jobs import Progress
 from backend.matching import match_profiles, profile_for
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link, NeedsProfile
@@ -69,6 +70,12 @@ def show_progress(fraction: float, step: str) -> None:
     if sys.stderr.isatty():
         end = "\n" if fraction >= 1 else ""
         print(f"\r{fraction:5.0%}  {step:60.60}", end=end, file=sys.stderr, flush=True)
+
+
+def progress() -> Progress:
+    """A job's progress, shown as `show_progress` does."""
+    shown = Progress(lambda: show_progress(shown.fraction, shown.step))
+    return shown
 
 
 @asynccontextmanager

@@ -43,13 +43,19 @@ class Station:
         bench_file: Path | None = None,
         segment_options: Sequence[str] = (),
         people: People | None = None,
+        *,
+        steady: bool = False,
     ) -> None:
+        """With ``steady`` replies on EtherCAT are awaited, as in the demo: a busy machine is then
+        no trouble for the drives.
+        """
         self.people = people
         self.loop: asyncio.AbstractEventLoop | None = None
         self.folder = folder
         self.drives = DemoBench(
-            bench_file, folder / "wires", folder / "nvm", segment_options=segment_options
-        )
+            bench_file, folder / "wires", folder / "nvm", segment_options=segment_options,
+            steady=steady,
+        )  # fmt: skip
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
         self.http = httpx.Client()
@@ -98,6 +104,13 @@ class Station:
     def stop(self) -> None:
         self.stop_server()
         self.drives.stop()
+
+    @property
+    def server_thread(self) -> int:
+        """The system's number of the thread that the server runs in."""
+        assert self._thread is not None
+        assert self._thread.native_id is not None
+        return self._thread.native_id
 
     @property
     def url(self) -> str:

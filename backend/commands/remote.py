@@ -1,0 +1,188 @@
+"""A running server, asked from the command line as a page asks it.
+
+The wires of the demo bench belong to the server that made them, and an EtherCAT interface has one
+master: what runs already is asked. A drive is named as on a bus of one's own, by bus URL and
+station; where the server does not have it on its bench yet, it is put there.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Annotated, TypeVar
+
+import httpx
+import typer
+from pydantic import TypeAdapter, ValidationError
+
+from backend.api.models import Bus, DriveSummary, FoundDrive, JobInfo, Problem
+from backend.commands.session import show_progress
+from drivers.errors import DriveError, LinkLost, NotAllowed, ProtocolError
+from drivers.urls import parse_url
+
+T = TypeVar("T")
+
+#: Where `servodeck demo` and `servodeck serve` listen unless told otherwise.
+DEFAULT_SERVER = "http://127.0.0.1:8420"
+_TIMEOUT_S, _LOOK_S = 60.0, 0.1
+
+Server = Annotated[
+    str | None,
+    typer.Option(
+        envvar="SERVODECK_SERVER",
+        help=f"ask this running server, as {DEFAULT_SERVER}, which is asked for virtual buses",
+    ),
+]
+
+
+def server_for(url: str, server: str | None) -> str | None:
+    """The server to ask about a bus; None where the bus is opened here.
+
+    Raises:
+        OutOfRange: no bus URL.
+    """
+    virtual = parse_url(url).is_virtual
+    return server or (DEFAULT_SERVER if virtual else None)
+
+
+class Remote:
+    """One server. Its problems are raised as `DriveError` in its own words."""
+
+    def __init__(self, address: str, http: httpx.AsyncClient) -> None:
+        self.address = address
+        self._http = http
+
+    async def ask(
+        self, method: str, path: str, kind: type[T], *, body: object = None,
+        query: dict[str, str] | None = None,
+    ) -> T:  # fmt: skip
+        """One request and its answer.
+
+        Raises:
+            DriveError: what the server says, or that it cannot be reached.
+        """
+        answer = await self.raw(method, path, body=body, query=query)
+        try:
+            return TypeAdapter(kind).validate_json(answer.content or b"null")
+        except ValidationError as error:
+            raise ProtocolError(
+                f"{self.address} gives an answer of another form to {method} {path}",
+                remedy="use the command line of the server's version",
+            ) from error
+
+    async def raw(
+        self, method: str, path: str, *, body: object = None, query: dict[str, str] | None = None
+    ) -> httpx.Response:
+        """One request; the answer as it came."""
+        try:
+            answer = await self._http.request(method, path, json=body, params=query)
+        except httpx.HTTPError as error:
+            raise LinkLost(
+                f"no server answers at {self.address}: {error}",
+                remedy="start it with `servodeck demo` or `servodeck serve`, or name another one"
+                " with --server",
+            ) from error
+        if not answer.is_success:
+            raise _problem(answer)
+        return answer
+
+    async def result(self, path: str, body: object) -> dict[str, object]:
+        """Start a job and wait for its end; it is cancelled where the waiting is.
+
+        Raises:
+            NotAllowed: it failed or was cancelled; the server's words.
+        """
+        job = await self.ask("POST", path, JobInfo, body=body)
+        try:
+            while job.state == "running":
+                await asyncio.sleep(_LOOK_S)
+                job = await self.ask("GET", f"/jobs/{job.id}", JobInfo)
+                show_progress(job.progress, job.step)
+        except asyncio.CancelledError:
+            await asyncio.shield(self.raw("DELETE", f"/jobs/{job.id}"))
+            raise
+        if job.state != "done":
+            told = job.problem
+            raise NotAllowed(
+                told.detail if told else f"{job.title}: the job was {job.state}",
+                remedy=told.remedy if told else None,
+            )
+        return job.result or {}
+
+    async def drives(self) -> list[DriveSummary]:
+        """Drives of the server's bench."""
+        return await self.ask("GET", "/drives", list[DriveSummary])
+
+    async def scan(self, url: str, stations: list[int] | None = None) -> list[FoundDrive]:
+        """What answers on a bus."""
+        result = await self.result("/scan", {"url": url, "stations": stations})
+        return TypeAdapter(list[FoundDrive]).validate_python(result["found"])
+
+    async def drive(self, url: str, station: int, profile: str | None = None) -> DriveSummary:
+        """The drive at a station; put on the bench where it is not.
+
+        Raises:
+            NotAllowed: nothing answers there, or several families would fit.
+        """
+        wanted = str(parse_url(url))
+        for known in await self.drives():
+            for port in known.ports:
+                if (str(parse_url(port.url)), port.station) == (wanted, station):
+                    return known
+        found = next((f for f in await self.scan(url, [station]) if f.station == station), None)
+        if found is None:
+            raise NotAllowed(
+                f"nothing answers at station {station} of {url}",
+                remedy="check power, cable, station address, baud rate and parity",
+            )
+        sure = [m for m in found.matches if m.confidence != "possible"] or found.matches
+        if profile is None and len(sure) != 1:
+            choices = ", ".join(match.profile for match in found.matches) or "none"
+            raise NotAllowed(f"the drive at station {station} could be: {choices}",
+                             remedy="say which with --profile")  # fmt: skip
+        body = {"url": url, "station": station, "profile": profile or sure[0].profile}
+        return await self.ask("POST", "/drives", DriveSummary, body=body)
+
+    @asynccontextmanager
+    async def exchange(self, url: str, cycle_us: int | None) -> AsyncIterator[None]:
+        """The bus exchanges process data inside the block; where it did before, it goes on after.
+
+        ``cycle_us`` None leaves everything as it is.
+        """
+        buses = await self.ask("GET", "/buses", list[Bus])
+        runs = any(bus.url == url and bus.cyclic is not None for bus in buses)
+        if cycle_us is None or runs:
+            yield
+            return
+        await self.ask("POST", "/buses/cyclic", Bus, body={"url": url, "cycle_us": cycle_us})
+        try:
+            yield
+        finally:
+            await asyncio.shield(self.raw("DELETE", "/buses/cyclic", query={"url": url}))
+
+
+@asynccontextmanager
+async def remote(server: str) -> AsyncIterator[Remote]:
+    """A server for the length of one command; ``SERVODECK_TOKEN`` is shown to it."""
+    address = server.rstrip("/")
+    headers = authorisation()
+    async with httpx.AsyncClient(
+        base_url=f"{address}/api/v1", timeout=_TIMEOUT_S, headers=headers
+    ) as http:
+        yield Remote(address, http)
+
+
+def authorisation() -> dict[str, str]:
+    """The header of the token in the environment, if there is one."""
+    token = os.environ.get("SERVODECK_TOKEN")
+    return {"Authorization": f"Bearer {token}"} if token else {}
+
+
+def _problem(answer: httpx.Response) -> DriveError:
+    try:
+        told = Problem.model_validate_json(answer.content)
+    except ValidationError:
+        return DriveError(f"the server says {answer.status_code}")
+    return DriveError(told.detail or told.title, remedy=told.remedy)

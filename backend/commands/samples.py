@@ -1,0 +1,46 @@
+"""Scope blocks of the live connection, taken apart; `backend.api.live_messages` has the form."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.api.live_scope import BASES, MAGIC, TRUE_TIMES
+from drivers.errors import ProtocolError
+
+_HEADER = struct.Struct("<IIIIHHIdd")
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Times [n] in s and values [n, k]; ``dropped`` samples were lost before them."""
+
+    times_s: npt.NDArray[np.float64]
+    values: npt.NDArray[np.float64]
+    dropped: int
+
+
+def decode(frame: bytes) -> Samples:
+    """One binary frame.
+
+    Raises:
+        ProtocolError: it is no scope block.
+    """
+    try:
+        magic, _sub, _seq, dropped, rows, columns, flags, t0_s, dt_s = _HEADER.unpack_from(frame)
+        at = _HEADER.size if magic == MAGIC else len(frame) + 1
+        times = t0_s + dt_s * np.arange(rows, dtype=np.float64)
+        if flags & TRUE_TIMES:
+            times, at = np.frombuffer(frame, "<f8", rows, at), at + 8 * rows
+        bases = np.zeros(columns)
+        if flags & BASES:
+            bases, at = np.frombuffer(frame, "<f8", columns, at), at + 8 * columns
+        values = np.frombuffer(frame, "<f4", rows * columns, at).reshape(rows, columns)
+    except (struct.error, ValueError) as error:
+        raise ProtocolError(
+            f"the server sent something that is no scope block ({error})"
+        ) from error
+    return Samples(times, values.astype(np.float64) + bases, dropped)
