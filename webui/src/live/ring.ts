@@ -8,6 +8,8 @@ const CHUNK = 64
  */
 export class Ring {
   readonly capacity: number
+  /** Rows from this time on are looked at: a full ring takes nothing in rather than let them go. */
+  keep = Number.POSITIVE_INFINITY
   private times = new Float64Array(FIRST_ROWS)
   private values = new Float64Array(FIRST_ROWS)
   private low: Float64Array
@@ -36,6 +38,7 @@ export class Ring {
     if (this.used > 0 && time < this.time(this.used - 1)) this.clear()
     if (this.used === this.times.length) {
       if (this.times.length < this.capacity) this.grow()
+      else if (this.time(0) >= this.keep) return
       else {
         this.first++
         this.used--

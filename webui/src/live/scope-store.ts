@@ -307,6 +307,10 @@ export class ScopeStore {
   private frame(view: ScopeView): ScopeFrame {
     const newest = this.newest()
     const { from, to } = this.stretch(view, newest)
+    // A picture that stands is not to crumble while somebody talks about it.
+    for (const { ring } of this.rings.values()) {
+      ring.keep = 'from' in view.show ? Math.min(ring.keep, from) : Number.POSITIVE_INFINITY
+    }
     const traces = view.ids.map((id) => this.found(id))
     const over = view.measure === 'shown' ? { from, to } : view.measure
     const now = this.ports.now()

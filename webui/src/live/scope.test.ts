@@ -456,6 +456,22 @@ describe('scope store', () => {
     scope.block(frame({ t0: 10, dt: 0.5, rows: [[0]], sequence: 21 }))
     expect(scope.answer('view', whole).newest).toBe(10)
   })
+  it('keeps a picture that stands, and runs on when it is followed again', () => {
+    const { store: scope } = store()
+    scope.configure(config(source('c1', 'a')))
+    const rows = new Array<number[]>(32_000).fill([1])
+    const send = (i: number) => scope.block(frame({ t0: i * 32, dt: 0.001, rows, sequence: i + 1 }))
+    const shown = (show: ScopeView['show']) =>
+      scope.answer('view', { ...view, ids: ['c1'], show, measure: 'shown' }).measurements?.[0]
+    send(0)
+    expect(shown({ from: 10, to: 20 })?.count).toBe(10_001)
+    // 320 s are kept; these are 384.
+    for (let i = 1; i < 12; i++) send(i)
+    expect(shown({ from: 10, to: 20 })?.count).toBe(10_001)
+    shown({ window: 1 })
+    for (let i = 12; i < 23; i++) send(i)
+    expect(shown({ from: 10, to: 20 })).toBeNull()
+  })
   it('shows what would lie before the trigger while it waits for one', () => {
     const { store: scope } = store()
     scope.configure(config(source('c1', 'a')))
