@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import secrets
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -81,6 +82,8 @@ class JobRunner:
         self._permit = permit
         self._jobs: dict[str, Job] = {}
         self._numbers = itertools.count(1)
+        # A page outlives a restart of the server: its old jobs must not be taken for new ones.
+        self._run_mark = secrets.token_hex(3)
         self._changed = changed
         self._last_told: dict[str, float] = {}
 
@@ -123,7 +126,7 @@ class JobRunner:
         if motion and drive is not None:
             self._permit(drive)
         job = Job(
-            id=f"{kind}-{next(self._numbers)}",
+            id=f"{kind}-{self._run_mark}-{next(self._numbers)}",
             kind=kind,
             title=title,
             drive=drive,

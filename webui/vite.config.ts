@@ -1,8 +1,26 @@
+import { readdirSync, readFileSync, writeFileSync } from 'node:fs'
+import { join } from 'node:path'
+import { gzipSync } from 'node:zlib'
 import react from '@vitejs/plugin-react'
 import { defineConfig } from 'vitest/config'
 
+/** A packed copy of each asset beside it: the server sends it as it is (backend/api/app.py). */
+function packed() {
+  return {
+    name: 'packed',
+    apply: 'build' as const,
+    writeBundle(options: { dir?: string | undefined }) {
+      const folder = join(options.dir ?? 'dist', 'assets')
+      for (const name of readdirSync(folder).filter((each) => /\.(js|css)$/.test(each))) {
+        const file = join(folder, name)
+        writeFileSync(`${file}.gz`, gzipSync(readFileSync(file), { level: 9 }))
+      }
+    },
+  }
+}
+
 export default defineConfig({
-  plugins: [react()],
+  plugins: [react(), packed()],
   base: './',
   build: {
     target: 'es2022',

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import mimetypes
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from fastapi import APIRouter, FastAPI, Response, WebSocket
+from fastapi import APIRouter, FastAPI, Request, Response, WebSocket
 from fastapi.responses import FileResponse
 from fastapi.routing import APIRoute
 
@@ -176,7 +177,7 @@ def _add_page(app: FastAPI) -> None:
     folder = next((f for f in _PAGE_FOLDERS if (f / "index.html").is_file()), None)
 
     @app.get("/{path:path}", include_in_schema=False)
-    async def page(path: str) -> Response:
+    async def page(path: str, request: Request) -> Response:
         if path.startswith("api/"):
             raise NotFound(f"there is nothing at /{path}", remedy=f"see {PREFIX}/openapi.json")
         if folder is None:
@@ -190,7 +191,13 @@ def _add_page(app: FastAPI) -> None:
             # Assets carry a hash of their contents in the name.
             forever = "public, max-age=31536000, immutable"
             cache = forever if path.startswith("assets/") else "no-cache"
-            return FileResponse(wanted, headers={"Cache-Control": cache})
+            headers = {"Cache-Control": cache, "Vary": "Accept-Encoding"}
+            packed = wanted.with_name(f"{wanted.name}.gz")
+            if "gzip" in request.headers.get("accept-encoding", "") and packed.is_file():
+                headers["Content-Encoding"] = "gzip"
+                kind = mimetypes.guess_type(wanted.name)[0]
+                return FileResponse(packed, headers=headers, media_type=kind)
+            return FileResponse(wanted, headers=headers)
         if path.startswith("assets/"):
             raise NotFound(f"there is no {path}")
         return FileResponse(folder / "index.html", headers={"Cache-Control": "no-cache"})

@@ -1,4 +1,4 @@
-import '@mantine/core/styles.css'
+import './app/library-styles'
 import './app/style.css'
 import './app/people.css'
 import { StrictMode } from 'react'

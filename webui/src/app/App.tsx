@@ -1,60 +1,27 @@
 import { MantineProvider } from '@mantine/core'
-import { Component, type ReactNode, useEffect } from 'react'
+import { Component, type ReactNode, Suspense, useEffect } from 'react'
 import { useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useDrives, useLink } from '../live/store'
-import { AlarmsPage } from '../pages/alarms/AlarmsPage'
-import { AuditPage } from '../pages/audit/AuditPage'
-import { ConnectPage } from '../pages/connect/ConnectPage'
-import { FilesPage } from '../pages/files/FilesPage'
-import { GainsPage } from '../pages/gains/GainsPage'
-import { IoPage } from '../pages/io/IoPage'
-import { MotionPage } from '../pages/motion/MotionPage'
-import { OverviewPage } from '../pages/overview/OverviewPage'
-import { ParametersPage } from '../pages/parameters/ParametersPage'
-import { PeoplePage } from '../pages/people/PeoplePage'
-import { RerunPage } from '../pages/rerun/RerunPage'
-import { ScenePage } from '../pages/scene/ScenePage'
-import { ResponsePage } from '../pages/response/ResponsePage'
-import { ScopePage } from '../pages/scope/ScopePage'
-import { SetupPage } from '../pages/setup/SetupPage'
-import { TunePage } from '../pages/tune/TunePage'
 import { Frame } from './Frame'
+import { AXIS, BENCH, fetchAhead } from './pages'
 import { isAxisPage, useRoute } from './router'
 import { SessionGate } from './SessionGate'
+import { StopButton } from './StopButton'
 import { theme } from './theme'
 
 export function App() {
   return (
     <MantineProvider theme={theme} defaultColorScheme="auto">
       <SessionGate>
-        <Frame>
-          <Page />
-        </Frame>
+        <Guard stop>
+          <Frame>
+            <Page />
+          </Frame>
+        </Guard>
       </SessionGate>
     </MantineProvider>
   )
-}
-
-const AXIS = {
-  overview: OverviewPage,
-  parameters: ParametersPage,
-  motion: MotionPage,
-  tune: TunePage,
-  response: ResponsePage,
-  gains: GainsPage,
-  setup: SetupPage,
-  io: IoPage,
-  alarms: AlarmsPage,
-}
-const BENCH = {
-  connect: ConnectPage,
-  scope: ScopePage,
-  rerun: RerunPage,
-  scene: ScenePage,
-  files: FilesPage,
-  audit: AuditPage,
-  people: PeoplePage,
 }
 
 function Page() {
@@ -62,12 +29,17 @@ function Page() {
   const { page, drive } = useRoute()
   const drives = useDrives()
   const { open } = useLink()
+  const chosen = drive ?? drives?.[0]?.id ?? null
+  const there = drives?.some((each) => each.id === chosen) ?? false
   useEffect(() => {
     // The descriptions tell which pages an axis has; they do not change while it is connected.
-    if (open && drive && drives?.some((each) => each.id === drive) && !contents.rows.has(drive)) {
-      void live.loadRows(drive).catch(() => {})
+    if (open && chosen && there && !contents.rows.has(chosen)) {
+      void live.loadRows(chosen).catch(() => {})
     }
-  }, [drive, drives, open])
+  }, [chosen, there, open])
+  useEffect(() => {
+    if (open) fetchAhead()
+  }, [open])
   if (!isAxisPage(page)) {
     const Shown = BENCH[page]
     return (
@@ -95,7 +67,10 @@ function Page() {
 }
 
 /** A defect in one page must not take STOP away with it. */
-class Guard extends Component<{ children: ReactNode }, { error: Error | null }> {
+class Guard extends Component<
+  { children: ReactNode; stop?: boolean },
+  { error: Error | null }
+> {
   override state = { error: null as Error | null }
 
   static getDerivedStateFromError(error: Error) {
@@ -103,8 +78,24 @@ class Guard extends Component<{ children: ReactNode }, { error: Error | null }> 
   }
 
   override render() {
-    return this.state.error ? <Broken error={this.state.error} /> : this.props.children
+    return this.state.error ? (
+      <>
+        {this.props.stop && <StopButton />}
+        <Broken error={this.state.error} />
+      </>
+    ) : (
+      <Suspense fallback={<Loading />}>{this.props.children}</Suspense>
+    )
   }
+}
+
+function Loading() {
+  const t = useT()
+  return (
+    <p className="empty" role="status">
+      {t('loading')}
+    </p>
+  )
 }
 
 function Broken({ error }: { error: Error }) {
@@ -116,6 +107,9 @@ function Broken({ error }: { error: Error }) {
           <strong>{t('broken.title')}</strong> {error.message}
         </p>
         <p>{t('broken.text')}</p>
+        <button type="button" className="plain" onClick={() => window.location.reload()}>
+          {t('broken.reload')}
+        </button>
       </div>
     </div>
   )

@@ -1,8 +1,9 @@
 import { ActionIcon, Drawer, NativeSelect } from '@mantine/core'
-import { type ReactNode, useEffect, useState } from 'react'
+import { type ReactNode, useEffect, useLayoutEffect, useState } from 'react'
 import { known, useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '../live/store'
+import { clock } from '../widgets/format'
 import { Icon } from '../widgets/Icon'
 import {
   AXIS_PAGES,
@@ -22,6 +23,10 @@ import { linkLook, stateLook } from './states'
 import { useCanTune } from './useCanTune'
 import { useHasIo } from './useHasIo'
 
+/** What a thumb reaches on a phone: with an axis, and before there is one. */
+const HANDY = ['overview', 'parameters', 'motion', 'scope', 'alarms'] as const
+const EMPTY_BENCH = ['connect', 'files', 'people'] as const
+
 /** What surrounds every page: axis, state, link, control, STOP, and the way to the pages. */
 export function Frame({ children }: { children: ReactNode }) {
   const t = useT()
@@ -34,8 +39,19 @@ export function Frame({ children }: { children: ReactNode }) {
       drives: (drives ?? []).map((each) => each.id).slice(0, 64),
     })
   }, [drives?.map((each) => each.id).join(' ')])
+  const chosen = useChosen()
   const key = `${page} ${drive}`
   useEffect(() => setOpen(false), [key])
+  // Each page from its top, not from where the one before it was left.
+  useLayoutEffect(() => {
+    document.getElementById('main')?.scrollTo(0, 0)
+  }, [key])
+  const axis = useDrive(isAxisPage(page) ? drive : null)
+  useEffect(() => {
+    // Tabs, bookmarks and screen readers tell pages apart by it.
+    const names = [axis?.name, t(`page.${page}`), 'servodeck']
+    document.title = names.filter(Boolean).join(' · ')
+  }, [axis?.name, page, t(`page.${page}`)])
   return (
     <div className="frame">
       <button
@@ -54,7 +70,7 @@ export function Frame({ children }: { children: ReactNode }) {
         <div className="top-status">
           <StateBadge />
           <LinkBadge />
-          <LeaseControl drive={useChosen()} />
+          <LeaseControl drive={chosen} />
         </div>
         <div className="wide-only">
           <Preferences />
@@ -85,7 +101,7 @@ export function Frame({ children }: { children: ReactNode }) {
       </main>
       <PointerLayer />
       <nav className="bottom" aria-label={t('frame.pages')}>
-        {(['overview', 'parameters', 'motion', 'scope', 'alarms'] as const).map((name) => (
+        {(chosen === null ? EMPTY_BENCH : HANDY).map((name) => (
           <PageLink key={name} name={name} short />
         ))}
       </nav>
@@ -95,8 +111,8 @@ export function Frame({ children }: { children: ReactNode }) {
 
 function Pages() {
   const t = useT()
-  const { drive } = useRoute()
   const drives = useDrives() ?? []
+  const drive = useChosen()
   const hasIo = useHasIo(drive)
   const canTune = useCanTune(drive)
   const offered = (name: Page) =>
@@ -104,9 +120,11 @@ function Pages() {
   return (
     <>
       <h2>{t('frame.axes')}</h2>
-      {drives.map((each) => (
-        <AxisEntry key={each.id} id={each.id} />
-      ))}
+      <div className="axes">
+        {drives.map((each) => (
+          <AxisEntry key={each.id} id={each.id} />
+        ))}
+      </div>
       {drives.length === 0 && <p className="dim">{t('frame.noAxes')}</p>}
       <h2>{t('frame.axisPages')}</h2>
       {AXIS_PAGES.filter(offered).map((name) => (
@@ -247,7 +265,8 @@ function ConnectionLost() {
   return (
     <div className={`banner ${contents.everOpen ? 'fault' : 'ready'}`} role="alert">
       <strong>{t(contents.everOpen ? 'lost.title' : 'lost.opening')}</strong>{' '}
-      {contents.everOpen && t('lost.text', { attempt: link.attempt })}
+      {contents.lostAt !== null &&
+        t('lost.text', { attempt: link.attempt, time: clock(contents.lostAt) })}
     </div>
   )
 }

@@ -8,6 +8,7 @@ export function Preferences() {
   const t = useT()
   const language = useLanguage()
   const session = useSession()
+  const zone = Intl.DateTimeFormat().resolvedOptions().timeZone
   const { colorScheme, setColorScheme } = useMantineColorScheme()
   return (
     <Menu position="bottom-end" zIndex={260}>
@@ -38,6 +39,7 @@ export function Preferences() {
             {t(`language.${each}`)}
           </Menu.Item>
         ))}
+        <Menu.Label>{t('frame.times', { zone })}</Menu.Label>
         {session?.login_required && session.person !== null && (
           <>
             <Menu.Label>{t('door.in', { name: session.person ?? '' })}</Menu.Label>

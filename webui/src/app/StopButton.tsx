@@ -17,8 +17,14 @@ export function StopButton() {
         className="stop"
         // Down, not click: a finger that slides off the button has still asked for a stop.
         onPointerDown={() => void stopEverything()}
+        // Voice control and screen readers press with a click alone, which counts no presses.
+        onClick={(event) => {
+          if (event.detail === 0) void stopEverything()
+        }}
         onKeyDown={(event) => {
-          if ((event.key === 'Enter' || event.key === ' ') && !event.repeat) void stopEverything()
+          if (event.key !== 'Enter' && event.key !== ' ') return
+          event.preventDefault() // the key's own click would come second
+          if (!event.repeat) void stopEverything()
         }}
         title={t('stop.help')}
         aria-label={t('stop.help')}

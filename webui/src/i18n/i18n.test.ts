@@ -31,13 +31,44 @@ const NEUTRAL = /^(servodeck|[^\p{L}]*|[AB]|B−A|ms|s|Hz|0x|rpm|\/s|1\/Δt)$/u
 
 const entries = Object.entries(catalogue)
 
-function sources(folder: string): string[] {
+function sources(folder: string, wanted: RegExp): string[] {
   return readdirSync(folder, { withFileTypes: true }).flatMap((entry) =>
     entry.isDirectory()
-      ? sources(join(folder, entry.name))
-      : entry.name.endsWith('.tsx')
+      ? sources(join(folder, entry.name), wanted)
+      : wanted.test(entry.name)
         ? [join(folder, entry.name)]
         : [],
+  )
+}
+
+/** Which keys a file can ask for: written in full, put together, or by `known(t, prefix, …)`. */
+function asked(code: string): { whole: Set<string>; made: RegExp[] } {
+  const tree = ts.createSourceFile('x.tsx', code, ts.ScriptTarget.ES2022, true, ts.ScriptKind.TSX)
+  const whole = new Set<string>()
+  const made: RegExp[] = []
+  const quoted = (text: string) => text.replace(/[.*+?^${}()|[\]\\]/g, '\\$&')
+  const visit = (node: ts.Node) => {
+    if (ts.isStringLiteralLike(node)) whole.add(node.text)
+    if (ts.isTemplateExpression(node) && node.head.text.includes('.')) {
+      const parts = [node.head.text, ...node.templateSpans.map((span) => span.literal.text)]
+      made.push(new RegExp(`^${parts.map(quoted).join('.+')}$`, 'u'))
+    }
+    if (ts.isCallExpression(node) && node.expression.getText() === 'known') {
+      const prefix = node.arguments[1]
+      if (prefix && ts.isStringLiteral(prefix)) made.push(new RegExp(`^${quoted(prefix.text)}\\.`))
+    }
+    ts.forEachChild(node, visit)
+  }
+  visit(tree)
+  return { whole, made }
+}
+
+function unused(codes: string[]): string[] {
+  const found = codes.map(asked)
+  const whole = new Set(found.flatMap((each) => [...each.whole]))
+  const made = found.flatMap((each) => each.made)
+  return Object.keys(catalogue).filter(
+    (key) => !whole.has(key) && !made.some((pattern) => pattern.test(key)),
   )
 }
 
@@ -109,7 +140,9 @@ describe('the catalogue', () => {
 
 describe('the markup', () => {
   it('has no words of its own', () => {
-    const found = sources(SOURCE).flatMap((file) => bareStrings(file, readFileSync(file, 'utf-8')))
+    const found = sources(SOURCE, /\.tsx$/).flatMap((file) =>
+      bareStrings(file, readFileSync(file, 'utf-8')),
+    )
     expect(found).toEqual([])
     // Parses every page; a busy machine takes its time.
   }, 60_000)
@@ -118,5 +151,21 @@ describe('the markup', () => {
     expect(bareStrings('x.tsx', '<input placeholder="Name" />')).toHaveLength(1)
     expect(bareStrings('x.tsx', '<p>{ok ? "All good here" : ""}</p>')).toHaveLength(1)
     expect(bareStrings('x.tsx', '<p>{t("close")} · 3 ms</p>')).toEqual([])
+  })
+})
+
+describe('the keys', () => {
+  it('are all used', () => {
+    // Not the catalogue's own files, the description of the interface, or tests.
+    const files = sources(SOURCE, /\.tsx?$/).filter(
+      (file) => !/\/texts\/|\.test\.ts$|\.d\.ts$/.test(file),
+    )
+    expect(unused(files.map((file) => readFileSync(file, 'utf-8')))).toEqual([])
+  }, 60_000)
+  it('would be missed', () => {
+    const left = unused(["t('close')", 't(`page.${name}`)', "known(t, 'state', word)"])
+    expect(left).toContain('cancel')
+    expect(left).not.toContain('close')
+    expect(left.some((key) => key.startsWith('page.') || key.startsWith('state.'))).toBe(false)
   })
 })

@@ -14,10 +14,17 @@ function initial(): Language {
   return globalThis.navigator?.language.startsWith('zh') ? 'zh' : 'en'
 }
 
+// Screen readers and hyphenation go by this; index.html cannot know the stored language.
+if (globalThis.document) mark(language)
+
+function mark(to: Language): void {
+  document.documentElement.lang = to === 'zh' ? 'zh-Hans' : 'en'
+}
+
 export function setLanguage(next: Language): void {
   language = next
   globalThis.localStorage?.setItem(STORED, next)
-  document.documentElement.lang = next === 'zh' ? 'zh-Hans' : 'en'
+  mark(next)
   for (const listener of listeners) listener()
 }
 

@@ -50,8 +50,11 @@ export function askScope<Kind extends QuestionKind>(
  * it: every connection begins with one, and an answer fetched here could be older.
  */
 async function refresh(): Promise<void> {
+  const before = store.runningJobs()
   try {
-    for (const job of await ask(api.GET('/api/v1/jobs'))) store.setJob(job)
+    const jobs = await ask(api.GET('/api/v1/jobs'))
+    for (const job of jobs) store.setJob(job)
+    store.endForgotten(before, jobs)
     for (const id of store.contents.rows.keys()) void loadRows(id)
   } catch {
     // The connection went again; its banner is already shown and the next one comes here.
@@ -140,9 +143,7 @@ worker.onmessage = (event: MessageEvent<FromWorker>) => {
     case 'link':
       if (!answer.state.open) setConnection(null)
       if (!answer.state.open && answer.state.attempt > 0) onRefused()
-      store.contents.link = answer.state
-      store.contents.everOpen ||= answer.state.open
-      store.publish('link')
+      store.setLink(answer.state, Date.now())
       break
     case 'message':
       receive(answer.message)

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest'
 import type { AxisState, JobInfo, ParameterValue } from '../api/schema'
-import { contents, setJob, setReadings, setState } from './store'
+import { contents, endForgotten, FORGOTTEN, setJob, setLink, setReadings, setState } from './store'
 
 const job = (state: JobInfo['state']): JobInfo => ({
   id: 'j1',
@@ -43,5 +43,33 @@ describe('the store', () => {
     setState(state('2026-01-01T00:00:02Z', 'Fault'))
     setState(state('2026-01-01T00:00:01Z', 'Operation enabled'))
     expect(contents.states.get('x')?.state).toBe('Fault')
+  })
+  it('takes nothing for current once the connection is lost, until the server says it again', () => {
+    const open = { open: true, attempt: 0, roundTripMs: null }
+    const state = (time: string) =>
+      ({ drive: 'y', time, state: 'Operation enabled', fresh: true }) as AxisState
+    setLink(open, 1000)
+    setState(state('2026-01-01T00:00:01Z'))
+    setLink({ ...open, open: false, attempt: 1 }, 2000)
+    setLink({ ...open, open: false, attempt: 2 }, 3000)
+    expect(contents.states.get('y')?.fresh).toBe(false)
+    expect(contents.lostAt).toBe(2000)
+    setLink(open, 4000)
+    expect(contents.lostAt).toBeNull()
+    expect(contents.states.get('y')?.fresh).toBe(false)
+    setState(state('2026-01-01T00:00:05Z'))
+    expect(contents.states.get('y')?.fresh).toBe(true)
+  })
+  it('ends jobs that the server has forgotten, and no others', () => {
+    setJob({ ...job('running'), id: 'old' })
+    setJob({ ...job('running'), id: 'kept' })
+    setJob({ ...job('running'), id: 'begun since' })
+    endForgotten(['old', 'kept'], [{ ...job('running'), id: 'kept' }])
+    expect(contents.jobs.get('old')).toMatchObject({
+      state: 'failed',
+      problem: { type: FORGOTTEN },
+    })
+    expect(contents.jobs.get('kept')?.state).toBe('running')
+    expect(contents.jobs.get('begun since')?.state).toBe('running')
   })
 })

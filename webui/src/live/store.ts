@@ -17,6 +17,8 @@ import type { LinkState } from './socket'
 interface Contents {
   link: LinkState
   everOpen: boolean
+  /** When the connection was lost; null while there is one. What is shown is from then. */
+  lostAt: number | null
   connection: string | null
   drives: DriveSummary[] | null
   jobs: Map<string, JobInfo>
@@ -32,10 +34,13 @@ interface Contents {
 }
 
 const LOG_LENGTH = 500
+/** Type of the problem of a job that the server has forgotten. */
+export const FORGOTTEN = 'urn:servodeck:page:forgotten'
 
 export const contents: Contents = {
   link: { open: false, attempt: 0, roundTripMs: null },
   everOpen: false,
+  lostAt: null,
   connection: null,
   drives: null,
   jobs: new Map(),
@@ -88,6 +93,21 @@ export const useRows = (drive: string) =>
 export const useReadings = (drive: string) =>
   useStore(`values ${drive}`, () => contents.readings.get(drive) ?? null)
 
+/** Keep word of the connection. Without one nothing that was said before is current any more. */
+export function setLink(link: LinkState, now: number): void {
+  contents.link = link
+  contents.everOpen ||= link.open
+  if (link.open) contents.lostAt = null
+  else if (contents.everOpen && contents.lostAt === null) {
+    contents.lostAt = now
+    for (const state of contents.states.values()) {
+      contents.states.set(state.drive, { ...state, fresh: false, problem: '' })
+      publish(`state ${state.drive}`)
+    }
+  }
+  publish('link')
+}
+
 export function setDrives(drives: DriveSummary[]): void {
   contents.drives = drives
   publish('drives')
@@ -106,6 +126,19 @@ export function setJob(job: JobInfo): void {
   if (known && known.state !== 'running' && job.state === 'running') return
   contents.jobs = new Map(contents.jobs).set(job.id, job)
   publish('jobs')
+}
+
+export const runningJobs = () =>
+  [...contents.jobs.values()].filter((job) => job.state === 'running').map((job) => job.id)
+
+/** Jobs that ran at `before` and that the server does not know any more: it was restarted. */
+export function endForgotten(before: string[], known: JobInfo[]): void {
+  for (const id of before) {
+    const job = contents.jobs.get(id)
+    if (!job || job.state !== 'running' || known.some((each) => each.id === id)) continue
+    const problem = { type: FORGOTTEN, title: job.title, status: 0, detail: '' }
+    setJob({ ...job, state: 'failed', ended: new Date().toISOString(), problem })
+  }
 }
 
 export function setRows(drive: string, rows: ParameterRow[]): void {

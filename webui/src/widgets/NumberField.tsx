@@ -35,9 +35,11 @@ export function NumberField({
     // A value set from elsewhere replaces the text; one's own typing is left as typed.
     setText((typed) => (value !== null && toNumber(typed) !== value ? String(value) : typed))
   }, [value])
+  // An empty form is not a mistake yet; a field that was emptied or left empty is.
+  const [touched, setTouched] = useState(false)
   const number = toNumber(text)
   let problem: string | null = null
-  if (text.trim() === '') problem = optional ? null : t('number.missing')
+  if (text.trim() === '') problem = optional || !touched ? null : t('number.missing')
   else if (number === null) problem = t('number.bad')
   else if (integer && !Number.isInteger(number)) problem = t('number.whole')
   else if (above !== undefined && number <= above) problem = t('number.above', { limit: above })
@@ -56,11 +58,14 @@ export function NumberField({
       description={help}
       inputMode="decimal"
       disabled={disabled}
+      aria-required={!optional}
+      onBlur={() => setTouched(true)}
       value={text}
       error={problem}
       rightSection={unit ? <span className="unit">{unit}</span> : null}
       rightSectionWidth={unit ? 20 + unit.length * 8 : 0}
       onChange={(event) => {
+        setTouched(true)
         setText(event.currentTarget.value)
         const next = toNumber(event.currentTarget.value)
         onChange(valid(next) ? next : null)

@@ -1,6 +1,7 @@
 import { UNREACHABLE } from '../api/client'
 import type { Problem } from '../api/schema'
 import { useT } from '../i18n'
+import { FORGOTTEN } from '../live/store'
 
 /** What happened, to which drive and parameter, the limit, and what to try. */
 export function ProblemNote({
@@ -13,22 +14,28 @@ export function ProblemNote({
   const t = useT()
   if (!problem) return null
   const unreachable = problem.type === UNREACHABLE
+  const forgotten = problem.type === FORGOTTEN
   return (
     <div className="note fault" role="alert">
       <p>
         <strong>
           {unreachable ? t('problem.unreachable') : problem.title || t('problem.title')}
         </strong>{' '}
-        {problem.detail}
+        {forgotten ? t('problem.forgotten') : problem.detail}
       </p>
       {problem.limit && (
         <p>
           {t('problem.limit')} <span className="num">{problem.limit}</span>
         </p>
       )}
-      {(problem.remedy || unreachable) && (
+      {(problem.remedy || unreachable || forgotten) && (
         <p>
-          {t('problem.try')} {unreachable ? t('problem.unreachableTry') : problem.remedy}
+          {t('problem.try')}{' '}
+          {unreachable
+            ? t('problem.unreachableTry')
+            : forgotten
+              ? t('problem.forgottenTry')
+              : problem.remedy}
         </p>
       )}
       {onClose && (

@@ -17,7 +17,9 @@ const DECIMALS: Record<string, number> = {
 /** A live quantity with as many decimals as its unit deserves. */
 export function quantity(value: number | null | undefined, unit: string): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return '—'
-  return minus(value.toFixed(DECIMALS[unit] ?? (Number.isInteger(value) ? 0 : 2)))
+  const text = value.toFixed(DECIMALS[unit] ?? (Number.isInteger(value) ? 0 : 2))
+  // Noise around zero must not make the sign flicker.
+  return minus(/[1-9]/.test(text) ? text : text.replace('-', ''))
 }
 
 /** A figure with about `digits` significant digits and no exponent for usual sizes. */
@@ -35,7 +37,6 @@ const minus = (text: string) => text.replace(/^-(?=[\d.])/, '−')
 export function duration(seconds: number): string {
   const whole = Math.max(0, Math.round(seconds))
   if (whole < 60) return `${whole} s`
-  const two = (n: number) => String(n).padStart(2, '0')
   const hours = Math.floor(whole / 3600)
   const rest = `${hours ? two(Math.floor(whole / 60) % 60) : Math.floor(whole / 60)}:${two(whole % 60)}`
   return hours ? `${hours}:${rest}` : rest
@@ -82,11 +83,19 @@ export function toValue(info: ParameterInfo, raw: Raw): Raw {
   return Number((raw * info.scale + info.offset).toPrecision(12))
 }
 
-/** Time of day with seconds. */
-export function clock(time: string | null): string {
-  return time === null ? '—' : new Date(time).toLocaleTimeString([], { hour12: false })
+const two = (n: number) => String(n).padStart(2, '0')
+
+/** Time of day with seconds, 24 hours, in the time zone of this computer. */
+export function clock(time: string | number | null): string {
+  if (time === null) return '—'
+  const at = new Date(time)
+  return [at.getHours(), at.getMinutes(), at.getSeconds()].map(two).join(':')
 }
 
+/** Day and time, written as ISO 8601 does: 03/04 is not the same day everywhere. */
 export function dateTime(time: string | null): string {
-  return time === null ? '—' : new Date(time).toLocaleString([], { hour12: false })
+  if (time === null) return '—'
+  const at = new Date(time)
+  const day = [at.getFullYear(), two(at.getMonth() + 1), two(at.getDate())].join('-')
+  return `${day} ${clock(time)}`
 }

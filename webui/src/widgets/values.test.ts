@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest'
 import type { ParameterRow } from '../api/schema'
 import { parseStations } from '../pages/connect/stations'
 import { groups, isChanged, matches, select } from '../pages/parameters/filters'
-import { duration, figure, hexadecimal, quantity, shown, toValue } from './format'
+import { clock, dateTime, duration, figure, hexadecimal, quantity, shown, toValue } from './format'
 import { bitFields, getField, parseTyped, setField } from './parse'
 
 function row(part: Partial<ParameterRow>): ParameterRow {
@@ -111,6 +111,7 @@ describe('figures', () => {
     expect(quantity(1.23456, 'rpm')).toBe('1.2')
     expect(quantity(-0.5, 'rev')).toBe('−0.5000')
     expect(quantity(null, 'V')).toBe('—')
+    expect(quantity(-0.04, 'rpm')).toBe('0.0')
     expect(duration(59.4)).toBe('59 s')
     expect(duration(185)).toBe('3:05')
     expect(duration(3723)).toBe('1:02:03')
@@ -167,5 +168,14 @@ describe('stations', () => {
   it('are numbers and ranges', () => {
     expect(parseStations('1-3, 9')).toEqual([1, 2, 3, 9])
     for (const bad of ['a', '3-1', '1-', '70000', '1-65535']) expect(parseStations(bad)).toBeNull()
+  })
+})
+
+describe('times', () => {
+  it('read the same in every country, and midnight is 00', () => {
+    const at = new Date(2026, 2, 4, 0, 5, 9).toISOString()
+    expect(clock(at)).toBe('00:05:09')
+    expect(dateTime(at)).toBe('2026-03-04 00:05:09')
+    expect(dateTime(null)).toBe('—')
   })
 })

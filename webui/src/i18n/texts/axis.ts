@@ -2,6 +2,31 @@ import type { Texts } from '../types'
 
 /** Pages about one axis: Overview, Motion, I/O, Alarms. */
 export const axis = {
+  'next.title': ['From here to a tuned axis', '从这里到调好的轴'],
+  'next.compare': [
+    'Read everything; compare with a file or with the defaults.',
+    '读取全部参数，与文件或出厂值比较。',
+  ],
+  'next.mechanics': [
+    'Say what the motor drives, so that units and limits are those of the machine.',
+    '说明电机带动什么，使单位和限制与机器一致。',
+  ],
+  'next.terminals': [
+    'See that switches and brake are wired to what they should do.',
+    '确认开关和制动器的接线与功能相符。',
+  ],
+  'next.jog': [
+    'Hold a button and look: right direction, right distance, free travel. Then home.',
+    '按住按钮观察：方向、距离正确，行程无阻。然后回零。',
+  ],
+  'next.tune': [
+    'Inertia, response, notches and gains; verified, with a report.',
+    '惯量、响应、陷波和增益；经验证并生成报告。',
+  ],
+  'next.save': [
+    'Save in the drive, and keep a parameter set under Files.',
+    '保存到驱动器，并在“文件”中保留一份参数集。',
+  ],
   'overview.now': ['Now', '实时'],
   'overview.machine': ['State machine', '状态机'],
   'overview.machineHelp': [

@@ -33,6 +33,7 @@ export const bench = {
   'connect.nameless': ['(gives no name)', '（未提供名称）'],
   'connect.noIdentity': ['It tells no identity on this link.', '该链路上不提供身份信息。'],
   'connect.inUse': ['On the bench as {name}.', '已作为 {name} 在工作台上。'],
+  'connect.goOn': ['Open this axis', '打开此轴'],
   'connect.profile': ['Profile', '配置文件'],
   'connect.choose': ['Choose…', '请选择…'],
   'confidence.certain': ['certain', '确定'],
@@ -59,6 +60,12 @@ export const bench = {
     'Nothing is connected. Choose an interface, scan it, and connect what is found.',
     '尚未连接。请选择接口、扫描并连接找到的驱动器。',
   ],
+  'connect.virtualAll': ['Connect the virtual drives', '连接虚拟驱动器'],
+  'connect.virtualHelp': [
+    'Nothing real moves: they are for trying and training.',
+    '不会有实物运动：供试用和培训。',
+  ],
+  'connect.virtualStep': ['Searching {url}…', '正在搜索 {url}…'],
   'connect.partial': [
     'Partial profile: not every parameter is known.',
     '部分配置文件：并非所有参数已知。',
@@ -152,10 +159,6 @@ export const bench = {
   ],
   'scope.age': ['{age} s old', '滞后 {age} 秒'],
   'scope.between': ['Between the cursors: {time} s', '光标间隔：{time} 秒'],
-  'scope.dropped': [
-    'Left out: {count} samples, {blocks} blocks',
-    '丢弃：{count} 个采样，{blocks} 个数据块',
-  ],
   'measure.min': ['Min', '最小'],
   'measure.max': ['Max', '最大'],
   'measure.mean': ['Mean', '平均'],
@@ -174,8 +177,6 @@ export const bench = {
   'trigger.level': ['Level', '电平'],
   'trigger.before': ['Before the trigger', '触发前'],
   'trigger.waiting': ['Waiting for the trigger…', '等待触发…'],
-  'sets.title': ['Parameter sets', '参数集'],
-  'sets.none': ['No parameter set is stored yet.', '尚未保存参数集。'],
   'sets.save': ['Save to a file', '保存到文件'],
   'sets.saveTitle': ['Save the settings of {name}', '保存 {name} 的设置'],
   'sets.name': ['File name', '文件名'],
@@ -199,12 +200,4 @@ export const bench = {
   ],
   'sets.listProblems': ['Lines that could not be used:', '无法使用的行：'],
   'sets.download': ['Download', '下载'],
-  'sets.delete': ['Delete {name}', '删除 {name}'],
-  'sets.deleteText': ['The file cannot be brought back.', '文件无法恢复。'],
-  'sets.deleteNow': ['Delete', '删除'],
-  'sets.count': ['{count} parameters', '{count} 个参数'],
-  'sets.loadHelp': [
-    'To load a set into a drive, compare it first: Parameters, Compare.',
-    '要将参数集载入驱动器，请先比较：参数 → 比较。',
-  ],
 } satisfies Texts

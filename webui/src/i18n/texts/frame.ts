@@ -27,6 +27,7 @@ export const frame = {
     '停止按钮仍然有效。请选择其他页面或重新加载。',
   ],
   'frame.skip': ['To the content', '跳到内容'],
+  'frame.times': ['Times are those of {zone}', '时间按 {zone} 时区'],
   'frame.menu': ['Axes and pages', '轴与页面'],
   'frame.pages': ['Pages', '页面'],
   'frame.axes': ['Axes', '轴'],
@@ -103,13 +104,22 @@ export const frame = {
   'control.give': ['Give control back', '交还控制权'],
   'lost.title': ['Connection to the server lost.', '与服务器的连接已断开。'],
   'lost.text': [
-    'Nothing shown here is current. A jog has been stopped. Trying again ({attempt}).',
-    '当前显示的内容不是最新的。点动已停止。正在重试（{attempt}）。',
+    'What is shown is from {time} and not current. A jog has been stopped. Trying again ({attempt}).',
+    '所示内容截至 {time}，不是最新的。点动已停止。正在重试（{attempt}）。',
   ],
   'lost.opening': ['Connecting to the server…', '正在连接服务器…'],
+  'broken.reload': ['Load the page again', '重新加载页面'],
   'problem.title': ['That did not work.', '操作未成功。'],
   'problem.limit': ['Limit:', '限制：'],
   'problem.try': ['What to try:', '建议：'],
+  'problem.forgotten': [
+    'The server was restarted; how this ended is not known.',
+    '服务器已重新启动；不知此任务如何结束。',
+  ],
+  'problem.forgottenTry': [
+    'look at the state of the axis, then start again',
+    '查看轴的状态后重新开始',
+  ],
   'problem.unreachable': ['The server does not answer.', '服务器无应答。'],
   'problem.unreachableTry': [
     'check the network; whether the change was made will show once the connection is back',

@@ -13,6 +13,7 @@ import { ConnectHelp } from './ConnectHelp'
 import { NotListedPanel } from './NotListed'
 import { Scan } from './Scan'
 import { InterfacePermissions } from './segment/Permissions'
+import { VirtualBench } from './VirtualBench'
 
 /** One way to a bus: what it is, whether it can be used, and the URL to start from. */
 interface Way {
@@ -50,6 +51,7 @@ export function ConnectPage() {
   const link = useLink()
   const [interfaces, setInterfaces] = useState<Interfaces | null>(null)
   const [url, setUrl] = useState('')
+  const [joining, setJoining] = useState(false)
   const load = useAction()
   const refresh = useCallback(
     () => load.run(async () => setInterfaces(await ask(api.GET('/api/v1/interfaces')))),
@@ -107,6 +109,9 @@ export function ConnectPage() {
         </Panel>
         <Panel title={t('connect.bench')}>
           {drives?.length === 0 && <p className="dim">{t('connect.benchEmpty')}</p>}
+          {(joining || drives?.length === 0) && interfaces && interfaces.virtual.length > 0 && (
+            <VirtualBench urls={interfaces.virtual} onBusy={setJoining} />
+          )}
           {drives?.map((drive) => (
             <BenchDrive key={drive.id} drive={drive} />
           ))}

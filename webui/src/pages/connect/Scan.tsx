@@ -2,8 +2,9 @@ import { Button, Checkbox, NativeSelect, TextInput } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { FoundDrive, ImportedDescription, MissingPort, ProfileInfo } from '../../api/schema'
+import { href } from '../../app/router'
 import { type T, useT } from '../../i18n'
-import { setJob, useDrives, useJob } from '../../live/store'
+import { setJob, useDrives, useJob, useJobs } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
@@ -17,10 +18,18 @@ export function Scan({ url, onUrl }: { url: string; onUrl: (url: string) => void
   const [id, setId] = useState<string | null>(null)
   const [early, setEarly] = useState(true)
   const scan = useAction()
+  const jobs = useJobs()
+  // A scan that was begun before this page was loaded again is still this page's.
+  const left = [...jobs.values()].findLast((each) => each.kind === 'scan')
+  const unseen = id === null && left?.state === 'running' ? left.id : null
+  useEffect(() => {
+    if (unseen) setId(unseen)
+  }, [unseen])
   const job = useJob(id)
   const list = stations.trim() === '' ? null : parseStations(stations)
   const bad = stations.trim() !== '' && list === null
   const running = job?.state === 'running'
+  const ready = url !== '' && !bad && !running && !scan.busy
   const found = (job?.result?.found ?? []) as FoundDrive[]
   const start = () =>
     scan.run(async () => {
@@ -40,13 +49,11 @@ export function Scan({ url, onUrl }: { url: string; onUrl: (url: string) => void
           value={stations}
           error={bad ? t('connect.stationsBad') : null}
           onChange={(event) => setStations(event.currentTarget.value)}
+          onKeyDown={(event) => {
+            if (event.key === 'Enter' && ready) void start()
+          }}
         />
-        <Button
-          variant="filled"
-          disabled={url === '' || bad || running}
-          loading={scan.busy}
-          onClick={() => void start()}
-        >
+        <Button variant="filled" disabled={!ready} loading={scan.busy} onClick={() => void start()}>
           {t('connect.scan')}
         </Button>
       </div>
@@ -60,7 +67,7 @@ export function Scan({ url, onUrl }: { url: string; onUrl: (url: string) => void
       <JobNote id={id} />
       {isSerial(url) && <LineSearch url={url} stations={list} onFound={onUrl} />}
       {job?.state === 'done' && (
-        <section aria-label={t('connect.results')}>
+        <section aria-label={t('connect.results')} ref={reveal}>
           <h3>{t('connect.found', { count: found.length })}</h3>
           {found.length === 0 && <p>{t('connect.foundNone')}</p>}
           {found.map((drive) => (
@@ -70,6 +77,11 @@ export function Scan({ url, onUrl }: { url: string; onUrl: (url: string) => void
       )}
     </>
   )
+}
+
+/** What was found is below the fold of a small screen. */
+function reveal(section: HTMLElement | null): void {
+  section?.scrollIntoView({ block: 'nearest' })
 }
 
 function identity(t: T, found: FoundDrive): string {
@@ -144,7 +156,12 @@ function Found({ found }: { found: FoundDrive }) {
         </p>
       ))}
       {used ? (
-        <p>{t('connect.inUse', { name: used.name })}</p>
+        <p>
+          {t('connect.inUse', { name: used.name })}{' '}
+          <a className="lone" href={href('overview', used.id)}>
+            {t('connect.goOn')}
+          </a>
+        </p>
       ) : (
         <div className="row">
           <NativeSelect

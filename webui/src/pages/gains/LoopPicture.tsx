@@ -5,7 +5,8 @@ import { useT } from '../../i18n'
 type Block = GainBlock['block']
 
 const WIDTH = 128
-const HEIGHT = 46
+/** 44 px where the picture is drawn at its least width. */
+const HEIGHT = 58
 
 /** Where each block of the loops is drawn: centre, in the units of the drawing. */
 const PLACES: { block: Block; x: number; y: number; width?: number }[] = [

@@ -14,6 +14,7 @@ import { SceneHere } from './SceneHere'
 import { StateMachine } from './StateMachine'
 import { travelOf } from './travel'
 import { WatchPanel } from './WatchPanel'
+import { WhatNext } from './WhatNext'
 
 export function OverviewPage({ drive }: { drive: string }) {
   const t = useT()
@@ -72,6 +73,7 @@ export function OverviewPage({ drive }: { drive: string }) {
           </Panel>
           <div className="later stack">
             <WatchPanel drive={drive} />
+            <WhatNext drive={drive} />
             <Procedures drive={drive} />
           </div>
         </div>

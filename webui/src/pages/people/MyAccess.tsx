@@ -1,8 +1,8 @@
-import { Button, NumberInput, PasswordInput, TextInput } from '@mantine/core'
+import { Button, NumberInput, TextInput } from '@mantine/core'
 import { type SyntheticEvent, useCallback, useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { MadeToken, Right, SessionInfo, TokenInfo } from '../../api/schema'
-import { NewPassword } from '../../app/SessionGate'
+import { NewPassword, PasswordField } from '../../app/Door'
 import { useSession } from '../../app/session'
 import { useT } from '../../i18n'
 import { dateTime } from '../../widgets/format'
@@ -95,14 +95,7 @@ function ChangePassword() {
   }
   return (
     <form onSubmit={submit} className="stack">
-      <PasswordInput
-        label={t('access.present')}
-        value={present}
-        autoComplete="current-password"
-        maxLength={200}
-        required
-        onChange={(event) => setPresent(event.currentTarget.value)}
-      />
+      <PasswordField label={t('access.present')} value={present} onChange={setPresent} />
       <NewPassword value={password} onChange={setPassword} />
       <ProblemNote problem={act.problem} onClose={act.clear} />
       {done && <p className="good-text">{t('access.changed')}</p>}

@@ -37,11 +37,11 @@ export function MarkerChips({
     onMove(marker.id, inside)
   }
   return (
-    <div className="chips" role="group" aria-label={t('marker.group')}>
+    <div className="markers" role="group" aria-label={t('marker.group')}>
       {markers.map((marker) => (
         <span
           key={marker.id}
-          className="chip num"
+          className="marker num"
           role="slider"
           tabIndex={0}
           aria-label={
