@@ -16,10 +16,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from drivers.virtual.mechanics.spec import MechanicsSpec
+from drivers.virtual.mechanics.spec import LoadSpec, MechanicsSpec
 
 Array = npt.NDArray[np.float64]
 
+_RIGID_DAMPING = 0.5
 ANGLE, SPEED, TORQUE, FIRST_LOAD = 0, 1, 2, 3
 INPUT_COMMAND, INPUT_MOTOR, INPUT_LAST, FIRST_SIDE = 0, 1, 2, 3
 
@@ -78,6 +79,7 @@ def discretise(spec: MechanicsSpec, current_loop_rad_s: float, step_s: float) ->
 
     The arrays are shared by all who ask for the same chain: they are not to be written.
     """
+    spec = _without_ringing(spec, step_s)
     gaps = [i for i, load in enumerate(spec.load) if load.backlash_rad > 0]
     pairs = []
     for contact in range(2 ** len(gaps)):
@@ -94,6 +96,29 @@ def discretise(spec: MechanicsSpec, current_loop_rad_s: float, step_s: float) ->
         gap_state=np.array([FIRST_LOAD + 2 * i for i in gaps], dtype=np.int64),
         half_gap_rad=np.array([spec.load[i].backlash_rad / 2 for i in gaps], dtype=np.float64),
     )
+
+
+def _without_ringing(spec: MechanicsSpec, step_s: float) -> MechanicsSpec:
+    """The chain in which what is too stiff for the steps is well damped.
+
+    Stiffnesses such as 1e7 Nm/rad are written for "rigid". Between two steps such a coupling
+    swings more than once, so that friction and end stops, which act once a step, would push it
+    the wrong way and blow it up. Damped, it is as stiff as before: with half of the critical
+    damping above the sampling rate, 20 kHz, the response up to 2 kHz changes by less than 0.02 dB
+    and 0.7°.
+    """
+    loads: list[LoadSpec] = []
+    before_kgm2 = spec.motor.inertia_kgm2
+    for load in spec.load:
+        inverse = 1.0 / before_kgm2 + 1.0 / load.inertia_kgm2
+        own_rad_s = math.sqrt(load.stiffness_nm_per_rad * inverse)
+        before_kgm2 = load.inertia_kgm2
+        least = 2 * _RIGID_DAMPING * own_rad_s / inverse
+        if own_rad_s * step_s > math.tau and load.damping_nms_per_rad < least:
+            loads.append(load.model_copy(update={"damping_nms_per_rad": least}))
+        else:
+            loads.append(load)
+    return spec.model_copy(update={"load": tuple(loads)})
 
 
 def analytic_response(
