@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
 import json
 import os
 import signal
@@ -262,8 +263,16 @@ async def _found(url: str, server: str | None) -> list[tuple[dict[str, object], 
         ]
 
 
+def _speak_any_letter() -> None:
+    """Terminals of other code pages get a ? for what they lack; files and pipes get UTF-8."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(encoding=None if stream.isatty() else "utf-8", errors="replace")
+
+
 def main() -> None:
     """Entry point. A defect of the program itself ends it with exit code 70, in one sentence."""
+    _speak_any_letter()
     try:
         app()
     except Exception as error:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import sys
 from pathlib import Path
 
 import pytest
@@ -87,6 +89,17 @@ def test_a_defect_of_the_program_is_one_sentence_and_its_own_exit_code(
     monkeypatch.setenv("SERVODECK_TRACEBACK", "1")
     with pytest.raises(ZeroDivisionError):
         cli.main()
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
+def test_letters_that_a_terminal_lacks_do_not_end_a_command(
+    encoding: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, encoding=encoding))
+    monkeypatch.setattr(cli, "app", lambda: print("drive 1 → file 2 …", flush=True))
+    cli.main()
+    assert written.getvalue().decode("utf-8") == "drive 1 → file 2 …\n"  # no terminal: a file
 
 
 @pytest.mark.parametrize(
