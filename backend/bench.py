@@ -16,6 +16,7 @@ from backend.axis_store import AxisStore
 from backend.cyclic import CyclicSession
 from backend.drive import Drive, Port, Reading
 from backend.drive_list import DriveList, SavedDrive, SavedPort
+from backend.files import StorageFailed
 from backend.jobs import Job, JobRunner, Progress
 from backend.journal import Journal
 from backend.matching import profile_for
@@ -296,7 +297,7 @@ class Bench:
             await check(drive, port)
             self._require_free(link, url, station)
         drive.ports = (*drive.ports, port)
-        self._save()
+        self._remember()
         self.journal.add(f"{drive.name} is reached over {url} too", drive=drive.id)
         self._drives_changed()
         return member
@@ -325,7 +326,7 @@ class Bench:
         drive.listen_writes(self._witness.wrote)
         drive.listen_commands(self._witness.commanded)
         monitor.start()
-        self._save()
+        self._remember()
         self.journal.add(f"connected {drive.name} ({drive.profile.title})", drive=drive_id)
         self._drives_changed()
         return member
@@ -344,7 +345,7 @@ class Bench:
                 await self.stop_cyclic(url)
         del self.members[drive_id]
         await member.monitor.close()
-        self._save()
+        self._remember()
         self._drives_changed()
 
     async def _let_go(self, member: Member) -> None:
@@ -355,13 +356,21 @@ class Bench:
             self.journal.add(text, level="error", drive=member.drive.id)
 
     def rename(self, drive_id: str, name: str | None, notes: str | None) -> Member:
-        """Change name or notes; None leaves them."""
+        """Change name or notes; None leaves them.
+
+        Raises:
+            StorageFailed: they could not be stored and are as before.
+        """
         member = self.member(drive_id)
-        if name is not None:
-            member.drive.name = name
-        if notes is not None:
-            member.drive.notes = notes
-        self._save()
+        drive = member.drive
+        before = drive.name, drive.notes
+        drive.name = drive.name if name is None else name
+        drive.notes = drive.notes if notes is None else notes
+        try:
+            self._save()
+        except StorageFailed:
+            drive.name, drive.notes = before
+            raise
         self._drives_changed()
         return member
 
@@ -490,11 +499,19 @@ class Bench:
         drive.found = replace(drive.found or Found(drive.ports[0].station), serial=serial)
         drive.identity_warning = ""
         self.journal.add(f"{drive.name}: serial number {serial} accepted", drive=drive.id)
-        self._save()
+        self._remember()
         self._drives_changed()
         return member
 
     # --- over restarts ----------------------------------------------------------------
+
+    def _remember(self) -> None:
+        """Store the list of drives; where that fails the bench works on, and says so."""
+        try:
+            self._save()
+        except StorageFailed as error:
+            text = f"the list of drives is not stored, a restart begins with the old one: {error}"
+            self.journal.add(text, level="error")
 
     def _save(self) -> None:
         self._list.store(

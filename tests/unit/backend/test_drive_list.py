@@ -5,7 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
+from backend.bench import Bench
 from backend.drive_list import DriveList, SavedDrive, SavedPort
+from backend.files import StorageFailed
+from tests.support.memory_link import MemoryLink
 
 X = SavedDrive("X", "mms7", (SavedPort("mlink:///dev/ttyUSB0", 1),), "left", 77)
 Z = SavedDrive(
@@ -42,3 +47,23 @@ def test_a_damaged_file_is_told_and_not_fatal(tmp_path: Path) -> None:
         loaded, problems = DriveList(path).load()
         assert (loaded, len(problems)) == ([], 1)
         assert "bench.json cannot be read" in problems[0]
+
+
+async def test_a_full_disk_keeps_nobody_from_connecting_a_drive(tmp_path: Path) -> None:
+    """As on a full disk: bench.json cannot be written, here because a folder is in its place."""
+    (tmp_path / "bench.json").mkdir()
+    link = MemoryLink({})
+    bench = Bench(tmp_path, {"mlink://virtual0": lambda: link})
+    try:
+        member = await bench.connect("mlink://virtual0", 1, "mms7", "X")
+        assert bench.members == {"x": member}
+        assert "the list of drives is not stored" in next(
+            e.text for e in bench.journal.entries() if e.level == "error"
+        )
+        with pytest.raises(StorageFailed, match=r"bench\.json could not be written"):
+            bench.rename("x", "Y", "on the left")
+        assert (member.drive.name, member.drive.notes) == ("X", "")
+        await bench.remove("x")
+        assert bench.members == {}
+    finally:
+        await bench.close()
