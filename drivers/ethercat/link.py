@@ -15,9 +15,10 @@ from typing import Any
 from drivers import cia402
 from drivers.codec import size_of
 from drivers.errors import DriveError, NotAllowed, ProtocolError
-from drivers.ethercat import coe, firmware, permissions
+from drivers.ethercat import firmware, permissions
 from drivers.ethercat.al_status import AlState
 from drivers.ethercat.hostprocess import HostProcess
+from drivers.ethercat.information import EntryDescription, ObjectInfo
 from drivers.ethercat.protocol import Message, error_from_wire
 from drivers.ethercat.segmentcyclic import EthercatCyclic
 from drivers.ethercat.survey import ExchangeFigures, Survey, exchange_from, survey_from
@@ -209,15 +210,15 @@ class EthercatLink:
 
     async def enumerate(
         self, station: int, progress: Progress
-    ) -> list[coe.EntryDescription | coe.ObjectInfo]:
+    ) -> list[EntryDescription | ObjectInfo]:
         """The drive's own dictionary, by the SDO information service."""
         found: list[Message] = await self._call(
             {"op": "enumerate", "station": station}, 600.0, progress=progress
         )
-        described: list[coe.EntryDescription | coe.ObjectInfo] = []
+        described: list[EntryDescription | ObjectInfo] = []
         for item in found:
             whole = item.pop("kind") == "object"
-            described.append(coe.ObjectInfo(**item) if whole else coe.EntryDescription(**item))
+            described.append(ObjectInfo(**item) if whole else EntryDescription(**item))
         return described
 
     async def set_state(self, station: int, state: AlState) -> None:

@@ -10,10 +10,11 @@ from typing import Any
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed, OutOfRange, ProtocolError
-from drivers.ethercat import coe, esc, firmware, sii
+from drivers.ethercat import coe, esc, firmware, reading, sii
 from drivers.ethercat import station as transactions
 from drivers.ethercat.al_status import AlState, state_name
 from drivers.ethercat.cyclic import CyclicLoop
+from drivers.ethercat.information import ObjectInfo
 from drivers.ethercat.lanes import Done, Lanes, Urgency
 from drivers.ethercat.protocol import Message, error_to_wire
 from drivers.ethercat.realtime import RealTime
@@ -155,7 +156,7 @@ class Operations:
         station = self._calm_station(message)
         self._require_parameters(station)
         items = [tuple(item) for item in message["items"]]
-        steps = transactions.read_items(station, items, lambda _count: None)
+        steps = reading.read_items(station, items, lambda _count: None)
 
         def finished(results: list[bytes | DriveError] | None, error: DriveError | None) -> None:
             if results is None:
@@ -194,13 +195,13 @@ class Operations:
                 return
             done(
                 [
-                    {"kind": "object" if isinstance(i, coe.ObjectInfo) else "entry"} | asdict(i)
+                    {"kind": "object" if isinstance(i, ObjectInfo) else "entry"} | asdict(i)
                     for i in found
                 ],
                 None,
             )
 
-        steps = transactions.enumerate_objects(station, progress)
+        steps = reading.enumerate_objects(station, progress)
         self.lanes.submit(station.number, "mailbox", steps, finished)
 
     # State, ports, alias, firmware ---------------------------------------------------------

@@ -5,33 +5,29 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from drivers.cia402 import State
-from drivers.errors import LinkLost, LinkTimeout, NotAllowed, OutOfRange
+from drivers.errors import LinkLost, LinkTimeout, NotAllowed
 from drivers.ethercat.hostprocess import HostProcess
-from drivers.ethercat.mapping import TARGETS, Entry, Pdo, StationPlan, plan_station
+from drivers.ethercat.mapping import Pdo, StationPlan, plan_station
 from drivers.ethercat.playback import Phase
 from drivers.ethercat.protocol import Message
 from drivers.ethercat.recovery import Recovery
 from drivers.ethercat.ring import VALID, RingReader
-from drivers.link import Address, CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
-from profiles.schema import INTEGER_RANGE, Profile
+from drivers.ethercat.samples import contiguous, fields_of
+from drivers.ethercat.trajectory import message_of
+from drivers.link import CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
+from profiles.schema import Profile
 
 _ANSWER_S, _CONFIGURE_S, _START_S, _STOP_S = 5.0, 60.0, 25.0, 15.0
 _DRAIN_S = 0.025
 _RENEW_S, _PATIENCE = 0.05, 10
 WATCHDOG_MS = 50.0
 """Process-data watchdog in the slaves: with braking well below the 200 ms that are allowed."""
-
-_NUMPY = {
-    "b": "<i1", "B": "<u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "q": "<i8",
-    "Q": "<u8", "f": "<f4",
-}  # fmt: skip
-_OFFSET_OF = {0x607A: 0x60B0, 0x60FF: 0x60B1, 0x6071: 0x60B2}
 
 
 @dataclass
@@ -110,7 +106,7 @@ class EthercatCyclic:
         answer: Message = await self._host.call(message, _CONFIGURE_S)
         self._setup = message | {"identities": answer["identities"]}
         self._plans, self._cycle_s, self.dc = plans, cycle_s, bool(answer["dc"])
-        self._fields = _fields(plans)
+        self._fields = fields_of(plans)
         self.left_over = tuple(item for plan in plans for item in plan.left_over)
         return tuple(signal for plan in plans for signal in plan.mapped)
 
@@ -144,7 +140,7 @@ class EthercatCyclic:
             OutOfRange: a value does not fit its object or the envelope; nothing moves.
             NotAllowed: not enabled, not mapped, a limit that cannot be watched, or a jump.
         """
-        messages = [self._message(trajectory) for trajectory in trajectories]
+        messages = [message_of(trajectory) for trajectory in trajectories]
         generation = self._generation
         number: int = await self._host.call({"op": "play", "trajectories": messages}, _ANSWER_S)
         self._played |= {trajectory.station: generation for trajectory in trajectories}
@@ -336,32 +332,6 @@ class EthercatCyclic:
                 remedy="choose another cycle time",
             )
 
-    def _message(self, trajectory: Trajectory) -> Message:
-        if trajectory.target.index not in TARGETS:
-            raise NotAllowed(f"{trajectory.target} is not a setpoint for cyclic motion")
-        _check_type(trajectory.target, trajectory.values)
-        limits = trajectory.envelope
-        _check_envelope(trajectory)
-        message: Message = {
-            "station": trajectory.station,
-            "target": trajectory.target.index,
-            "values": np.ascontiguousarray(trajectory.values, np.int64).tobytes(),
-            "limits": asdict(limits),
-            "renew_s": trajectory.renew_s,
-            "longest_step": int(np.max(np.abs(np.diff(trajectory.values)), initial=0)),
-            "offset": None,
-            "offset_values": None,
-        }
-        if trajectory.offset_target is not None and trajectory.offset_values is not None:
-            _check_type(trajectory.offset_target, trajectory.offset_values)
-            if len(trajectory.offset_values) != len(trajectory.values):
-                raise OutOfRange("offsets and values of a trajectory differ in number")
-            message["offset"] = trajectory.offset_target.index
-            message["offset_values"] = np.ascontiguousarray(
-                trajectory.offset_values, np.int64
-            ).tobytes()
-        return message
-
     async def _drain(self, reader: RingReader) -> None:
         names = tuple(self._fields)
         dropped = 0
@@ -371,7 +341,7 @@ class EthercatCyclic:
                 await asyncio.sleep(_DRAIN_S)
                 taken, lost = reader.drain()
                 dropped += lost
-                for part in _contiguous(taken):
+                for part in contiguous(taken):
                     first = int(part["cycle"][0])
                     if expected >= 0 and not lost:
                         dropped += max(first - expected, 0)
@@ -407,74 +377,6 @@ class EthercatCyclic:
             consumer.sequence += 1
 
 
-def _contiguous(taken: npt.NDArray[np.void]) -> list[npt.NDArray[np.void]]:
-    """Runs without a gap in the cycle counter."""
-    if not len(taken):
-        return []
-    breaks = np.flatnonzero(np.diff(taken["cycle"].astype(np.int64)) != 1) + 1
-    return list(np.split(taken, breaks))
-
-
 def _wire(pdo: Pdo) -> Message:
     entries = [[e.index, e.subindex, e.size, e.code] for e in pdo.entries]
     return {"index": pdo.index, "entries": entries, "write": pdo.write}
-
-
-def _fields(plans: Sequence[StationPlan]) -> dict[str, tuple[str, int]]:
-    """Channel name to numpy type and offset in a sample: outputs, then inputs, per station."""
-    fields: dict[str, tuple[str, int]] = {}
-    start = 0
-    for plan in plans:
-        names = {(s.address.index, s.address.subindex): s.channel for s in plan.mapped}
-        for pdo in (plan.rx, plan.tx):
-            start = _add_fields(fields, names, pdo.entries, start)
-    return fields
-
-
-def _add_fields(
-    fields: dict[str, tuple[str, int]],
-    names: Mapping[tuple[int | None, int], str],
-    entries: Sequence[Entry],
-    start: int,
-) -> int:
-    for entry in entries:
-        name = names.get((entry.index, entry.subindex))
-        if name is not None and entry.code in _NUMPY:
-            fields[name] = (_NUMPY[entry.code], start)
-        start += entry.size
-    return start
-
-
-def _check_type(address: Address, values: npt.NDArray[np.int64]) -> None:
-    low, high = INTEGER_RANGE[address.type]
-    if len(values) and not (low <= int(values.min()) and int(values.max()) <= high):
-        raise OutOfRange(
-            f"the trajectory goes from {values.min()} to {values.max()}, {address} holds"
-            f" {low} to {high}",
-            parameter=str(address),
-            limit=f"{low}…{high}",
-        )
-
-
-def _check_envelope(trajectory: Trajectory) -> None:
-    """What can be known before anything moves: positions inside the travel, torques inside."""
-    kind = TARGETS[trajectory.target.index or 0]
-    values, limits = trajectory.values, trajectory.envelope
-    low: float | None = None
-    high: float | None = None
-    if kind == "position":
-        low, high = limits.position_min, limits.position_max
-    elif kind == "velocity" and limits.speed_max is not None:
-        low, high = -limits.speed_max, limits.speed_max
-    elif kind == "torque" and limits.torque_max is not None:
-        low, high = -limits.torque_max, limits.torque_max
-    if not len(values):
-        raise OutOfRange("a trajectory without values")
-    if (low is not None and values.min() < low) or (high is not None and values.max() > high):
-        raise OutOfRange(
-            f"the {kind} setpoints go from {values.min()} to {values.max()}, the envelope allows"
-            f" {low} to {high}",
-            parameter=str(trajectory.target),
-            limit=f"{low}…{high}",
-            remedy="shorten the move or widen the envelope",
-        )

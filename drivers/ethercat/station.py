@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError, Rejected
 from drivers.ethercat import coe, esc, sii
 from drivers.ethercat.al_status import ERROR_BIT, AlState, al_status_text, state_name
-from drivers.ethercat.mailbox import Gap, Mailbox, Pause, Read, Steps, Write
+from drivers.ethercat.mailbox import Mailbox, Pause, Read, Steps, Write
 
 AL_CONTROL, AL_STATUS = 0x120, 0x130
 _SYNC_MANAGERS, _NO_MAILBOXES = 0x800, 0x0016
-_NO_COMPLETE_ACCESS = {0x05040001, 0x06010000, 0x06010004}
 
 #: ETG.1020 clause 5.3.7.2: how long a slave may take for each state.
 STATE_TIMEOUT_S = {
     AlState.INIT: 5.0, AlState.PREOP: 3.0, AlState.BOOT: 3.0, AlState.SAFEOP: 10.0,
     AlState.OP: 10.0,
 }  # fmt: skip
-
-_LISTS = frozenset((*range(0x1600, 0x1C00), *range(0x1C10, 0x1C30)))
-"""PDO mappings and their assignments."""
-
-Item = tuple[int, int, int | None]
-"""Index, subindex and length in bytes (None for text)."""
-
 
 _TRIES, _GONE_S = 3, 1.0
 
@@ -57,7 +49,7 @@ class Station:
     """Layouts of whole objects that were found equal to single reads, with their lengths."""
     void: dict[int, tuple[dict[int, bytes], dict[int, bytes]]] = field(default_factory=dict)
     """Process-data lists as they were read whole, with what was told of entries beyond their count:
-    nothing. See `_void_of`."""
+    nothing. See `drivers.ethercat.reading`."""
     describes: bool = True
     """It has the SDO information service, as far as is known."""
     notes: list[str] = field(default_factory=list)
@@ -317,150 +309,3 @@ def read_ports(station: Station) -> Steps[bool]:
         if difference is not None:
             station.clock_ahead_ns = esc.decode_time_difference(difference)
     return counters is not None
-
-
-def read_items(
-    station: Station, items: Sequence[Item], on_progress: Callable[[int], None]
-) -> Steps[list[bytes | DriveError]]:
-    """Read many entries; whole objects at once where that is possible and certain.
-
-    One failure does not spoil the others, except that a drive which does not answer at all is
-    not asked for every single entry.
-    """
-    results: dict[Item, bytes | DriveError] = {}
-    groups: dict[int, list[Item]] = {}
-    for item in items:
-        groups.setdefault(item[0], []).append(item)
-    dead: DriveError | None = None
-    for index, members in groups.items():
-        sizes = _sizes_of_whole(station, index, members) if dead is None else {}
-        whole: dict[int, bytes] = {}
-        if sizes:
-            yield Gap()
-            whole = yield from _read_whole(station, index, sizes)
-            known = whole | _void_of(station, index, whole)
-            results.update({item: known[item[1]] for item in members if item[1] in known})
-        for item in members:
-            if item in results:
-                continue
-            if dead is not None:
-                results[item] = dead
-                continue
-            yield Gap()
-            try:
-                results[item] = yield from coe.upload(station.box, index, item[1])
-            except DriveError as error:
-                results[item] = error
-                if isinstance(error, LinkLost | LinkTimeout):
-                    dead = error
-        read = {item[1]: results[item] for item in members}
-        good = {sub: value for sub, value in read.items() if isinstance(value, bytes)}
-        if index in station.to_prove:
-            _prove(station, index, sizes, good)
-        elif sizes and whole:
-            _remember_void(station, index, whole, good)
-        on_progress(len(results))
-    return [results[item] for item in items]
-
-
-def _sizes_of_whole(station: Station, index: int, members: Sequence[Item]) -> dict[int, int]:
-    """Subindex to length of what is wanted of an object, if reading it at once is worth it."""
-    if not station.complete_access or index in station.single_only:
-        return {}
-    sizes = {sub: size for _, sub, size in members if sub and size is not None}
-    return sizes if len(members) >= 2 else {}
-
-
-def _read_whole(station: Station, index: int, sizes: dict[int, int]) -> Steps[dict[int, bytes]]:
-    """Subindex to bytes, as far as the drive and the certainty of the layout allow it."""
-    try:
-        data = yield from coe.upload(station.box, index, 0, complete=True)
-    except Rejected as error:
-        station.single_only.add(index)
-        if error.code in _NO_COMPLETE_ACCESS and len(station.single_only) >= 3:
-            station.complete_access = False
-        return {}
-    except DriveError:
-        station.single_only.add(index)
-        return {}
-    proven = station.proven.get(index) == tuple(sorted(sizes.items()))
-    parts = coe.split_complete(data, sizes, proven=proven)
-    if parts:
-        return parts
-    parts = coe.split_complete(data, sizes, proven=True)
-    if not parts:
-        station.single_only.add(index)
-    elif (yield from _is_all_there_is(station, index, sizes)):
-        station.proven[index] = tuple(sorted(sizes.items()))
-        return parts
-    else:
-        station.to_prove[index] = data
-    return {}
-
-
-def _void_of(station: Station, index: int, whole: dict[int, bytes]) -> dict[int, bytes]:
-    """Entries of a process-data list beyond its count, as told when it last read just the same.
-
-    They mean nothing (ETG.1000.6 clause 5.6.7.4) and can only be read one by one, so they are not
-    asked for every time. `Station.forget_void` where somebody writes the list.
-    """
-    before, void = station.void.get(index, ({}, {}))
-    return void if whole and whole == before else {}
-
-
-def _remember_void(
-    station: Station, index: int, whole: dict[int, bytes], read: dict[int, bytes]
-) -> None:
-    beyond = {sub: value for sub, value in read.items() if sub not in whole}
-    if index in _LISTS and beyond and not any(map(any, beyond.values())):
-        station.void[index] = (whole, beyond)
-
-
-def _is_all_there_is(station: Station, index: int, sizes: dict[int, int]) -> Steps[bool]:
-    """Whether the drive's own dictionary knows no other subindices than these.
-
-    An answer as long as all of them together then holds each of them: one question instead of
-    reading every entry once more.
-    """
-    last = max(sizes)
-    if not station.describes or sorted(sizes) != list(range(1, last + 1)):
-        return False
-    try:
-        info = yield from coe.describe_object(station.box, index)
-    except DriveError:
-        station.describes = False
-        return False
-    return info.max_subindex == last
-
-
-def _prove(station: Station, index: int, sizes: dict[int, int], singles: dict[int, bytes]) -> None:
-    """Compare an uncertain whole with the single reads that followed it."""
-    data = station.to_prove.pop(index)
-    if {s: singles.get(s) for s in sizes} == {
-        s: part for s, part in coe.split_complete(data, sizes, proven=True).items() if s
-    }:
-        station.proven[index] = tuple(sorted(sizes.items()))
-    else:
-        station.single_only.add(index)
-
-
-def enumerate_objects(
-    station: Station, on_progress: Callable[[int, int], None]
-) -> Steps[list[coe.EntryDescription | coe.ObjectInfo]]:
-    """Every object and entry that the drive's own dictionary tells of."""
-    indices = yield from coe.list_objects(station.box)
-    found: list[coe.EntryDescription | coe.ObjectInfo] = []
-    for number, index in enumerate(indices):
-        on_progress(number, len(indices))
-        try:
-            info = yield from coe.describe_object(station.box, index)
-        except Rejected:
-            continue
-        found.append(info)
-        for sub in range(info.max_subindex + 1):
-            yield Gap()
-            try:
-                found.append((yield from coe.describe_entry(station.box, index, sub)))
-            except Rejected:
-                continue
-    return found

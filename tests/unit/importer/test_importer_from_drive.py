@@ -9,7 +9,7 @@ from importer_samples import GOOD_EDS
 
 from backend.description import dictionary_entries, profile_of_drive
 from drivers.errors import NotAllowed, Rejected
-from drivers.ethercat.coe import EntryDescription, ObjectInfo
+from drivers.ethercat.information import EntryDescription, ObjectInfo
 from drivers.link import Address, Found
 from profiles.importer import ImportFailed
 

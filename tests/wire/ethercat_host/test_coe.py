@@ -8,7 +8,9 @@ import pytest
 
 from drivers.errors import LinkLost, LinkTimeout, ProtocolError, Rejected
 from drivers.ethercat import coe as sdo
-from drivers.ethercat.station import Station, read_items
+from drivers.ethercat import information
+from drivers.ethercat.reading import read_items
+from drivers.ethercat.station import Station
 from tests.wire.ethercat_host.scripted import ScriptedSlave, coe
 
 
@@ -198,10 +200,10 @@ def test_information_service() -> None:
 
     slave = ScriptedSlave(react)
     box = slave.box()
-    assert slave.run(sdo.list_objects(box)) == [0x1000, 0x1008, 0x6040, 0x6041]
-    found = slave.run(sdo.describe_object(box, 0x6041))
+    assert slave.run(information.list_objects(box)) == [0x1000, 0x1008, 0x6040, 0x6041]
+    found = slave.run(information.describe_object(box, 0x6041))
     assert (found.name, found.data_type, found.object_code) == ("Statusword", 6, 7)
-    entry = slave.run(sdo.describe_entry(box, 0x6041, 0))
+    entry = slave.run(information.describe_entry(box, 0x6041, 0))
     assert (entry.bit_length, entry.access, entry.name) == (16, 0x87, "Statusword")
     assert slave.requests[0] == bytes.fromhex("0080 01 00 0000 0100")
 
@@ -218,14 +220,14 @@ def test_a_missing_part_of_a_description_is_not_passed_over() -> None:
     slave = ScriptedSlave(react)
     box = slave.box()
     with pytest.raises(ProtocolError, match="a part of the drive's description of itself"):
-        slave.run(sdo.list_objects(box))
+        slave.run(information.list_objects(box))
     assert box.unsettled, "the next question is asked after what may still come"
 
 
 def test_information_service_abort() -> None:
     slave = ScriptedSlave(lambda _: [coe(8, bytes.fromhex("07 00 0000 00000206"))])
     with pytest.raises(Rejected, match="no such object"):
-        slave.run(sdo.describe_object(slave.box(), 0x7777))
+        slave.run(information.describe_object(slave.box(), 0x7777))
 
 
 def test_a_mailbox_taken_over_from_soem_may_drop_the_first_mail() -> None:

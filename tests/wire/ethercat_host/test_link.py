@@ -15,7 +15,7 @@ import pytest
 
 from drivers.errors import Busy, DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
 from drivers.ethercat.al_status import AlState
-from drivers.ethercat.coe import EntryDescription
+from drivers.ethercat.information import EntryDescription
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Address
 from drivers.virtual.wires.netns import Namespace, child_environment

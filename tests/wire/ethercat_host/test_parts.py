@@ -18,7 +18,7 @@ from drivers.ethercat.frames import Request
 from drivers.ethercat.lanes import Lanes
 from drivers.ethercat.mailbox import Mailbox, Pause, Read, Step, Steps, Write
 from drivers.ethercat.ring import RING_BYTES, SLOT, VALID, Ring
-from drivers.ethercat.segmentcyclic import _contiguous
+from drivers.ethercat.samples import contiguous
 from drivers.ethercat.setup import interpolation_period
 from drivers.ethercat.station import Station, _to_preop
 
@@ -71,7 +71,7 @@ def test_signs_of_life(ring: Ring) -> None:
 def test_blocks_are_cut_at_gaps_of_the_cycle_counter() -> None:
     taken = np.zeros(5, np.dtype([("cycle", "<u8")]))
     taken["cycle"] = [7, 8, 11, 12, 13]
-    assert [list(part["cycle"]) for part in _contiguous(taken)] == [[7, 8], [11, 12, 13]]
+    assert [list(part["cycle"]) for part in contiguous(taken)] == [[7, 8], [11, 12, 13]]
 
 
 @pytest.mark.parametrize(

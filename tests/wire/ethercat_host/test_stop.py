@@ -16,7 +16,8 @@ from drivers.ethercat import coe
 from drivers.ethercat.frames import Request
 from drivers.ethercat.lanes import GRACE_S, Lanes, Urgency
 from drivers.ethercat.mailbox import Read, Write
-from drivers.ethercat.station import Station, read_items
+from drivers.ethercat.reading import read_items
+from drivers.ethercat.station import Station
 from drivers.link import Address
 from tests.wire.ethercat_host.conftest import Rig, until
 from tests.wire.ethercat_host.scripted import OUT, ScriptedSlave

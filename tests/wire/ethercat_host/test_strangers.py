@@ -13,7 +13,7 @@ import pytest
 
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, Rejected
-from drivers.ethercat.coe import EntryDescription, ObjectInfo
+from drivers.ethercat.information import EntryDescription, ObjectInfo
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
 from drivers.virtual.wires.netns import Namespace
