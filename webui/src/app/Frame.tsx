@@ -184,7 +184,21 @@ function PageLink({ name, short = false }: { name: Page; short?: boolean }) {
     >
       <Icon name={name} size={short ? 22 : 18} /> <span>{t(`page.${name}`)}</span>
       {count > 0 && <b className="count">{count}</b>}
+      {name === 'scope' && page !== 'scope' && <ScopeMark />}
     </a>
+  )
+}
+
+/** The scope's trigger is sought while other pages are open, too. */
+function ScopeMark() {
+  const t = useT()
+  const trigger = useStore('trigger', () => contents.trigger)
+  if (trigger === 'off') return null
+  const words = t(`frame.scope.${trigger}`)
+  return (
+    <b className={`count scope-mark ${trigger}`} role="img" aria-label={words} title={words}>
+      {trigger === 'triggered' ? '✓' : '…'}
+    </b>
   )
 }
 

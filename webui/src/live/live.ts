@@ -154,6 +154,10 @@ worker.onmessage = (event: MessageEvent<FromWorker>) => {
     case 'subscriptions':
       store.keepScopeInfo(answer.numbers)
       break
+    case 'triggered':
+      store.contents.trigger = answer.state
+      store.publish('trigger')
+      break
     case 'answer':
       waiting.get(answer.id)?.(answer.answer as never)
       waiting.delete(answer.id)

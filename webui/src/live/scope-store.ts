@@ -15,6 +15,7 @@ import type {
   ScopeFrame,
   ScopeTrigger,
   ScopeView,
+  TriggerState,
 } from './worker-messages'
 
 /** Rows kept per channel: at 4 kHz 80 s, and 16 channels of it take 82 MB. */
@@ -42,6 +43,8 @@ interface Ports {
   stop(subscription: number): void
   /** These are the subscriptions that there are now. */
   changed(subscriptions: number[]): void
+  /** What the trigger is up to, whenever that changes. */
+  triggered(state: TriggerState): void
   /** Seconds on the clock of this computer. */
   now(): number
 }
@@ -61,6 +64,7 @@ export class ScopeStore {
   private armedAt = 0
   /** A single picture was caught whole: nothing more is taken, so that it stays however long. */
   private held = false
+  private told: TriggerState = 'off'
   private count = 0
   private period = 0
 
@@ -248,6 +252,7 @@ export class ScopeStore {
       trigger,
       search: new Trigger(trigger.settings, this.armedAt),
     }
+    this.tell()
   }
 
   private look(): void {
@@ -261,6 +266,13 @@ export class ScopeStore {
       if (trigger.mode === 'single') break
     }
     this.sweeps = this.sweeps.slice(-Math.min(MOST_SWEEPS, trigger.persistence + 1))
+    this.tell()
+  }
+
+  private tell(): void {
+    const state = !this.finder ? 'off' : this.sweeps.length === 0 ? 'waiting' : 'triggered'
+    if (state !== this.told) this.ports.triggered(state)
+    this.told = state
   }
 
   private newest(): number | null {

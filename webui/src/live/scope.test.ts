@@ -302,6 +302,7 @@ function store() {
     },
     stop: (subscription) => sent.push(`stop ${subscription}`),
     changed: () => {},
+    triggered: (state) => sent.push(state),
     now: () => clock.now,
   })
   return { store: made, sent, clock }
@@ -431,7 +432,7 @@ describe('scope store', () => {
     }
   })
   it('holds a single picture until it is armed again, with the traces that lag', () => {
-    const { store: scope, clock } = store()
+    const { store: scope, clock, sent } = store()
     scope.configure(config(source('c1', 'a'), source('c2', 'b', 'y')))
     scope.setTrigger({ ...rising, mode: 'single' })
     const slow = (t0: number, sequence: number) =>
@@ -455,6 +456,9 @@ describe('scope store', () => {
     scope.setTrigger({ ...rising, mode: 'single' })
     scope.block(frame({ t0: 10, dt: 0.5, rows: [[0]], sequence: 21 }))
     expect(scope.answer('view', whole).newest).toBe(10)
+    scope.setTrigger(null)
+    // Told to every page, once for each change.
+    expect(sent.slice(2)).toEqual(['waiting', 'triggered', 'waiting', 'off'])
   })
   it('keeps a picture that stands, and runs on when it is followed again', () => {
     const { store: scope } = store()

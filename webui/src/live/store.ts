@@ -12,6 +12,7 @@ import type {
   ScopeInfo,
 } from '../api/schema'
 import type { LinkState } from './socket'
+import type { TriggerState } from './worker-messages'
 
 /** What the server said last. Nothing here is ever a value that a person typed. */
 interface Contents {
@@ -30,6 +31,8 @@ interface Contents {
   /** What the server said of the subscriptions that there are, and of every channel ever asked. */
   scopeInfo: Map<number, ScopeInfo>
   scopeChannels: Map<string, ScopeChannelInfo>
+  /** Of the scope, which seeks it on other pages too. */
+  trigger: TriggerState
   refused: { request: string; problem: Problem; at: number } | null
 }
 
@@ -51,6 +54,7 @@ export const contents: Contents = {
   jogEnded: null,
   scopeInfo: new Map(),
   scopeChannels: new Map(),
+  trigger: 'off',
   refused: null,
 }
 

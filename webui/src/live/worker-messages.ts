@@ -30,6 +30,9 @@ export interface ScopeTrigger {
   persistence: number
 }
 
+/** Whether a trigger is sought, and whether anything was caught since it was armed. */
+export type TriggerState = 'off' | 'waiting' | 'triggered'
+
 export interface ScopeView {
   ids: string[]
   /** Fixed stretch, or the newest `window` seconds, or the newest triggered stretch. */
@@ -126,4 +129,5 @@ export type FromWorker =
   | { kind: 'message'; message: ToPage }
   | { kind: 'jogRefused' }
   | { kind: 'subscriptions'; numbers: number[] }
+  | { kind: 'triggered'; state: TriggerState }
   | { kind: 'answer'; id: number; answer: Questions[QuestionKind]['get'] }

@@ -28,6 +28,7 @@ const scope = new ScopeStore({
     socket.send({ type: 'scope_stop', subscription })
   },
   changed: (numbers) => post({ kind: 'subscriptions', numbers }),
+  triggered: (state) => post({ kind: 'triggered', state }),
   now: () => performance.now() / 1000,
 })
 const deadMan = new DeadMan(

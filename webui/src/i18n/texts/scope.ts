@@ -17,6 +17,8 @@ export const scope = {
     'Lost in this view, not in recordings: {dropped} samples left out, {blocks} blocks, {away} samples while there was no connection.',
     '仅此显示有丢失（录制不受影响）：{dropped} 个采样被略去，{blocks} 个数据块，断线期间 {away} 个采样。',
   ],
+  'frame.scope.waiting': ['waits for its trigger', '等待触发'],
+  'frame.scope.triggered': ['has triggered', '已触发'],
   'scope.units': ['Units', '单位'],
   'scope.unit.axis': ['{unit} (axis)', '{unit}（轴单位）'],
   'scope.unit.drive': ['{unit} (drive)', '{unit}（驱动器单位）'],
