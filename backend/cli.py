@@ -17,7 +17,6 @@ from typing import Annotated
 
 import typer
 
-from backend.bench import Bench
 from backend.commands import (
     functions,
     keep,
@@ -30,9 +29,8 @@ from backend.commands import (
     report,
 )
 from backend.commands.remote import Server, server_for
-from backend.commands.serve import Serving, state_folder
-from backend.commands.serve import serve as run_server
 from backend.commands.session import opened, run, show_progress
+from backend.commands.state import state_folder
 from backend.demo import DemoBench
 from backend.matching import match_profiles
 from drivers.errors import NotAllowed
@@ -108,6 +106,11 @@ def serve(
     allow_host: AllowHost = None,
 ) -> None:
     """Start the server and the web page."""
+    # The server takes longer to import than every other command takes to run.
+    from backend.bench import Bench
+    from backend.commands.serve import Serving
+    from backend.commands.serve import serve as run_server
+
     serving = Serving(
         host, port, accounts, certificate, key, frozenset(allow_host or ()), open_page=open_
     )
@@ -133,6 +136,10 @@ def demo(
     allow_host: AllowHost = None,
 ) -> None:
     """Start the server on a bench of virtual drives: no hardware, no root."""
+    from backend.bench import Bench
+    from backend.commands.serve import Serving
+    from backend.commands.serve import serve as run_server
+
     serving = Serving(
         host, port, accounts, certificate, key, frozenset(allow_host or ()), open_page=open_
     )

@@ -16,8 +16,8 @@ from backend import parameter_set
 from backend.audit.chain import Anchor
 from backend.audit.export_check import check_lines
 from backend.audit.trail import Filter
-from backend.commands.serve import state_folder
 from backend.commands.session import told
+from backend.commands.state import state_folder
 from backend.journal import Journal
 from backend.library.entries import KINDS, Kind, Query
 from backend.people.identity import LOCAL, Actor, acting

@@ -16,9 +16,6 @@ from backend.commands.remote import remote
 from backend.commands.session import drive_at, progress, run
 from backend.cyclic import CyclicSession
 from backend.files import write_atomically
-from backend.tools import inertia as inertia_tool
-from backend.tools import sweep as sweep_tool
-from backend.tools import sweep_evaluation
 from drivers.errors import NotAllowed
 
 Url = Annotated[str | None, typer.Argument(metavar="[BUS_URL]")]
@@ -100,6 +97,10 @@ def sweep(
     }  # fmt: skip
 
     async def here() -> dict[str, object]:
+        # The analysis takes seconds to import; no other command shall wait for it.
+        from backend.tools import sweep as sweep_tool
+        from backend.tools import sweep_evaluation
+
         settings = sweep_evaluation.SweepSettings(
             Envelope(travel_rev, speed_rpm, torque_percent, 60.0), kind.value, loop.value,
             f_min_hz, f_max_hz, share, realisations, rated_torque_nm=rated_torque_nm,
@@ -143,6 +144,8 @@ def inertia(
     }  # fmt: skip
 
     async def here() -> dict[str, object]:
+        from backend.tools import inertia as inertia_tool
+
         settings = inertia_tool.InertiaSettings(
             Envelope(travel_rev, speed_rpm, torque_percent, 60.0), scheme.value, ends,
             repetitions=repetitions, rated_torque_nm=rated_torque_nm,

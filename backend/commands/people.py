@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from backend.commands.serve import state_folder
 from backend.commands.session import run
+from backend.commands.state import state_folder
 from backend.people.accounts import Accounts
 from backend.people.records import Account
 from backend.people.rights import Right, Role

@@ -6,18 +6,20 @@ import json
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import httpx
 import typer
 
 from backend.commands.session import run
-from backend.evaluation import Evaluation, evaluate
 from backend.files import write_atomically
 from backend.measurements import SUFFIX, BadMeasurement, Head, MeasurementStore, unpack
 from backend.report.gather import About, choose, facts_of_files, measured_from
 from backend.report.store import FORMATS, Format, render
 from drivers.errors import DriveError, LinkLost, NotAllowed
+
+if TYPE_CHECKING:
+    from backend.evaluation import Evaluation
 
 Files = Annotated[list[Path] | None, typer.Argument(metavar="[FILE.sdmeas]...")]
 Out = Annotated[Path, typer.Option(help="report to write; .html or .pdf")]
@@ -126,6 +128,9 @@ def recompute(
             raise BadMeasurement(f"{file} cannot be read: {error.strerror}", value=str(file),
                                  remedy="check the name and the rights") from error  # fmt: skip
         found = unpack(data, file.name)
+        # The analysis takes seconds to import; no other command shall wait for it.
+        from backend.evaluation import evaluate
+
         made = evaluate(found)
         head = found.head
         print(f"{head.kind} of {head.drive}, {head.saved:%Y-%m-%d %H:%M:%S %Z}")

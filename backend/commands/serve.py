@@ -9,7 +9,6 @@ import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
 
-import platformdirs
 import uvicorn
 
 from backend.api.app import make_app
@@ -49,11 +48,6 @@ class Serving:
     def on_loopback(self) -> bool:
         """Only this machine reaches it."""
         return self.host in LOOPBACK or self.host == "::1"
-
-
-def state_folder(chosen: Path | None) -> Path:
-    """Where the list of drives and the parameter sets are kept."""
-    return chosen or Path(platformdirs.user_data_dir("servodeck"))
 
 
 async def serve(bench: Bench, serving: Serving) -> None:
