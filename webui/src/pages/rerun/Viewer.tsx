@@ -1,7 +1,7 @@
 import { useComputedColorScheme } from '@mantine/core'
 import { useEffect, useRef } from 'react'
-import { stopEverything } from '../../app/stop'
 import { useT } from '../../i18n'
+import { stopByEscapeIn } from '../../widgets/frame-stop'
 import { LOADING, size, useViewer, viewerUrl } from './viewer'
 
 /** rerun's own viewer in a frame of our origin; `recording` null shows what happens now. */
@@ -37,16 +37,7 @@ export function Viewer({ recording }: { recording: string | null }) {
         className="viewer"
         title={t('rerun.title')}
         src={viewerUrl(recording, theme)}
-        onLoad={() => {
-          // Keys pressed in the frame do not come to the page; Esc must stop from there too.
-          frame.current?.contentWindow?.addEventListener(
-            'keydown',
-            (event) => {
-              if (event.key === 'Escape' && !event.repeat) void stopEverything()
-            },
-            { capture: true },
-          )
-        }}
+        onLoad={() => stopByEscapeIn(frame.current)}
       />
     </>
   )

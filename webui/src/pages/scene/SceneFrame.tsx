@@ -1,8 +1,8 @@
 import { useComputedColorScheme } from '@mantine/core'
 import { useRef } from 'react'
-import { stopEverything } from '../../app/stop'
 import { useT } from '../../i18n'
 import { useDrives } from '../../live/store'
+import { stopByEscapeIn } from '../../widgets/frame-stop'
 
 /** Distance of two axes in the scene, as backend/scene/view.py places them (_SPACING). */
 const SPACING = 0.9
@@ -30,16 +30,7 @@ export function SceneFrame({ axis, className = '' }: { axis?: string; className?
       className={`viewer ${className}`}
       title={t('scene.frame')}
       src={`/viser/?${query}`}
-      onLoad={() => {
-        // Keys pressed in the frame do not come to the page; Esc must stop from there too.
-        frame.current?.contentWindow?.addEventListener(
-          'keydown',
-          (event) => {
-            if (event.key === 'Escape' && !event.repeat) void stopEverything()
-          },
-          { capture: true },
-        )
-      }}
+      onLoad={() => stopByEscapeIn(frame.current)}
     />
   )
 }
