@@ -118,9 +118,22 @@ def test_r6l_forces_an_output_that_has_the_function_for_it(station: Station) -> 
 
 def test_m6l_forces_outputs_only_while_process_data_run(station: Station) -> None:
     """60FEh acts in OP (000:3101)."""
-    answer = station.http.post("/drives/m6l/io/forcing/outputs", json={"confirmed": True})
+    path = "/drives/m6l/io/forcing/outputs"
+    answer = station.http.post(path, json={"confirmed": True})
     assert answer.status_code == 409
     assert "process data" in answer.json()["detail"]
+    before = raw(station, "m6l", "2003:10")
+    put(station, "m6l", "2003:10", 28)
+    station.ok(station.http.post("/buses/cyclic", json={"url": URL, "cycle_us": 2000}))
+    try:
+        station.ok(station.http.post(path, json={"confirmed": True}))
+        station.ok(station.http.put(path, json={"values": {"DO1": True}}))
+        until(lambda: raw(station, "m6l", "200B:0E") & 1, 5, "DO1 is on")
+        station.ok(station.http.delete(path))
+        assert raw(station, "m6l", "200B:0E") & 1 == 0
+    finally:
+        station.ok(station.http.delete("/buses/cyclic", params={"url": URL}))
+    put(station, "m6l", "2003:10", before)
 
 
 def test_m6l_switches_a_virtual_input_on(station: Station) -> None:

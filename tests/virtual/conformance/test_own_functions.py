@@ -360,6 +360,20 @@ def test_m6l_forces_no_output_with_another_function() -> None:
     assert not do1(d)
 
 
+def test_r6l_forces_outputs_with_function_31_only() -> None:
+    """60FEh:02 lets its bits through (002:14003)."""
+    d = drive("r6l")
+    d.set_all({"2002:23": 31, "60FE:01": 1 << 17})
+    assert not d.get("200D:15") & 2
+    d.set("60FE:02", 1 << 17)
+    assert d.get("200D:15") & 2
+    d.set("2002:23", 2)
+    d.set("60FE:01", 0)
+    d.enable(1)
+    d.run(0.1)
+    assert d.get("200D:15") & 2  # in position, whatever the bus says
+
+
 def ep3e_with_brake() -> OnWire:
     """A hanging load; 6040h and 60FEh:01 and :02 as process data of ten bytes."""
     d = drive("ep3e", motor=BRAKED, friction=FrictionSpec(gravity_nm=0.05))

@@ -186,9 +186,10 @@ R6L = TerminalTable(
         39: "jog_forward",
         40: "jog_backward",
     },
-    output_uses={0: "brake", 1: "fault", 2: "in_position", 6: "homed"},
+    output_uses={0: "brake", 1: "fault", 2: "in_position", 6: "homed", 31: "bus"},
     inputs_key="200D:14",
     outputs_key="200D:15",
+    bus_outputs_need_function=True,  # the note at 002:14003
 )
 
 #: The parameters that select the functions stand before the excerpt: EMG on DI1, POT on DI2, NOT
