@@ -242,11 +242,18 @@ def scan(
             name = row["name"] or "no name"
             print(f"station {row['station']}: {name}  serial {row['serial']}  {which}")
         if not rows:
-            print("no drive answers: check power, cable, baud rate, parity and address")
+            print(f"no drive answers: check {_LOOK_AT[parse_url(url).scheme]}")
 
     run(work)
 
 
+_SERIAL = "power, cable, baud rate, parity and address"
+_LOOK_AT = {
+    "mlink": _SERIAL,
+    "modbus": _SERIAL,
+    "canopen": "power, cable, both terminating resistors, bit rate and node number",
+    "ethercat": "power, cable (computer to IN of the first drive) and the interface's name",
+}
 _FOUND = {
     "station", "vendor_id", "product_code", "revision", "serial", "name", "alias", "firmware",
     "state", "notes",
