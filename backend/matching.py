@@ -29,7 +29,8 @@ def match_profiles(kind: str, found: Found) -> list[Match]:
         if profile.link(kind) is None:
             continue
         identity = profile.identity
-        if identity.vendor_id is not None and found.vendor_id is not None:
+        # Vendor 0 does not exist (CiA 301 clause 7.5.2.19): such a drive does not tell its maker.
+        if identity.vendor_id is not None and found.vendor_id:
             if identity.vendor_id != found.vendor_id:
                 continue
             if identity.product_code is not None and identity.product_code == found.product_code:
@@ -40,7 +41,8 @@ def match_profiles(kind: str, found: Found) -> list[Match]:
         if any(re.search(p, found.name, re.IGNORECASE) for p in identity.name_patterns):
             matches.append(Match(profile, "likely", f"its name {found.name!r} fits"))
         else:
-            text = f"it answers over {kind}; the manual prints no identity to compare"
+            silent = "the manual prints" if identity.vendor_id is None else "the drive tells"
+            text = f"it answers over {kind}; {silent} no identity to compare"
             matches.append(Match(profile, "possible", text))
     order = ("certain", "likely", "possible")
     return sorted(matches, key=lambda m: order.index(m.confidence))

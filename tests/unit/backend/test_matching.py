@@ -1,0 +1,28 @@
+"""Which profile fits a found drive, by what it says of itself."""
+
+from __future__ import annotations
+
+import pytest
+
+from backend import matching
+from drivers.link import Found
+from profiles.schema import Profile
+
+
+@pytest.mark.parametrize(
+    ("found", "fits"),
+    [
+        (Found(1, vendor_id=0x2FE, product_code=5), ["certain"]),
+        (Found(1, vendor_id=0x2FE, product_code=6), ["likely"]),
+        (Found(1, vendor_id=0x999, product_code=5), []),
+        (Found(1, vendor_id=0, product_code=0), ["possible"]),  # tells nothing of itself
+        (Found(1), ["possible"]),
+    ],
+)
+def test_vendor_and_product(
+    found: Found, fits: list[str], profile: Profile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    identity = profile.identity.model_copy(update={"vendor_id": 0x2FE, "product_code": 5})
+    known = profile.model_copy(update={"identity": identity})
+    monkeypatch.setattr(matching, "load_all", lambda: {"sample": known})
+    assert [m.confidence for m in matching.match_profiles("mlink", found)] == fits
