@@ -68,6 +68,7 @@ async def serve(bench: Bench, serving: Serving) -> None:
     if server.started:
         shown = _address(serving, certificate, listening.getsockname()[1])
         _tell(shown, people, certificate)
+        _tell_problems(bench)
         if serving.open_page:
             webbrowser.open(shown)
     await running
@@ -167,6 +168,13 @@ def _tell(shown: str, people: People, certificate: Certificate | None) -> None:
     if people.setup_needed:
         print("  there is no administrator yet; the page asks for this code:")
         print(f"  {people.accounts.setup_code}", flush=True)
+
+
+def _tell_problems(bench: Bench) -> None:
+    """What went wrong at the start, such as a state folder that cannot be written."""
+    for entry in reversed(bench.journal.entries()):
+        if entry.level == "error":
+            print(f"  note: {entry.text}", flush=True)
 
 
 def _listen(host: str, port: int) -> socket.socket:

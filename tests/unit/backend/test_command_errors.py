@@ -14,6 +14,7 @@ from backend import cli
 from backend.bench import Bench
 from backend.commands import session
 from backend.commands.params import _assignment
+from backend.commands.serve import _tell_problems
 from backend.drive import Drive
 from drivers.errors import NotAllowed
 from tests.support.memory_link import MemoryLink
@@ -54,6 +55,20 @@ async def test_the_bench_refuses_it_too(tmp_path: Path, link: MemoryLink) -> Non
         assert bench.members == {}
     finally:
         await bench.close()
+
+
+async def test_a_state_folder_that_cannot_be_used_is_told_in_the_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    bench = Bench(tmp_path / "file")
+    await bench.restore()
+    try:
+        _tell_problems(bench)
+    finally:
+        await bench.close()
+    assert "  note: " in (said := capsys.readouterr().out)
+    assert f"{tmp_path}/file" in said
 
 
 @pytest.mark.parametrize("text", ["nan", "inf", "-inf", "1e400", "five"])
