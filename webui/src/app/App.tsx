@@ -67,10 +67,7 @@ function Page() {
 }
 
 /** A defect in one page must not take STOP away with it. */
-class Guard extends Component<
-  { children: ReactNode; stop?: boolean },
-  { error: Error | null }
-> {
+class Guard extends Component<{ children: ReactNode; stop?: boolean }, { error: Error | null }> {
   override state = { error: null as Error | null }
 
   static getDerivedStateFromError(error: Error) {

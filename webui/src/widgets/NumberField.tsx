@@ -58,6 +58,7 @@ export function NumberField({
       description={help}
       inputMode="decimal"
       disabled={disabled}
+      placeholder={optional ? undefined : t('number.needed')}
       aria-required={!optional}
       onBlur={() => setTouched(true)}
       value={text}

@@ -130,6 +130,7 @@ export const frame = {
   'job.failed': ['{title}: failed', '{title}：失败'],
   'job.elapsed': ['{time} so far', '已用 {time}'],
   'job.remaining': ['about {time} left', '约剩 {time}'],
+  'number.needed': ['needed', '必填'],
   'number.missing': ['a number is needed', '需要一个数值'],
   'number.bad': ['not a number', '不是数值'],
   'number.whole': ['a whole number is needed', '需要整数'],
