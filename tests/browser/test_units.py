@@ -31,12 +31,34 @@ def test_a_screw_becomes_a_gear_and_is_taken_back(laptop: Page, bench: Bench) ->
     # Overview shows travel beside revolutions.
     open_axis(page, bench.drive, "overview")
     expect(page.get_by_text("Travel", exact=True)).to_be_visible()
+    _move_in_millimetres(page, bench)
     open_axis(page, bench.drive, "setup")
     bench.write("6092:01", before)
     page.get_by_role("button", name="Forget the mechanics").click()
     expect(page.get_by_role("button", name="Forget the mechanics")).to_have_count(0)
     open_axis(page, bench.drive, "overview")
     expect(page.get_by_text("Travel", exact=True)).to_have_count(0)
+
+
+def _move_in_millimetres(page: Page, bench: Bench) -> None:
+    """Typed in mm, refused in mm, moved by mm; going back to revolutions leaves no number."""
+    start = bench.state()["position"]
+    open_axis(page, bench.drive, "motion")
+    page.get_by_text("Move", exact=True).click()
+    target = page.get_by_role("textbox", name="Target")
+    target.fill("5")
+    page.locator(".travel-unit").get_by_text("mm").click()
+    expect(target).to_have_value("")
+    target.fill("500")
+    page.get_by_role("button", name="Start the move").click()
+    expect(page.get_by_text("+500 mm from the start point")).to_be_visible()
+    target.fill("5")
+    page.get_by_role("button", name="Start the move").click()
+    # 10 mm for each revolution.
+    until(lambda: abs(bench.state()["position"] - start - 0.5) < 0.01, what="the axis moved 5 mm")
+    bench.wait_standing()
+    page.locator(".travel-unit").get_by_text("rev").click()
+    expect(target).to_have_value("")
 
 
 def test_what_cannot_be_is_said_before_it_is_written(laptop: Page, bench: Bench) -> None:
