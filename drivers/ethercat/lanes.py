@@ -143,14 +143,13 @@ class Lanes:
         due = [at for lane in self._order if (at := lane.due_s()) is not None]
         return min(due, default=None)
 
-    def step(self) -> bool:
+    def step(self, room: int = ROOM_BYTES) -> bool:
         """Do the next access of every lane that is due, in one frame. False when none is.
 
-        A lane that may not fit any more is the first of the next frame.
+        A lane that may not fit into ``room`` bytes any more is the first of the next frame.
         """
         now = self._clock()
         frame: list[tuple[_Job, Request]] = []
-        room = ROOM_BYTES
         for _ in range(len(self._order)):
             lane = self._order[0]
             if frame and lane.widest > room:
@@ -161,7 +160,7 @@ class Lanes:
                 continue
             size = bytes_of(taken[1][1])
             lane.widest = max(lane.widest, size)
-            if size > room:
+            if frame and size > room:
                 # Never kept for later: a stop might come in between.
                 self._send(frame)
                 frame, room = [], ROOM_BYTES

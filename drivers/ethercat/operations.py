@@ -14,6 +14,7 @@ from drivers.ethercat import coe, esc, firmware, reading, sii
 from drivers.ethercat import station as transactions
 from drivers.ethercat.al_status import AlState, state_name
 from drivers.ethercat.cyclic import CyclicLoop
+from drivers.ethercat.frames import ROOM_BYTES
 from drivers.ethercat.information import ObjectInfo
 from drivers.ethercat.lanes import Done, Lanes, Urgency
 from drivers.ethercat.protocol import Message, error_to_wire
@@ -26,6 +27,8 @@ from drivers.ethercat.station import Station
 _CONTROL_WORD = 0x6040
 _MAX_STEPS_PER_CYCLE = 16
 _STARVED_CYCLES = 8
+_NS_PER_BYTE = 80
+"""100 Mbit/s: a frame may not become so long that process data wait for it."""
 
 
 class Operations:
@@ -85,7 +88,9 @@ class Operations:
         if loop is None:
             return
         done = 0
-        while done < _MAX_STEPS_PER_CYCLE and loop.spare_ns() > 0 and self.lanes.step():
+        while done < _MAX_STEPS_PER_CYCLE and (spare_ns := loop.spare_ns()) > 0:
+            if not self.lanes.step(min(spare_ns // _NS_PER_BYTE, ROOM_BYTES)):
+                break
             done += 1
             if self.segment.silent:
                 # Nothing comes back: process data must not wait for more of that.

@@ -40,7 +40,7 @@ def read_items(
             yield Gap()
             whole = yield from _read_whole(station, index, sizes)
             known = whole | _void_of(station, index, whole)
-            results.update({item: known[item[1]] for item in members if item[1] in known})
+            results.update({item: _sized(item, known) for item in members if item[1] in known})
         for item in members:
             if item in results:
                 continue
@@ -62,6 +62,12 @@ def read_items(
             _remember_void(station, index, whole, good)
         on_progress(len(results))
     return [results[item] for item in items]
+
+
+def _sized(item: Item, known: dict[int, bytes]) -> bytes:
+    """A value of a whole object; a count as wide as its manual prints it (1C12h: UINT16)."""
+    _, subindex, size = item
+    return known[subindex].ljust(size or 0, b"\0") if subindex == 0 else known[subindex]
 
 
 def _sizes_of_whole(station: Station, index: int, members: Sequence[Item]) -> dict[int, int]:

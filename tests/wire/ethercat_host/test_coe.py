@@ -338,3 +338,18 @@ def test_entries_beyond_the_count_of_a_list_are_asked_for_once_until_it_changes(
         assert slave.run(read_items(station, items, lambda _n: None)) == told
         asked.append(len(slave.requests) - before)
     assert asked == [3, 1, 3, 1]
+
+
+def test_a_count_that_is_printed_wider_comes_as_wide() -> None:
+    """1C12:00 is UINT16 in the manual of the MMS7 (004:1437), and one byte of the whole object."""
+
+    def react(request: bytes) -> list[bytes]:
+        assert request[2] == 0x50
+        whole = b"\x01\x00\x00\x16"
+        return [coe(3, b"\x53" + request[3:6] + whole)]
+
+    slave = ScriptedSlave(react)
+    station = Station(1, mailbox=slave.box())
+    items = [(0x1C12, 0, 2), (0x1C12, 1, 2)]
+    told = slave.run(read_items(station, items, lambda _n: None))
+    assert told == [b"\x01\x00", b"\x00\x16"]

@@ -17,7 +17,7 @@ POSITION = Address(0x607A, 0, "INT32")
 
 @pytest.fixture(scope="module")
 def odd_rig(namespace: Namespace) -> Iterator[Rig]:
-    rig = Rig(namespace, ("fixed", "without_dc"))
+    rig = Rig(namespace, ("fixed", "without_dc"), lockstep=True)
     yield rig
     rig.segment.close()
 

@@ -96,3 +96,19 @@ def test_lanes_share_a_frame_as_far_as_it_reaches(mailbox: int, frames: int) -> 
     assert sum(wire.counts) == 12
     assert max(wire.sizes) <= ROOM_BYTES
     assert len(wire.counts) == 3 * frames
+
+
+def test_with_little_time_a_frame_carries_one_access() -> None:
+    wire = Frames()
+    lanes = Lanes(wire, lambda: 0.0)
+
+    def job() -> Steps[None]:
+        yield Write(0x1000, bytes(128))
+        yield Write(0x1000, bytes(128))
+
+    for station in range(1, 4):
+        lanes.submit(station, "mailbox", job(), lambda _r, _e: None)
+    while lanes.step(10):
+        pass
+    assert sum(wire.counts) == 6
+    assert max(wire.counts) == 1

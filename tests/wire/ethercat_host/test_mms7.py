@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.cia402 import Mode, State
-from drivers.errors import Rejected
+from drivers.errors import DriveError
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
@@ -22,7 +22,9 @@ ACTUAL = Address(0x6064, 0, "INT32")
 
 @pytest.fixture(scope="module")
 def mms7(namespace: Namespace) -> Iterator[VirtualSegment]:
-    with VirtualSegment.start("ec0s", ["--drive", "mms7", "--sdo-ms", "0.3"], namespace) as made:
+    """Its time follows the frames, so that a busy machine is no trouble."""
+    arguments = ["--drive", "mms7", "--sdo-ms", "0.3", "--lockstep"]
+    with VirtualSegment.start("ec0s", arguments, namespace) as made:
         yield made
 
 
@@ -37,7 +39,7 @@ async def test_mms7_is_read_whole_and_moves(namespace: Namespace, mms7: VirtualS
         for p in profile.parameters
         if p.index is not None and p.access != "wo"
     ]
-    link = EthercatLink("ec0m", launcher=namespace.command([]))
+    link = EthercatLink("ec0m", launcher=namespace.command([]), lockstep=1.0)
     bus = Bus(link)
     await link.open()
     try:
@@ -49,7 +51,7 @@ async def test_mms7_is_read_whole_and_moves(namespace: Namespace, mms7: VirtualS
         once = await link.read_many(1, addresses)
         again = await link.read_many(1, addresses)
         singles = [await link.read(1, address) for address in addresses[::7]]
-        assert not [a for a in once if isinstance(a, Rejected)]
+        assert not [a for a in (*once, *again) if isinstance(a, DriveError)]
         steady = [
             (a, b, c) for a, b, c in zip(once[::7], again[::7], singles, strict=True) if a == b
         ]
