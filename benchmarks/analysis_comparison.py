@@ -27,13 +27,16 @@ from scipy.signal import csd, find_peaks, welch  # noqa: E402
 
 from backend.analysis.arrays import ComplexArray, FloatArray  # noqa: E402
 from backend.analysis.excitation import chirp, scaled, stepped_sine  # noqa: E402
-from backend.analysis.frf import Record, estimate_stepped  # noqa: E402
+from backend.analysis.frf_aperiodic import estimate_stepped  # noqa: E402
 from backend.analysis.identify import Identification, identify_mechanics  # noqa: E402
+from backend.analysis.line_spectra import Record  # noqa: E402
 from backend.analysis.sampling import SignalPath  # noqa: E402
 
 _Answer = TypeVar("_Answer")
 
 RATES_HZ = (1000.0, 4000.0)
+#: A frequency further off than this share belongs to something else.
+_SAME = 0.15
 #: Torque of the stepped sine and the sweep, as the multisine's, in Nm.
 AMPLITUDE_NM = 0.35 * 1.27
 
@@ -100,7 +103,7 @@ def _nearest(found: FloatArray, truth: float) -> str:
         return "   none"
     best = float(found[np.argmin(np.abs(found / truth - 1.0))])
     off = 100 * (best / truth - 1.0)
-    return f"{off:+6.2f} %" if abs(off) < 15 else "   none"
+    return f"{off:+6.2f} %" if abs(off) < 100 * _SAME else "   none"
 
 
 def _responses(names: list[str]) -> dict[tuple[str, float], Identification]:
@@ -142,10 +145,9 @@ def _resonances(kept: dict[tuple[str, float], Identification]) -> None:
             if hz > min(0.4 * rate, 1000.0):
                 continue
             own = np.array([m.frequency_hz for m in modes])
-            ratio = ""
-            if own.size:
-                mode = modes[int(np.argmin(np.abs(own - hz)))]
-                ratio = f"({100 * (mode.damping / damping - 1):+5.1f} %)"
+            near = [m for m in modes if abs(m.frequency_hz / hz - 1) < _SAME]
+            best = min(near, key=lambda m: abs(m.frequency_hz / hz - 1), default=None)
+            ratio = "" if best is None else f"({100 * (best.damping / damping - 1):+5.1f} %)"
             print(
                 f"{name:10s} {rate:5.0f}  {hz:8.1f}   {_nearest(own, hz)} {ratio:10s}"
                 f"   {_nearest(peaks, hz)}"

@@ -22,3 +22,15 @@ def magnitude_db(response: ComplexArray) -> FloatArray:
 def phase_deg(response: ComplexArray) -> FloatArray:
     """Unwrapped phase in degrees, the first line in (-180, 180]."""
     return np.asarray(np.degrees(np.unwrap(np.angle(response))), dtype=np.float64)
+
+
+def neighbour_mean(x: FloatArray, reach: int) -> FloatArray:
+    """Mean over a line and ``reach`` lines on each side (fewer at the ends)."""
+    width = 2 * reach + 1
+    kernel = np.ones(width)
+    return np.asarray(
+        np.convolve(x, kernel, "same")[: x.size]
+        / np.convolve(np.ones(x.size), kernel, "same")[: x.size]
+        if x.size >= width
+        else np.full(x.size, np.mean(x))
+    )

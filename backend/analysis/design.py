@@ -125,13 +125,21 @@ def continuous_notch(notch: Notch, frequency_hz: FloatArray) -> ComplexArray:
     return notch.response(frequency_hz)
 
 
+#: A resonance is known a little way beyond the highest line.
+_BEYOND = 1.25
+
+
 @dataclass(frozen=True)
 class MeasuredPlant:
-    """Mechanics on a dense grid: measured lines where there are any, the model elsewhere."""
+    """Mechanics on a dense grid: measured lines where there are any, the model elsewhere.
+
+    ``measured_hz`` is the highest of these lines.
+    """
 
     frequency_hz: FloatArray
     correction: ComplexArray
     model: MechanicalModel
+    measured_hz: float
 
     def response(self, frequency_factor: float = 1.0, damping_factor: float = 1.0) -> ComplexArray:
         """Response with all modes moved; the measured deviation from the model stays."""
@@ -154,19 +162,25 @@ def measured_plant(
     grid += [np.geomspace(0.85 * x, 1.18 * x, 60) for x in special if 1.0 < x < highest_hz / 1.2]
     dense = np.unique(np.concatenate(grid))
     if f.size < 2:
-        return MeasuredPlant(dense, np.ones(dense.size, dtype=np.complex128), model)
+        return MeasuredPlant(dense, np.ones(dense.size, dtype=np.complex128), model, 0.0)
     log_ratio = np.log(frf.response[use] / model.response(f))
     fade_f = np.concatenate([[f[0] / 1.26], f, [f[-1] * 1.26]])
     fade = np.concatenate([[0.0], log_ratio, [0.0]])
     x, xp = np.log(dense), np.log(fade_f)
     joined = np.interp(x, xp, fade.real) + 1j * np.interp(x, xp, fade.imag)
-    return MeasuredPlant(dense, np.exp(joined), model)
+    return MeasuredPlant(dense, np.exp(joined), model, float(f[-1]))
 
 
-def notch_sets(model: MechanicalModel, slots: int) -> list[tuple[Notch, ...]]:
-    """No notch, then notches on the highest one, two, … resonances in several shapes."""
+def notch_sets(model: MechanicalModel, slots: int, highest_hz: float) -> list[tuple[Notch, ...]]:
+    """No notch, then notches on the highest one, two, … resonances in several shapes.
+
+    A mode above ``highest_hz`` stands for whatever is stiffer than what was measured: where it
+    lies exactly nobody knows, so it gets no notch.
+    """
     heights = []
     for mode in model.modes:
+        if mode.frequency_hz > highest_hz:
+            continue
         f = np.array([mode.frequency_hz])
         rest = replace(model, modes=tuple(m for m in model.modes if m is not mode))
         rise = float(np.abs(model.response(f))[0] / np.abs(rest.response(f))[0])
@@ -277,7 +291,7 @@ def design(
     bandwidths = np.geomspace(1.0, highest, 48)
     found: list[Candidate] = []
     marks: tuple[Mark, ...] = ("robust", "balanced", "fast")
-    for notches in notch_sets(plant.model, slots):
+    for notches in notch_sets(plant.model, slots, _BEYOND * plant.measured_hz):
         try:
             filters = np.prod([notch_response(n, f) for n in notches], axis=0) * fixed
         except ValueError:

@@ -14,19 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backend.analysis.arrays import ComplexArray
-from backend.analysis.frf import (
-    Frf,
-    Quantity,
-    Record,
-    estimate_periodic,
-    loop_spectra,
-    valid_band_hz,
-)
+from backend.analysis.frf import Frf, estimate_periodic, valid_band_hz
+from backend.analysis.line_spectra import Quantity, Record, loop_spectra
 from backend.analysis.loop_fit import fit_loop
 from backend.analysis.model_fit import fit_sampled_model
 from backend.analysis.path_fit import find_paths
 from backend.analysis.sampled_model import LoopModel, SampledFit
-from backend.analysis.sampling import SignalPath, delay_response, lag_response
+from backend.analysis.sampling import STEP_LEAD_S, SignalPath, delay_response, lag_response
 from backend.analysis.settling import settled
 
 #: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
@@ -38,6 +32,8 @@ TRUSTED_ERROR = 0.03
 
 #: At most this many rounds of refining loop, path and mechanics against each other.
 _PASSES = 4
+#: What half a cycle of delay weighs, in the criterion's units, is half of this.
+_FRACTION = 100.0
 
 
 @dataclass(frozen=True)
@@ -92,7 +88,8 @@ def identify_with_path(
     best = min(trials, key=lambda t: t.fit.score + _implausible(t.fit))
 
     def again(fit: SampledFit) -> SignalPath:
-        return find_paths(records, path, loop_closed=True, hold_known=hold_known, motion=fit)[0]
+        known = replace(path, hold=fit.path.hold)
+        return find_paths(records, known, loop_closed=True, hold_known=True, motion=fit)[0]
 
     return _identification(task.refined(best, again), 0.0)
 
@@ -158,9 +155,12 @@ def _alike(one: SignalPath, other: SignalPath) -> bool:
 
 
 def _implausible(fit: SampledFit) -> float:
-    """A drive does not report what has not happened yet."""
-    cycles = -fit.delay_s * fit.path.sample_rate_hz
-    return 1e3 * max(cycles - 0.1, 0.0)
+    """A drive does not report what has not happened yet, and takes set-points at whole cycles."""
+    path = fit.path
+    early = max(-fit.delay_s * path.sample_rate_hz - 0.1, 0.0)
+    lead_s = STEP_LEAD_S if path.hold == "linear" else 0.0
+    cycles = (path.command_delay_s + lead_s) * path.sample_rate_hz
+    return 1e3 * early + _FRACTION * abs(cycles - round(cycles))
 
 
 def _identification(trial: _Trial, jitter_s: float) -> Identification:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.frf import Record, mean_spectra
+from backend.analysis.line_spectra import Record, mean_spectra
 from backend.analysis.sampled_model import SampledFit
 from backend.analysis.sampling import (
     STEP_LEAD_S,

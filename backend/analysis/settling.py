@@ -14,7 +14,7 @@ import numpy as np
 
 from backend.analysis.arrays import ComplexArray, FloatArray, IntArray
 from backend.analysis.excitation import Excitation
-from backend.analysis.frf import Record
+from backend.analysis.line_spectra import Record
 
 #: At most so many swings; each must stand so far above what lies around it (power).
 _MOST, _ABOVE = 5, 40.0

@@ -9,7 +9,8 @@ import numpy as np
 from drive_sim import TURN, Drive, Mechanics, simulate
 
 from backend.analysis.excitation import BaseMotion, choose_lines, multisine, scaled
-from backend.analysis.frf import Frf, Quantity, Record
+from backend.analysis.frf import Frf
+from backend.analysis.line_spectra import Quantity, Record
 from backend.analysis.sampling import SignalPath
 
 RIGID = Mechanics()

@@ -8,15 +8,10 @@ from drive_sim import TURN, Drive, Mechanics, simulate
 from measured_axes import HEAVY, NAMED, ONE, RIGID, STIFF, THREE, TWO, VERTICAL, errors, measure
 
 from backend.analysis.excitation import chirp, choose_lines, multisine, scaled, stepped_sine
-from backend.analysis.frf import (
-    Record,
-    empty_line_levels,
-    estimate_aperiodic,
-    estimate_periodic,
-    estimate_stepped,
-    valid_band_hz,
-)
+from backend.analysis.frf import estimate_periodic, valid_band_hz
+from backend.analysis.frf_aperiodic import estimate_aperiodic, estimate_stepped
 from backend.analysis.identify import identify_mechanics
+from backend.analysis.line_spectra import Record, empty_line_levels
 from backend.analysis.sampling import SignalPath, hold_response, sampled_command
 
 

@@ -8,8 +8,9 @@ from drive_sim import TURN, Drive, Mechanics
 from random_axes import RATED_NM, Case, errors, played, result_of
 from scipy.optimize import least_squares
 
-from backend.analysis.frf import Record, estimate_periodic
+from backend.analysis.frf import estimate_periodic
 from backend.analysis.identify import identify_with_path
+from backend.analysis.line_spectra import Record
 from backend.analysis.path_fit import find_paths
 from backend.analysis.robust_fit import minimise
 from backend.analysis.sampling import SignalPath, sampled_command, sampled_command_response

@@ -6,7 +6,8 @@ from drive_sim import TURN, Drive, Mechanics
 from random_axes import RATED_NM, Case, errors, played, result_of
 
 from backend.analysis.excitation import choose_lines, multisine
-from backend.analysis.frf import Record, estimate_periodic
+from backend.analysis.frf import estimate_periodic
+from backend.analysis.line_spectra import Record
 from backend.analysis.sampling import SignalPath
 from backend.analysis.settling import settled
 

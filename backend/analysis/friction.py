@@ -1,0 +1,68 @@
+"""Coulomb friction, from how the realisations of a frequency response differ."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from backend.analysis.arrays import ComplexArray, FloatArray, neighbour_mean
+from backend.analysis.line_spectra import (
+    LineSpectra,
+    Quantity,
+    continuous_input,
+    instrument_estimate,
+)
+from backend.analysis.sampling import SignalPath
+
+#: No line is weighed as if its noise were less than this share of an ordinary line's.
+_LEAST_NOISE = 0.1
+#: Friction is taken out where that leaves less than this share of the scatter.
+_WORTH_TAKING = 0.9
+
+
+def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> float:
+    """Coulomb friction that best explains the scatter between realisations.
+
+    Friction is the one nonlinearity every axis has. Subtracting Tc·sign(v) from the torque
+    leaves the linear mechanics; Tc is where the error, as torque, summed over all lines is
+    smallest. Zero where realisations do not suffice or nothing is gained.
+    """
+    if len(s.sent) < 2:
+        return 0.0
+    plain = continuous_input(s, path, quantity)
+    limit = float(
+        max(np.median(np.abs(u)) for u in plain) / s.samples * 2.0 * np.sqrt(s.lines.size)
+    )
+    # Alike first, since friction shows best where its lines are many; behind a coarse encoder
+    # the upper lines are mostly noise, and drown it.
+    for weight in (np.ones(s.frequency_hz.size), _torque_weight(s, plain)):
+        found = minimize_scalar(
+            _scatter, bounds=(0.0, limit), method="bounded", args=(s, plain, weight)
+        )
+        if found.fun < _WORTH_TAKING * _scatter(0.0, s, plain, weight):
+            return float(found.x)
+    return 0.0
+
+
+def _scatter(
+    coulomb_nm: float, s: LineSpectra, plain: list[ComplexArray], weight: FloatArray
+) -> float:
+    """What no linear mechanics explain with this friction taken out, as torque."""
+    inputs = [u - coulomb_nm * d for u, d in zip(plain, s.direction, strict=True)]
+    g, _, _ = instrument_estimate(s, inputs)
+    errors = np.array(
+        [y.mean(axis=0) / g - u.mean(axis=0) for y, u in zip(s.response, inputs, strict=True)]
+    )
+    return float(np.sum(np.abs(errors) ** 2 * weight))
+
+
+def _torque_weight(s: LineSpectra, inputs: list[ComplexArray]) -> FloatArray:
+    """One over the noise variance of each line as a torque; alike where one period tells none."""
+    g, _, _ = instrument_estimate(s, inputs)
+    errors = [y / g - u for y, u in zip(s.response, inputs, strict=True)]
+    freedom = s.used - len(errors)
+    if freedom == 0:
+        return np.ones(g.size)
+    noise = np.sum([np.sum(np.abs(e - e.mean(axis=0)) ** 2, axis=0) for e in errors], axis=0)
+    noise = neighbour_mean(noise / freedom, 3)
+    return np.asarray(1.0 / (noise + _LEAST_NOISE * np.median(noise)))

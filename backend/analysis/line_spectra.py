@@ -1,0 +1,319 @@
+"""Recordings as spectra on the excited lines, and what really drove the axis there.
+
+What the torque was between two bus cycles is reconstructed from the sent sequence, see
+:mod:`backend.analysis.sampling`. Periods with a lost cycle are left out, never interpolated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from backend.analysis.excitation import Excitation, Segment
+from backend.analysis.sampling import (
+    SignalPath,
+    command_response,
+    delay_response,
+    hold_response,
+    reported_response,
+    sampled_command,
+)
+
+#: *torque_mode*: nothing but the injection makes torque. *torque_injection*: a speed or position
+#: loop adds its own torque. *closed_loop*: from the loop's reference to the response.
+Quantity = Literal["torque_mode", "torque_injection", "closed_loop"]
+
+
+@dataclass(frozen=True)
+class Record:
+    """One played excitation: ``excitation.samples`` are the sent values in units of the injection.
+
+    ``response`` [n] is velocity or position, ``torque`` [n] the reported torque (needed for
+    *torque_injection*), ``valid`` [n] False where a cycle was lost or late, ``position`` [n] the
+    integral of a velocity ``response`` as the drive reports it.
+    """
+
+    excitation: Excitation
+    response: FloatArray
+    torque: FloatArray | None = None
+    valid: BoolArray | None = None
+    position: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        n = self.excitation.samples.size
+        for signal in (self.response, self.torque, self.valid, self.position):
+            if signal is not None and signal.shape != (n,):
+                raise ValueError(f"signals must have {n} samples, as the excitation has")
+
+
+@dataclass(frozen=True)
+class LineSpectra:
+    """Line spectra of all good periods: arrays [m realisations][p periods, lines].
+
+    ``torque`` is the loop's own torque, ``direction`` the direction of motion (-1 to 1) that
+    Coulomb friction follows.
+    """
+
+    frequency_hz: FloatArray
+    lines: IntArray
+    sent: tuple[ComplexArray, ...]
+    response: tuple[ComplexArray, ...]
+    torque: tuple[ComplexArray, ...]
+    direction: tuple[ComplexArray, ...]
+    realisation: tuple[int, ...]
+    samples: int
+    used: int
+    dropped: int
+
+
+def good_periods(record: Record) -> tuple[list[int], int]:
+    """Numbers of the usable periods, and how many had to be dropped.
+
+    A gap spoils its own period; the one after it is kept, since the axis itself saw nothing.
+    """
+    e = record.excitation
+    if e.segments:
+        return _good_halves(record)
+    numbers = range(e.transient_periods, e.periods)
+    if record.valid is None:
+        return list(numbers), 0
+    good = [
+        p
+        for p in numbers
+        if np.all(record.valid[e.first_sample + p * e.period_samples :][: e.period_samples])
+    ]
+    return good, len(numbers) - len(good)
+
+
+def _good_halves(record: Record) -> tuple[list[int], int]:
+    """The two halves of all tones of a stepped sine count as two periods.
+
+    A gap in one tone spoils its half for all of them: a spectrum needs every line.
+    """
+    if record.valid is None:
+        return [0, 1], 0
+    valid = record.valid
+    spoiled = {
+        half
+        for segment in record.excitation.segments
+        for half in (0, 1)
+        if not np.all(valid[_half_of(segment, half)])
+    }
+    return [half for half in (0, 1) if half not in spoiled], len(spoiled)
+
+
+def _half_of(segment: Segment, half: int) -> slice:
+    length = segment.samples // 2
+    return slice(segment.start + half * length, segment.start + (half + 1) * length)
+
+
+def tone_amplitudes(signal: FloatArray, e: Excitation, halves: list[int]) -> ComplexArray:
+    """Amplitudes [halves, tones] of a stepped sine, least squares beside mean and drift."""
+    found = np.zeros((len(halves), len(e.segments)), dtype=np.complex128)
+    for i, segment in enumerate(e.segments):
+        for j, half in enumerate(halves):
+            cut = _half_of(segment, half)
+            n = np.arange(cut.start, cut.stop)
+            turn = 2 * np.pi * segment.frequency_hz * n / e.sample_rate_hz
+            basis = np.column_stack([np.cos(turn), -np.sin(turn), np.ones(n.size), n - n.mean()])
+            c = np.linalg.lstsq(basis, signal[n], rcond=None)[0]
+            found[j, i] = c[0] + 1j * c[1]
+    return found
+
+
+def period_spectra(signal: FloatArray, e: Excitation, periods: list[int]) -> ComplexArray:
+    """Spectra [periods, lines], with the drift between the periods taken out.
+
+    A drift of s per sample would leak onto every line; the difference of the means of two
+    periods is exactly s·N for a periodic signal plus drift, whatever the signal is.
+    """
+    if e.segments:
+        return tone_amplitudes(signal, e, periods)
+    n = e.period_samples
+    blocks = np.array([signal[e.first_sample + p * n :][:n] for p in periods])
+    if len(periods) > 1:
+        means = blocks.mean(axis=1)
+        drift = np.gradient(means, np.array(periods, dtype=np.float64)) / n
+        blocks = blocks - drift[:, None] * np.arange(n)[None, :]
+    return np.asarray(np.fft.rfft(blocks, axis=1)[:, e.lines])
+
+
+def _velocity_from_position(
+    record: Record, e: Excitation, periods: list[int], rate: float
+) -> ComplexArray:
+    """Spectra [periods, lines] of the velocity by way of the reported position.
+
+    An axis that gains speed makes a parabola, whose curvature the velocity tells; the rest of the
+    drift is the difference between two periods.
+    """
+    if record.position is None:
+        raise ValueError("the recording has no position")
+    if e.segments:
+        return tone_amplitudes(record.position, e, periods) * (2j * np.pi * e.line_hz)
+    n = e.period_samples
+    curvature = 0.0
+    if len(periods) > 1:
+        means = [float(record.response[e.first_sample + p * n :][:n].mean()) for p in periods]
+        curvature = (means[-1] - means[0]) / ((periods[-1] - periods[0]) * n) / rate
+    t = np.arange(record.position.size) - e.first_sample
+    straight = record.position - 0.5 * curvature * t**2
+    spectra = period_spectra(np.asarray(straight), e, periods)
+    return np.asarray(spectra * (2j * np.pi * e.line_hz))
+
+
+def collect(
+    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, *, position: bool = False
+) -> LineSpectra:
+    """Spectra of all good periods; ``position`` takes the velocity from the reported position.
+
+    Raises:
+        ValueError: no period is whole, or the records do not belong together.
+    """
+    first = records[0].excitation
+    if first.period_samples == 0 and not first.segments:
+        raise ValueError("period-synchronous estimation needs a periodic excitation, or tones")
+    sent, response, torque, direction = [], [], [], []
+    realisation: list[int] = []
+    used = dropped = 0
+    for record in records:
+        e = record.excitation
+        if e.period_samples != first.period_samples or not np.array_equal(e.lines, first.lines):
+            raise ValueError("all realisations must share period length and lines")
+        good, lost = good_periods(record)
+        used, dropped = used + len(good), dropped + lost
+        if not good:
+            continue
+        realisation.append(e.realisation)
+        sent.append(period_spectra(e.samples, e, good))
+        response.append(
+            _velocity_from_position(record, e, good, path.sample_rate_hz)
+            if position
+            else period_spectra(record.response, e, good)
+        )
+        direction.append(
+            period_spectra(_direction(record.response), e, good)
+            * _centre_of_interval(e.line_hz, path.sample_rate_hz)
+        )
+        if quantity == "torque_injection":
+            torque.append(period_spectra(own_torque(record, path), e, good))
+    if not sent:
+        raise ValueError("every period has a gap; nothing is left to evaluate")
+    return LineSpectra(
+        first.line_hz, first.lines, tuple(sent), tuple(response), tuple(torque),
+        tuple(direction), tuple(realisation), first.period_samples or 2, used, dropped,
+    )  # fmt: skip
+
+
+def own_torque(record: Record, path: SignalPath) -> FloatArray:
+    """The sampled torque without what the injection contributes to it: the loop's own part."""
+    if record.torque is None:
+        raise ValueError("torque_injection needs the reported torque")
+    return record.torque - sampled_command(record.excitation.samples, path)
+
+
+def _direction(velocity: FloatArray) -> FloatArray:
+    """Mean sign of the velocity between each sample and the next, linear in between."""
+    after = np.append(velocity[1:], velocity[-1])
+    rise = after - velocity
+    moving = np.abs(rise) > 1e-12
+    safe = np.where(moving, rise, 1.0)
+    return np.where(moving, (np.abs(after) - np.abs(velocity)) / safe, np.sign(velocity))
+
+
+def _centre_of_interval(frequency_hz: FloatArray, sample_rate_hz: float) -> ComplexArray:
+    """Turns a spectrum of interval means into that of the signal at the interval's start."""
+    x = frequency_hz / sample_rate_hz
+    return np.asarray(np.exp(-1j * np.pi * x) / np.sinc(x), dtype=np.complex128)
+
+
+def continuous_input(
+    s: LineSpectra, path: SignalPath, quantity: Quantity, coulomb_nm: float = 0.0,
+    *, position: bool = False,
+) -> list[ComplexArray]:  # fmt: skip
+    """What really drove the measured quantity, per realisation [periods, lines]."""
+    f = s.frequency_hz
+    if quantity == "closed_loop":
+        whole = hold_response(f, path.sample_rate_hz, path.hold) * delay_response(
+            f, path.command_delay_s + path.response_delay_s
+        )
+        return [r * whole for r in s.sent]
+    late = reported_response(f, path)
+    if position:
+        late = delay_response(f, path.response_delay_s)
+    direct = command_response(f, path)
+    inputs: list[ComplexArray] = [r * direct * late for r in s.sent]
+    if quantity == "torque_injection":
+        inputs = [u + own * late for u, own in zip(inputs, s.torque, strict=True)]
+    if coulomb_nm:
+        # The direction comes from the reported velocity and is late already.
+        ahead = late / reported_response(f, path)
+        inputs = [u - coulomb_nm * ahead * d for u, d in zip(inputs, s.direction, strict=True)]
+    return inputs
+
+
+def instrument_estimate(
+    s: LineSpectra, inputs: list[ComplexArray]
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """S_yr / S_ur with both cross spectra, from the means over periods."""
+    r_mean = [r.mean(axis=0) for r in s.sent]
+    pairs = zip(s.response, r_mean, strict=True)
+    s_yr = np.asarray(sum(y.mean(axis=0) * r.conj() for y, r in pairs))
+    s_ur = np.asarray(sum(u.mean(axis=0) * r.conj() for u, r in zip(inputs, r_mean, strict=True)))
+    return np.asarray(s_yr / s_ur), s_yr, s_ur
+
+
+def empty_line_levels(record: Record) -> tuple[float, float]:
+    """RMS amplitude on the empty even and the empty odd bins between the excited lines.
+
+    With an odd-only multisine these are even- and odd-order distortion plus noise, in units of
+    the response signal (Pintelon & Schoukens section 4.4). NaN where there are no such bins.
+    """
+    e = record.excitation
+    good, _ = good_periods(record)
+    bins = np.arange(e.lines[0], e.lines[-1] + 1)
+    empty = np.setdiff1d(bins, np.append(e.lines, e.base_line))
+    spectrum = period_spectra(record.response, replace(e, lines=empty), good)
+    level = np.abs(spectrum.mean(axis=0)) * 2.0 / e.period_samples
+
+    def rms(selected: FloatArray) -> float:
+        return float(np.sqrt(np.mean(selected**2))) if selected.size else float("nan")
+
+    return rms(level[empty % 2 == 0]), rms(level[empty % 2 == 1])
+
+
+def mean_spectra(
+    records: tuple[Record, ...],
+) -> tuple[FloatArray, FloatArray, ComplexArray, ComplexArray]:
+    """Lines in Hz, and cross spectra with the injection of itself, the torque and the velocity.
+
+    Sums over the records' means; torque as reported, nothing taken from it.
+    """
+    parts = []
+    for record in records:
+        e = record.excitation
+        good, _ = good_periods(record)
+        if not good or record.torque is None:
+            continue
+        r, t, v = (
+            period_spectra(signal, e, good).mean(axis=0)
+            for signal in (e.samples, record.torque, record.response)
+        )
+        parts.append(np.array([r, t, v]) * r.conj())
+    if not parts:
+        raise ValueError("every period has a gap; nothing is left to evaluate")
+    r, t, v = np.sum(parts, axis=0)
+    return records[0].excitation.line_hz, np.asarray(r.real), np.asarray(t), np.asarray(v)
+
+
+def loop_spectra(
+    records: tuple[Record, ...], path: SignalPath
+) -> tuple[ComplexArray, ComplexArray]:
+    """Cross spectra with the injection of the loop's own torque and of the velocity, per line."""
+    s = collect(records, path, "torque_injection")
+    sent = [r.mean(axis=0).conj() for r in s.sent]
+    own = sum(t.mean(axis=0) * r for t, r in zip(s.torque, sent, strict=True))
+    velocity = sum(y.mean(axis=0) * r for y, r in zip(s.response, sent, strict=True))
+    return np.asarray(own), np.asarray(velocity)
