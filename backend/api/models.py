@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 Raw = int | float | str
 
@@ -341,6 +341,16 @@ class ParameterWrite(Message):
 
     raw: Raw | None = None
     value: Raw | None = None
+
+    @field_validator("raw", "value", mode="before")
+    @classmethod
+    def _no_truth(cls, given: object) -> object:
+        if isinstance(given, bool):
+            # Else it would become 1 or 0 of whatever unit the parameter has.
+            raise ValueError(  # noqa: TRY004 - pydantic reports these only
+                "true and false are no values of a parameter: give the number"
+            )
+        return given
 
 
 class ParameterWrites(Message):

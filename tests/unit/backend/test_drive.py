@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 
 import pytest
+from pydantic import ValidationError
 
+from backend.api.models import ParameterWrite
 from backend.drive import Drive
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, Rejected
 from tests.support.memory_link import MemoryLink
@@ -117,3 +119,11 @@ async def test_forgetting_leaves_nothing_to_believe(drive: Drive) -> None:
     assert not drive.readings
     assert not drive.unsaved
     assert not drive.pending
+
+
+@pytest.mark.parametrize("field", ["raw", "value"])
+def test_true_is_not_taken_for_one(field: str) -> None:
+    """A script that sends a truth value meant something else than 1 increment per second."""
+    assert ParameterWrite.model_validate({field: 1}).model_dump()[field] == 1
+    with pytest.raises(ValidationError, match="give the number"):
+        ParameterWrite.model_validate({field: True})
