@@ -27,6 +27,7 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
   const [share, setShare] = useRemembered(drive, 'sweep.share', 35)
   const [count, setCount] = useRemembered(drive, 'sweep.count', 2)
   const [base, setBase] = useState(true)
+  const stepped = signal === 'stepped'
   const limits = useLimits(drive)
   const start = useAction()
   const dark = useComputedColorScheme('light') === 'dark'
@@ -73,7 +74,12 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
         <NativeSelect
           label={t('sweep.excitation')}
           value={signal}
-          onChange={(event) => setSignal(event.currentTarget.value as typeof signal)}
+          onChange={(event) => {
+            const chosen = event.currentTarget.value as typeof signal
+            setSignal(chosen)
+            // One tone after another lasts too long for an axis that no loop holds.
+            if (chosen === 'stepped' && loop === 'none') setLoop('auto')
+          }}
           data={SIGNALS.map((each) => ({ value: each, label: t(`sweep.excitation.${each}`) }))}
         />
         <p className="dim">{t(`sweep.excitation.help.${signal}`)}</p>
@@ -83,7 +89,10 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
               label={t('sweep.loop')}
               value={loop}
               onChange={(event) => setLoop(event.currentTarget.value as SweepRequest['loop'])}
-              data={LOOPS.map((each) => ({ value: each, label: t(`sweep.loop.${each}`) }))}
+              data={LOOPS.filter((each) => each !== 'none' || !stepped).map((each) => ({
+                value: each,
+                label: t(`sweep.loop.${each}`),
+              }))}
             />
           )}
           <NumberField
@@ -114,15 +123,17 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
               help={t('sweep.shareHelp')}
             />
           )}
-          <NumberField
-            label={t('sweep.count')}
-            value={count}
-            onChange={setCount}
-            min={1}
-            max={8}
-            integer
-            help={t('sweep.countHelp')}
-          />
+          {!stepped && (
+            <NumberField
+              label={t('sweep.count')}
+              value={count}
+              onChange={setCount}
+              min={1}
+              max={8}
+              integer
+              help={t('sweep.countHelp')}
+            />
+          )}
         </div>
         <Checkbox
           label={t('sweep.base')}
