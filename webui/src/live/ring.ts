@@ -10,6 +10,8 @@ export class Ring {
   readonly capacity: number
   /** Rows from this time on are looked at: a full ring takes nothing in rather than let them go. */
   keep = Number.POSITIVE_INFINITY
+  /** How often it began anew: times before and after are of different clocks. */
+  begun = 0
   private times = new Float64Array(FIRST_ROWS)
   private values = new Float64Array(FIRST_ROWS)
   private low: Float64Array
@@ -117,6 +119,7 @@ export class Ring {
   clear(): void {
     this.first = 0
     this.used = 0
+    this.begun++
   }
 
   private grow(): void {

@@ -248,9 +248,10 @@ export class ScopeStore {
     this.sweepCount = 0
     this.held = false
     this.armedAt = this.newest() ?? 0
+    const ring = trigger && this.find(trigger.id)?.ring
     this.finder = trigger && {
       trigger,
-      search: new Trigger(trigger.settings, this.armedAt),
+      search: new Trigger(trigger.settings, ring?.newest ?? this.armedAt, ring?.begun),
     }
     this.tell()
   }
@@ -359,7 +360,8 @@ export class ScopeStore {
   private free(newest: number | null): boolean {
     if (this.finder?.trigger.mode !== 'auto' || newest === null) return false
     const last = this.sweeps.at(-1)?.to ?? this.armedAt
-    return newest - last > Math.max(AUTO_S, this.finder.trigger.settings.window)
+    // Earlier than the last one: the clock is another one since.
+    return newest < last || newest - last > Math.max(AUTO_S, this.finder.trigger.settings.window)
   }
 
   private stretch(view: ScopeView, newest: number | null): { from: number; to: number } {

@@ -431,6 +431,15 @@ describe('scope store', () => {
       expect([found.from, found.to]).toEqual([at - 1, at + 1])
     }
   })
+  it('sees a trigger where the clock goes back after it was armed', () => {
+    const { store: scope } = store()
+    scope.configure(config(source('c1', 'a')))
+    scope.block(frame({ times: [50], rows: [[0]], sequence: 1 }))
+    scope.setTrigger({ ...rising, mode: 'single' })
+    // An exchange begins, whose time lags behind that of the polled samples.
+    square(scope, 1)
+    expect(seen(scope).trigger).toEqual({ state: 'triggered', at: 4.5, count: 1 })
+  })
   it('holds a single picture until it is armed again, with the traces that lag', () => {
     const { store: scope, clock, sent } = store()
     scope.configure(config(source('c1', 'a'), source('c2', 'b', 'y')))

@@ -42,6 +42,8 @@ export class Trigger {
   constructor(
     readonly settings: TriggerSettings,
     since: number,
+    /** Of the ring that is looked at, when this was armed. */
+    private begun = 0,
   ) {
     this.seenUntil = since
   }
@@ -49,6 +51,12 @@ export class Trigger {
   /** A trigger whose stretch has been completed by now, or null. */
   look(trace: Trace): Sweep | null {
     const { window, before } = this.settings
+    if (trace.ring.begun !== this.begun) {
+      // Its clock is another one: all that it holds came after this was armed.
+      this.begun = trace.ring.begun
+      this.seenUntil = Number.NEGATIVE_INFINITY
+      this.previous = this.pending = null
+    }
     if (this.pending === null) this.search(trace)
     if (this.pending === null) return null
     const from = this.pending - window * before
