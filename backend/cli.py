@@ -160,6 +160,11 @@ def demo(
 
 
 def _until_interrupted(work: Callable[[], Awaitable[None]]) -> None:
+    def end(_number: int, _frame: object) -> None:
+        # A service manager's end is as orderly as Ctrl+C: virtual drives and folders are let go.
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, end)
     # uvicorn has already shut down in order when the interrupt arrives here.
     with contextlib.suppress(KeyboardInterrupt):
         run(work)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
+import signal
 import sys
 from pathlib import Path
 
@@ -147,3 +149,22 @@ def test_a_library_that_is_not_there_is_not_an_empty_one(words: list[str], tmp_p
     assert (done.exit_code, done.stdout) == (1, "")
     assert f"there is no database {elsewhere}/servodeck.db" in done.stderr
     assert not elsewhere.exists()
+
+
+def test_a_service_managers_end_lets_go_of_everything() -> None:
+    """SIGTERM alone would end the process at once and leave the demo's folders behind."""
+    let_go: list[str] = []
+
+    async def work() -> None:
+        try:
+            signal.raise_signal(signal.SIGTERM)
+            await asyncio.sleep(10)
+        finally:
+            let_go.append("folder")
+
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        cli._until_interrupted(work)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert let_go == ["folder"]
