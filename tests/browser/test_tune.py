@@ -17,9 +17,9 @@ from pypdf import PdfReader
 from tests.browser import tuning
 from tests.browser.cable import Cable
 from tests.browser.conftest import LAPTOP, _open
-from tests.browser.driving import open_axis
+from tests.browser.driving import MOVING_RPM, open_axis
 from tests.browser.tuning import COULOMB, INERTIA, MEASURED_MS, RESONANCE_HZ, confirm, row
-from tests.support.station import Station
+from tests.support.station import Station, until
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -72,6 +72,7 @@ def step_of(page: Page, name: str) -> str:
 def test_identify(page: Page, axis: str, station: Station) -> None:
     assert step_of(page, "Pre-checks") == "done"
     assert step_of(page, "Inertia") == "next"
+    page.get_by_label("Repetitions").fill("2")
     tuning.run_job(page, station, axis, "Measure the inertia")
     table = page.get_by_role("table", name="Inertia and friction")
     table.wait_for(timeout=MEASURED_MS)
@@ -87,6 +88,7 @@ def test_identify(page: Page, axis: str, station: Station) -> None:
 
 def test_measure_before(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "response")
+    tuning.short_sweeps(page)
     tuning.measure(page, station, axis, "Speed loop")
     tuning.measure(page, station, axis, "Mechanics")
     read = row(page.get_by_role("table", name="Resonances"), "resonance").inner_text()
@@ -188,3 +190,49 @@ def test_take_everything_back(page: Page, axis: str, station: Station) -> None:
     assert notches_of(station, axis) == []
     # As the virtual drive left the factory: 200 Hz for the motor alone.
     assert gains_of(station, axis) == (pytest.approx(200.0), pytest.approx(5e-5))
+
+
+def settings_of(station: Station, axis: str) -> tuple[object, object]:
+    """What tuning may change."""
+    gains, notches = (
+        tuning.answered(station, f"/drives/{axis}/{what}") for what in ("gains", "notches")
+    )
+    return gains, notches
+
+
+def test_autotune_is_cancelled_while_the_axis_moves(
+    page: Page, axis: str, station: Station
+) -> None:
+    open_axis(page, axis, "tune")
+    before = settings_of(station, axis)
+    page.get_by_label("Write and verify the result").uncheck()
+    page.get_by_role("button", name="Start tuning").click()
+    now = page.locator("ol.steps li[aria-current=step]")
+    expect(now).to_contain_text("Inertia", timeout=MEASURED_MS)
+    until(lambda: station.state(axis)["state"] == "Operation enabled", 60, "the axis is enabled")
+    page.locator(".job").get_by_role("button", name="Cancel").click()
+    expect(page.get_by_role("status").filter(has_text="cancelled")).to_be_visible()
+    # The axis stands without torque, and everything is as it was.
+    until(lambda: station.state(axis)["moving_job"] is None, 30, "the axis is free")
+    assert station.state(axis)["state"] != "Operation enabled"
+    assert abs(station.state(axis)["velocity"]) < MOVING_RPM
+    assert settings_of(station, axis) == before
+
+
+def test_autotune_shows_designs_and_writes_nothing_unasked(
+    page: Page, axis: str, station: Station
+) -> None:
+    before = settings_of(station, axis)
+    tuning.run_job(page, station, axis, "Start tuning")
+    told = page.locator("details", has=page.locator("summary", has_text="What was measured"))
+    told.locator("summary").click()
+    read = row(told.get_by_role("table", name="Inertia and friction"), "Inertia").inner_text()
+    assert tuning.number_in(read, "kg·m²") == pytest.approx(INERTIA, rel=0.02)
+    read = row(told.get_by_role("table", name="Resonances"), "resonance").inner_text()
+    assert tuning.number_in(read, "Hz") == pytest.approx(RESONANCE_HZ, rel=0.01)
+    told = page.locator("details", has=page.locator("summary", has_text="Designs"))
+    told.locator("summary").click()
+    designs = told.get_by_role("table", name="Designs")
+    for mark in ("Robust", "Balanced", "Fast"):
+        expect(designs.get_by_role("row").filter(has_text=mark).first).to_be_visible()
+    assert settings_of(station, axis) == before
