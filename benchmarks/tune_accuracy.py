@@ -1,24 +1,40 @@
-"""Errors of frequency response and inertia over EtherCAT frames, for a set of mechanics.
+"""Errors of frequency response, inertia and autotune on virtual axes, for a set of mechanics.
 
-    python -m benchmarks.tune_accuracy [--khz 1 4] [--drive mms7] [--only NAME ...] [--real-time]
+    python -m benchmarks.tune_accuracy [--drive mms7 m6l r6l] [--khz 1 4] [--only NAME ...]
+        [--wire lockstep|real-time|none] [--random N] [--autotune]
 
-Against the analytic response of the chain; the limits are those of the design (tuning.md).
+Against the analytic response of the chain; the limits are those of the design (tuning.md,
+sections 2, 3 and 5). *lockstep* and *real-time* go over EtherCAT frames; *none* plays the
+product's own cycle beside the firmware, which no busy computer disturbs. ``--random`` adds
+mechanics drawn by their number.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
 
+import numpy as np
+
+from backend.axis import Axis, Envelope
+from backend.cyclic import CyclicSession
 from backend.jobs import Progress
-from backend.tools.inertia import InertiaSettings, Scheme, inertia
+from backend.tools.autotune import AutotuneSettings, autotune
+from backend.tools.inertia import InertiaOutcome, InertiaSettings, Scheme, inertia
 from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import Loop, SweepSettings
+from backend.tools.sweep_evaluation import Loop, SweepResult, SweepSettings
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.virtual.mechanics import MechanicsSpec
+from drivers.virtual.mechanics.chain import continuous_chain
 from drivers.virtual.wires.netns import Namespace
-from tests.virtual.tools.rig import WIDE, Bench, bench, errors, mechanics
+from tests.virtual.tools.direct import direct
+from tests.virtual.tools.rig import WIDE, Errors, bench, errors, mechanics
 
 AXES: dict[str, MechanicsSpec] = {
     "motor alone": mechanics(),
@@ -35,70 +51,233 @@ AXES: dict[str, MechanicsSpec] = {
     "noisy encoder": mechanics((1e-4, 60.0, 0.006), noise=60.0),
     "backlash": mechanics((1e-4, 200.0, 0.01), backlash=0.002),
     "limited travel": mechanics((1e-4, 200.0, 0.005), travel=(-1.5, 1.5)),
-}
+}  # fmt: skip
 
 
-async def _ready(b: Bench) -> None:
-    if await b.axis.state() is State.FAULT:
-        await b.axis.reset_fault()
+def drawn(seed: int) -> MechanicsSpec:
+    """Random mechanics as machines come: ratio 0.3–60, up to three couplings, friction, gravity."""
+    rng = np.random.default_rng(seed)
+    motor = float(np.exp(rng.uniform(np.log(2e-5), np.log(2e-4))))
+    ratio = float(np.exp(rng.uniform(np.log(0.3), np.log(60.0))))
+    shares = rng.dirichlet(np.full(int(rng.integers(1, 4)), 1.5))
+    loads, before = [], motor
+    for share, hz in zip(shares, np.sort(rng.uniform(25.0, 450.0, shares.size)), strict=True):
+        load = max(float(share) * ratio * motor, 0.05 * motor)
+        reduced = before * load / (before + load)
+        damping = float(np.exp(rng.uniform(np.log(0.008), np.log(0.06))))
+        stiffness = (2 * np.pi * float(hz)) ** 2 * reduced
+        loads.append((load, stiffness, 2 * damping * 2 * np.pi * float(hz) * reduced))
+        before = load
+    return mechanics(
+        *loads, motor=motor, viscous=float(rng.uniform(0, 5e-4)),
+        coulomb=float(rng.uniform(0.005, 0.1)),
+        gravity=float(rng.uniform(0.05, 0.3)) if seed % 5 == 4 else 0.0,
+        noise=float(rng.choice([1.0, 5.0, 30.0])),
+    )  # fmt: skip
 
 
-async def _one(namespace: Namespace, name: str, khz: float, lockstep: bool, drive: str) -> str:
-    spec = AXES[name]
-    vertical = spec.friction.gravity_nm != 0
-    limited = spec.travel.max_rev < 100
-    brake = {"2108:01": 1} if vertical and drive == "mms7" else None
-    async with bench(
-        namespace, spec, 1e-3 / khz, lockstep=lockstep, settings=brake, drive=drive
-    ) as b:
-        await _ready(b)
-        loop: Loop = "speed" if vertical or limited else "auto"
-        envelope = WIDE if not limited else type(WIDE)(1.2, 1500.0, 100.0, 60.0)
-        try:
-            found = await sweep(
-                b.axis, b.session, SweepSettings(envelope, loop=loop), Progress(lambda: None)
-            )
-        except DriveError as error:
-            return f"{name:18} {khz:g} kHz  {error.message}"
-        fs = 1000.0 * khz
-        top = min(1000.0, 0.25 * fs) if loop == "auto" else min(1000.0, 0.2 * fs)
-        near, far = errors(found.direct, spec, 5, top), errors(found.frf, spec, 5, 0.4 * fs)
-        line = (
-            f"{name:18} {khz:g} kHz {found.loop:5} direct {near.magnitude_db:5.2f} dB "
-            f"{near.phase_deg:5.2f}°  model {far.magnitude_db:5.2f} dB {far.phase_deg:5.2f}°  in "
-            f"band {far.covered:4.0%}"
+@dataclass(frozen=True)
+class Rig:
+    """Where an axis lives: family, rate, and what carries the bytes."""
+
+    drive: str
+    khz: float
+    wire: str
+    namespace: Namespace | None
+
+    @asynccontextmanager
+    async def axis(self, spec: MechanicsSpec) -> AsyncIterator[tuple[Axis, CyclicSession]]:
+        """One axis of these mechanics with its exchange running."""
+        vertical = spec.friction.gravity_nm != 0
+        brake = {"2108:01": 1} if vertical and self.drive == "mms7" else None
+        if vertical and brake is None:
+            spec = spec.model_copy(update={"motor": spec.motor.model_copy(update={"brake": True})})
+        if self.namespace is None:
+            async with direct(spec, 1e-3 / self.khz, drive=self.drive, settings=brake) as d:
+                yield d.axis, d.session
+            return
+        async with bench(
+            self.namespace, spec, 1e-3 / self.khz, lockstep=self.wire == "lockstep",
+            settings=brake, drive=self.drive,
+        ) as b:  # fmt: skip
+            yield b.axis, b.session
+
+
+def _limited(spec: MechanicsSpec) -> bool:
+    return spec.travel.max_rev < 100
+
+
+def _true_modes(spec: MechanicsSpec) -> list[tuple[float, float]]:
+    """Frequency (Hz) and damping of the resonances of the chain, from its matrices."""
+    a, _b = continuous_chain(spec, 1e5)
+    poles = np.linalg.eigvals(a)
+    swinging = poles[poles.imag > 1.0]
+    return sorted((float(abs(p)) / (2 * np.pi), float(-p.real / abs(p))) for p in swinging)
+
+
+def _modes(found: SweepResult, spec: MechanicsSpec, highest_hz: float) -> str:
+    """Worst error of frequency and damping over the resonances of the band; named when missed."""
+    seen = [r for r in found.resonances if r.kind == "resonance"]
+    worst_f = worst_d = 0.0
+    missed = []
+    for hz, damping in _true_modes(spec):
+        if not 5.0 < hz < highest_hz:
+            continue
+        near = min(seen, key=lambda r: abs(np.log(r.frequency_hz / hz)), default=None)
+        if near is None or abs(near.frequency_hz / hz - 1) > 0.1:
+            missed.append(f"{hz:.0f}")
+            continue
+        worst_f = max(worst_f, abs(near.frequency_hz / hz - 1))
+        worst_d = max(worst_d, abs(near.damping / damping - 1))
+    true = [hz for hz, _damping in _true_modes(spec)]
+    extra = [
+        f"{r.frequency_hz:.0f}"
+        for r in seen
+        if not any(abs(r.frequency_hz / hz - 1) < 0.1 for hz in true)
+    ]
+    text = f"f {_marked(worst_f, 0.01, '5.1%')} ζ {_marked(worst_d, 0.15, '4.0%')}"
+    text += f" missed {','.join(missed)} Hz" if missed else ""
+    return text + (f" extra {','.join(extra)} Hz" if extra else "")
+
+
+def _marked(value: float, limit: float, form: str) -> str:
+    """A figure, with an exclamation mark where it misses its limit."""
+    return f"{value:{form}}" + (" " if value <= limit else "!")
+
+
+def _told(name: str, part: Errors, limits: tuple[float, float]) -> str:
+    db, deg = limits
+    covered = " " if part.covered >= 0.9 else "!"
+    return (
+        f"{name} {_marked(part.magnitude_db, db, '5.2f')}dB "
+        f"{_marked(part.phase_deg, deg, '5.2f')}° {part.covered:4.0%}{covered}"
+    )
+
+
+async def _ready(axis: Axis) -> None:
+    if await axis.state() is State.FAULT:
+        await axis.reset_fault()
+
+
+async def _frequency(rig: Rig, spec: MechanicsSpec) -> str:
+    limited = _limited(spec)
+    loop: Loop = "speed" if limited else "auto"
+    envelope = Envelope(1.2, 1500.0, 100.0, 60.0) if limited else WIDE
+    async with rig.axis(spec) as (axis, session):
+        await _ready(axis)
+        found = await sweep(axis, session, SweepSettings(envelope, loop=loop), _silent())
+    free = found.loop == "none"
+    if rig.khz >= 4:
+        parts = _told("direct", errors(found.direct, spec, 5, 1000), (0.3, 3.0))
+    elif free:
+        parts = _told("direct", errors(found.direct, spec, 5, 250 * rig.khz), (0.3, 2.0))
+    else:
+        parts = _told("direct", errors(found.direct, spec, 5, 200 * rig.khz), (0.4, 3.0))
+    if rig.khz < 4:
+        above = errors(found.frf, spec, 250 * rig.khz, 400 * rig.khz)
+        parts += " " + _told("model above", above, (0.6, 4.0))
+    top = min(1200.0, 400 * rig.khz)
+    took = _marked(found.motion_s, 10.0, "4.1f")
+    model = "" if found.trusted else " no model"
+    return f"{found.loop:8} {parts} {_modes(found, spec, top)} {took}s{model}"
+
+
+async def _inertia(rig: Rig, spec: MechanicsSpec) -> str:
+    limited = _limited(spec)
+    scheme: Scheme = "limited" if limited else "free"
+    async with rig.axis(spec) as (axis, session):
+        await _ready(axis)
+        settings = InertiaSettings(WIDE, scheme, search_speed_rpm=60.0)
+        outcome = await inertia(axis, session, settings, _silent())
+    return _moved(outcome, spec)
+
+
+def _moved(outcome: InertiaOutcome, spec: MechanicsSpec) -> str:
+    r = outcome.result
+    ratio = spec.total_inertia_kgm2 / spec.motor.inertia_kgm2 - 1
+    j = r.inertia_kgm2.value / spec.total_inertia_kgm2 - 1
+    tc = r.coulomb_nm.value / spec.friction.coulomb_nm - 1
+    if not r.identifiable:
+        return f"J not identifiable: {r.verdict.splitlines()[0]}"
+    limit = 0.02 if ratio <= 30 else 0.05
+    return (
+        f"J {j:+6.1%}{' ' if abs(j) <= limit else '!'} Tc {tc:+6.1%}"
+        f"{' ' if abs(tc) <= 0.1 else '!'} {r.verdict.splitlines()[0]}"
+    )
+
+
+async def _tuned(rig: Rig, spec: MechanicsSpec) -> str:
+    limited = _limited(spec)
+    began = time.monotonic()
+    async with rig.axis(spec) as (axis, session):
+        await _ready(axis)
+        rotor = None if rig.drive == "mms7" else spec.motor.inertia_kgm2
+        settings = AutotuneSettings(
+            WIDE, scheme="limited" if limited else "free", motor_inertia_kgm2=rotor
         )
-        if khz > 1:
-            return line
-        try:
-            scheme: Scheme = "limited" if limited else "free"
-            settings = InertiaSettings(WIDE, scheme, search_speed_rpm=60.0)
-            outcome = await inertia(b.axis, b.session, settings, Progress(lambda: None))
-        except DriveError as error:
-            return f"{line}  {error.message}"
-        r, f = outcome.result, spec.friction
-        return (
-            f"{line}  J {100 * (r.inertia_kgm2.value / spec.total_inertia_kgm2 - 1):+5.1f} %  Tc "
-            f"{100 * (r.coulomb_nm.value / f.coulomb_nm - 1):+5.1f} %  {r.verdict.splitlines()[0]}"
-        )
+        found = await autotune(axis, session, settings, _silent())
+    applied, verified = found.applied, found.verified
+    if applied is None or verified is None:
+        return "nothing applied"
+    m, p = verified.sweep.margins, applied.promised
+    plain = [c for c in found.candidates if not c.notches]
+    gain = applied.gains.speed_bandwidth_hz / max(
+        (c.gains.speed_bandwidth_hz for c in plain), default=np.nan
+    )
+    return (
+        f"{found.load:9} {len(applied.notches)} notches  bandwidth "
+        f"{_hz(verified.predicted_bandwidth_hz)}→{_hz(verified.measured_bandwidth_hz)}  PM "
+        f"{p.phase_margin_deg:.0f}→{_number(m.get('phase_margin_deg'))}°  GM "
+        f"{p.gain_margin_db:.1f}→{_number(m.get('gain_margin_db'))} dB  Ms {p.ms:.2f}→"
+        f"{_number(m.get('ms'))}  ×{gain:.1f} of no notch  tried {len(found.tried)}  "
+        f"{time.monotonic() - began:.0f} s"
+    )
 
 
-async def _all(names: list[str], rates: list[float], lockstep: bool, drive: str) -> None:
-    with Namespace.create() as namespace:
-        for khz in rates:
-            for name in names:
-                print(await _one(namespace, name, khz, lockstep, drive), flush=True)
+def _hz(value: float | None) -> str:
+    return "–" if value is None else f"{value:.0f} Hz"
+
+
+def _number(value: float | bool | None) -> str:
+    return f"{value:.2f}" if isinstance(value, float) else "–"
+
+
+def _silent() -> Progress:
+    return Progress(lambda: None)
+
+
+async def _all(rigs: list[Rig], axes: dict[str, MechanicsSpec], tune: bool) -> None:
+    for rig in rigs:
+        for name, spec in axes.items():
+            steps = [_tuned] if tune else [_frequency] + ([_inertia] if rig.khz == 1 else [])
+            for step in steps:
+                try:
+                    text = await step(rig, spec)
+                except DriveError as error:
+                    text = f"refused: {error.message}"
+                print(f"{rig.drive:5} {rig.khz:g} kHz {name:17} {text}", flush=True)
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--khz", type=float, nargs="+", default=[1.0, 4.0])
-    parser.add_argument("--drive", default="mms7", choices=["mms7", "m6l", "r6l"])
-    parser.add_argument("--only", nargs="+", default=list(AXES), choices=list(AXES))
-    parser.add_argument("--real-time", action="store_true", help="not in lockstep with the frames")
+    parser.add_argument("--drive", nargs="+", default=["mms7"], choices=["mms7", "m6l", "r6l"])
+    parser.add_argument("--only", nargs="+", default=list(AXES), choices=[*AXES, "none"])
+    parser.add_argument("--wire", default="lockstep", choices=["lockstep", "real-time", "none"])
+    parser.add_argument("--random", type=int, default=0, help="how many drawn mechanics to add")
+    parser.add_argument("--seed", type=int, default=0, help="number of the first drawn one")
+    parser.add_argument("--autotune", action="store_true", help="tune instead of measuring")
     options = parser.parse_args()
-    asyncio.run(_all(options.only, options.khz, not options.real_time, options.drive))
+    axes = {name: AXES[name] for name in options.only if name in AXES}
+    numbers = range(options.seed, options.seed + options.random)
+    axes |= {f"drawn {number}": drawn(number) for number in numbers}
+    with contextlib.ExitStack() as stack:
+        namespace = None
+        if options.wire != "none":
+            namespace = stack.enter_context(Namespace.create())
+        rigs = [Rig(d, k, options.wire, namespace) for d in options.drive for k in options.khz]
+        asyncio.run(_all(rigs, axes, options.autotune))
 
 
 if __name__ == "__main__":

@@ -43,6 +43,7 @@ from backend.measurements import BadMeasurement, unpack
 from backend.report.changes import Change
 from backend.tools import autotune, gains, notch, sweep_evaluation
 from backend.tools.axis_facts import read_facts
+from backend.tools.notch_meaning import meaning_of
 from backend.tools.temporary import put_back, write_settings
 from drivers.errors import NotAllowed, OutOfRange
 
@@ -85,7 +86,7 @@ async def read_notches(member: TheMember) -> list[NotchSlotInfo]:
             slot=s.slot, enabled=s.enabled, notch=_shape(s.notch), realised=_realised(s.realised),
             raw=dict(s.raw), note=s.note,
         )
-        for s in await notch.read_notches(member.drive)
+        for s in await notch.read_notches(member.drive, meaning_of(member.drive))
     ]  # fmt: skip
 
 
@@ -93,10 +94,10 @@ async def read_notches(member: TheMember) -> list[NotchSlotInfo]:
 async def preview_notches(member: TheMember, request: NotchPreviewRequest) -> NotchPreviewInfo:
     """What the drive would make of these notches. Nothing is read or written."""
     profile, name = member.drive.profile, member.drive.name
-    wanted = _notches(request.notches)
-    slots = [notch.encode(profile, name, n, w, None) for n, w in enumerate(wanted)]
+    wanted, meaning = _notches(request.notches), meaning_of(member.drive)
+    slots = [notch.encode(profile, name, n, w, None, meaning) for n, w in enumerate(wanted)]
     f = np.asarray(request.frequency_hz, dtype=np.float64)
-    total = notch.combined(profile, [w for w in wanted if w is not None], f)
+    total = notch.combined(profile, [w for w in wanted if w is not None], f, meaning)
     return NotchPreviewInfo(
         slots=[
             NotchSlotInfo(
@@ -114,7 +115,9 @@ async def preview_notches(member: TheMember, request: NotchPreviewRequest) -> No
 async def write_notches(bench: TheBench, member: Controlled, request: NotchWrite) -> Undo:
     """Write all notches and make them act; saving is another step."""
     bench.require_idle(member)
-    before = await notch.write_notches(member.axis, _notches(request.notches))
+    before = await notch.write_notches(
+        member.axis, _notches(request.notches), meaning_of(member.drive)
+    )
     await _note(bench, member, "notches", before)
     bench.journal.add(f"{member.drive.name}: notches written", drive=member.drive.id)
     return Undo(before=before)
@@ -219,7 +222,7 @@ async def predict(bench: TheBench, member: TheMember, request: PredictRequest) -
     wanted = [n for n in _notches(request.notches) if n is not None]
     g, f = request.gains, plant.frequency_hz
     try:
-        filters = notch.combined(member.drive.profile, wanted, f)
+        filters = notch.combined(member.drive.profile, wanted, f, meaning_of(member.drive))
     except ValueError as error:
         raise OutOfRange(f"{member.drive.name}: {error}", drive=member.drive.name) from error
     fixed = gains.loops_of(member.drive, facts).response(f) * filters

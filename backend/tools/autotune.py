@@ -30,14 +30,15 @@ from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.jobs import Progress
 from backend.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.tools import excite, notch_effect, sweep_evaluation
 from backend.tools import gains as gain_tool
 from backend.tools import inertia as inertia_tool
 from backend.tools import notch as notch_tool
 from backend.tools import step_response as step_tool
 from backend.tools import sweep as sweep_tool
-from backend.tools import sweep_evaluation
 from backend.tools.axis_facts import AxisFacts, read_facts
-from backend.tools.probe import holding_torque
+from backend.tools.notch_meaning import meaning_of, remember
+from backend.tools.probe import PULLED, holding_torque
 from backend.tools.recording import cycle_s
 from backend.tools.temporary import put_back, temporary, write_settings
 from drivers.cia402 import State
@@ -49,6 +50,10 @@ Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], No
 MARGIN_DB, MARGIN_DEG, MS_RATIO = 3.0, 6.0, 1.2
 #: A loop can be verified up to this share of the sample rate, so none is designed above it.
 _VERIFIABLE = 0.2
+#: The -3 dB point must lie below this share; the highest gain is lowered so many times for it.
+_SEEN, _NARROWINGS = 0.23, 4
+#: A response with more of its samples at a torque limit is none.
+_SATURATED = 0.25
 #: Gains that hardly any axis oscillates with, for measuring one that does with its own.
 _SOFT_HZ, _SOFT_INTEGRAL_HZ, _SOFT_POSITION_1_S = 5.0, 0.5, 5.0
 
@@ -128,12 +133,17 @@ async def autotune(
         _require_inertia(axis, outcome)
         mechanics = await sweep_tool.sweep(
             axis, session, _sweep_settings(settings, outcome),
-            _part(progress, 0.3, 0.6, "3 of 6: frequency response"), keep,
+            _part(progress, 0.3, 0.5, "3 of 6: frequency response"), keep,
         )  # fmt: skip
-    facts = sweep_evaluation.completed(facts, mechanics)
+        facts = sweep_evaluation.completed(facts, mechanics)
+        plain = await _learn_notches(
+            axis, session, settings, facts, outcome, mechanics,
+            _part(progress, 0.5, 0.6, "3 of 6: what the drive's notches do"),
+        )  # fmt: skip
     progress(0.6, "4 of 6: notches and gains")
     load, candidates = await _candidates(axis, session, settings, facts, outcome, mechanics)
-    nothing = AutotuneResult(outcome, mechanics, load, candidates, None, None, None, {}, ())
+    nothing = AutotuneResult(outcome, mechanics, load, candidates, None, None, None, {},
+                             (plain,) if plain else ())  # fmt: skip
     if not settings.apply:
         return nothing
     return await _apply_and_verify(axis, session, settings, facts, nothing, progress, keep)
@@ -190,6 +200,40 @@ def _require_inertia(axis: Axis, outcome: inertia_tool.InertiaOutcome) -> None:
         )  # fmt: skip
 
 
+async def _learn_notches(
+    axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
+    outcome: inertia_tool.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
+    progress: Progress,
+) -> str:  # fmt: skip
+    """Measure what no manual prints, where the axis turns freely and it is worth it.
+
+    Returns why the design goes without notches; empty where it does not.
+    """
+    if not notch_effect.unknown(axis.drive) or meaning_of(axis.drive) is not None:
+        return ""
+    if mechanics.model is None or not any(r.kind == "resonance" for r in mechanics.resonances):
+        return ""
+    found = outcome.result
+    held = abs(found.gravity_nm.value) > PULLED * facts.rated_torque_nm
+    if held or settings.scheme != "free" or settings.loop not in ("auto", "none"):
+        return (
+            "designed without notches: what they do is measured only on an axis that turns freely"
+        )
+    rigid = excite.Rigid(found.inertia_kgm2.value, found.coulomb_nm.value)
+    rate = 1.0 / cycle_s(session)
+    path = notch_effect.path_of(rate, facts, mechanics.hold, mechanics.delay_s)
+    try:
+        meaning = await notch_effect.measure_meaning(
+            axis, session, settings.envelope, facts, rigid, path, progress
+        )
+    except NotAllowed as error:
+        if await axis.state() in (State.FAULT, State.FAULT_REACTION):
+            raise
+        return f"designed without notches: {error.message}"
+    remember(axis.drive, meaning)
+    return ""
+
+
 def _sweep_settings(
     settings: AutotuneSettings, outcome: inertia_tool.InertiaOutcome
 ) -> sweep_evaluation.SweepSettings:
@@ -219,6 +263,14 @@ async def _candidates(
             f"{axis.drive.name}: no model explains the frequency response, so nothing is designed",
             drive=axis.drive.name, remedy="; ".join(mechanics.warnings) or "measure again",
         )  # fmt: skip
+    if mechanics.saturated_share > _SATURATED:
+        raise NotAllowed(
+            f"{axis.drive.name}: the torque was at its limit, or not what was commanded, for "
+            f"{mechanics.saturated_share:.0%} of the measurement, so nothing is designed from it",
+            drive=axis.drive.name, value=round(mechanics.saturated_share, 3),
+            limit=f"{_SATURATED:g}",
+            remedy="raise the drive's torque limits, or lower the envelope's torque",
+        )  # fmt: skip
     load = settings.load or load_class(mechanics)
     plant = measured_plant(mechanics.frf, mechanics.model)
     candidates = await asyncio.to_thread(
@@ -246,12 +298,24 @@ def candidates_for(
             loops,
             highest_speed_bandwidth_hz=min(loops.highest_speed_bandwidth_hz or highest, highest),
         )
-    known = profile.notch is not None and profile.notch.encoding in ("coefficients", "hz_width_db")
+    meaning = meaning_of(drive)
+    known = meaning is not None or not notch_effect.unknown(drive)
     slots = len(profile.notch.slots) if profile.notch is not None and known else 0
-    return design(
-        plant, inertia_kgm2, loops, load, slots=slots,
-        notch_response=lambda notch, f: notch_tool.response(profile, notch, f),
-    )  # fmt: skip
+    table: tuple[Candidate, ...] = ()
+    for _ in range(_NARROWINGS):
+        table = design(
+            plant, inertia_kgm2, loops, load, slots=slots,
+            notch_response=lambda notch, f: notch_tool.response(profile, notch, f, meaning),
+        )  # fmt: skip
+        widest = max((c.bandwidth_hz or np.inf for c in table if c.marks), default=0.0)
+        if sample_rate_hz is None or widest <= _SEEN * sample_rate_hz:
+            break
+        # Its -3 dB point lies above what this bus can see: a slower one that can be verified.
+        share = max(_SEEN * sample_rate_hz / widest, 0.5)
+        loops = replace(
+            loops, highest_speed_bandwidth_hz=share * (loops.highest_speed_bandwidth_hz or 0.0)
+        )
+    return table
 
 
 async def plan(
@@ -261,7 +325,7 @@ async def plan(
     rotor = await gain_tool.rotor_inertia(axis, motor_inertia_kgm2)
     raw = gain_tool.plan_gains(axis.drive, candidate.gains, inertia_kgm2, rotor)
     if axis.drive.profile.notch is not None:
-        raw |= await notch_tool.plan_notches(axis.drive, candidate.notches)
+        raw |= await notch_tool.plan_notches(axis.drive, candidate.notches, meaning_of(axis.drive))
     return raw
 
 
@@ -270,7 +334,7 @@ async def _apply_and_verify(
     found: AutotuneResult, progress: Progress, keep: Keep | None,
 ) -> AutotuneResult:  # fmt: skip
     """The wanted candidate, then more careful ones, until one keeps its promise."""
-    tried: list[str] = []
+    tried = list(found.tried)
     inertia = found.inertia.result.inertia_kgm2.value
     for number, candidate in enumerate(_order(found.candidates, settings.mark)):
         progress(0.65 + 0.1 * number, "5 of 6: applying")
@@ -290,7 +354,7 @@ async def _apply_and_verify(
             )
             if verified.kept:
                 step = await step_tool.step_response(
-                    axis, session, _step_settings(settings),
+                    axis, session, _step_settings(settings, facts, candidate),
                     _part(progress, 0.92, 0.99, "6 of 6: step"), keep,
                 )  # fmt: skip
                 return replace(
@@ -373,11 +437,15 @@ def _broken_promise(candidate: Candidate, found: dict[str, float | bool | None])
     return f"{candidate.gains.speed_bandwidth_hz:.0f} Hz: " + ", ".join(words)
 
 
-def _step_settings(settings: AutotuneSettings) -> step_tool.StepSettings:
-    size = min(100.0, 0.3 * settings.envelope.speed_rpm, 120.0 * settings.envelope.travel_rev)
-    return step_tool.StepSettings(
-        settings.envelope, size=size, rated_torque_nm=settings.rated_torque_nm
-    )
+def _step_settings(
+    settings: AutotuneSettings, facts: AxisFacts, candidate: Candidate
+) -> step_tool.StepSettings:
+    """A step of speed whose first torque, gain times step, leaves half of what is permitted."""
+    envelope = settings.envelope
+    torque_nm = envelope.torque_percent / 100.0 * facts.rated_torque_nm
+    gentle = 0.5 * torque_nm / candidate.gains.speed_nms * 60.0 / (2 * np.pi)
+    size = min(100.0, 0.3 * envelope.speed_rpm, 120.0 * envelope.travel_rev, gentle)
+    return step_tool.StepSettings(envelope, size=size, rated_torque_nm=settings.rated_torque_nm)
 
 
 def predicted(
@@ -386,7 +454,7 @@ def predicted(
     """Open speed loop (frequency, response) of a candidate on the measured plant."""
     f = plant.frequency_hz
     fixed = gain_tool.loops_of(drive, facts).response(f)
-    filters = fixed * notch_tool.combined(drive.profile, candidate.notches, f)
+    filters = fixed * notch_tool.combined(drive.profile, candidate.notches, f, meaning_of(drive))
     return f, speed_loop(f, plant.response(), filters, candidate.gains)
 
 

@@ -235,17 +235,20 @@ def loop_reference(
     position: bool,
     base: bool = True,
     waveform: Waveform = "multisine",
+    corner_hz: float | None = None,
 ) -> tuple[Sequence, ...]:
     """An excitation on the reference of the closed loop itself, ``amplitude`` in rad/s or rad.
 
-    Amplitudes fall with frequency so that the torque they ask for does not grow without end.
+    Amplitudes fall with frequency, from ``corner_hz`` on, so that the torque they ask for does not
+    grow without end.
 
     Raises:
         ValueError: the room does not suffice.
     """
+    corner = corner_hz or (20.0 if position else 40.0)
 
     def size(f: FloatArray) -> FloatArray:
-        return np.asarray(1.0 / np.hypot(1.0, f / (20.0 if position else 40.0)))
+        return np.asarray(1.0 / np.hypot(1.0, f / corner))
 
     return tuple(
         Sequence(scaled(e, amplitude, step), reference)

@@ -8,6 +8,7 @@ Three schemes: *free*, *limited* with the ends found at limited torque, and *tau
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Literal
@@ -28,7 +29,7 @@ from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.tools.axis_facts import AxisFacts, read_facts
 from backend.tools.go_back import go_back
-from backend.tools.probe import RoughFit, rough_fit
+from backend.tools.probe import RoughFit, require_right_sign, rough_fit
 from backend.tools.recording import (
     Play,
     Recording,
@@ -53,7 +54,8 @@ _RAMP_S = 0.15
 _SMOOTHING_S = 0.03
 _CUTOFF_HZ = 25.0
 _FIRST_REV = 0.12
-_STALL_S = 0.12
+#: So long at rest is an end; the axis' own start is not judged.
+_STALL_S, _START_S = 0.12, 0.25
 _END_MARGIN_REV = 0.15
 #: Above this R² nothing is left to explain; below, the load may swing in this range of Hz.
 _EXPLAINED, _SWING_HZ = 0.9995, (4.0, 80.0)
@@ -157,9 +159,11 @@ async def inertia(
             max(result.inertia_kgm2.value, rough.inertia_kgm2), rough.coulomb_nm, rough.gravity_nm
         )
         again = await _moves(axis, session, settings, facts, better, travel, gentle, told)
-        calm = await asyncio.to_thread(evaluate, again, settings, facts, gentle.cutoff_hz)
-        if calm.r2 > result.r2:
-            recording, result, shape = again, calm, gentle
+        # Too short a travel leaves too little of a gentle move: the first answer stays.
+        with contextlib.suppress(NotAllowed):
+            calm = await asyncio.to_thread(evaluate, again, settings, facts, gentle.cutoff_hz)
+            if calm.r2 > result.r2:
+                recording, result, shape = again, calm, gentle
     await go_back(axis, session, home, _wide(settings, ends), facts)
     if keep is not None:
         keep("inertia", *_raw(recording, settings, facts, shape))
@@ -269,6 +273,7 @@ async def _first_look(
             drive=axis.drive.name, value=round(moved, 4), limit=f"{travel:.3g} rev",
             remedy="look for a closed brake, a blocked axis or a torque limit that is too low",
         )  # fmt: skip
+    require_right_sign(axis.drive.name, recording)
     fit = rough_fit(
         recording.torque_nm, recording.velocity_rad_s, recording.sample_rate_hz, recording.valid
     )
@@ -316,6 +321,26 @@ async def _find_ends(
     return found[0], found[1]
 
 
+@dataclass
+class _Stall:
+    """Sees in the samples as they come when a creeping axis has come to rest."""
+
+    slow: float
+    enough: int
+    start: int
+    count: int = 0
+    resting: int = 0
+    found: bool = False
+
+    def seen(self, rows: npt.NDArray[np.float64]) -> bool:
+        """Whether it rests; ``rows`` [n, 3] are raw position, velocity and torque."""
+        moving = np.flatnonzero(np.abs(rows[:, 1]) >= self.slow)
+        self.resting = self.resting + len(rows) if not moving.size else len(rows) - moving[-1] - 1
+        self.count += len(rows)
+        self.found = self.count > self.start + self.enough and self.resting >= self.enough
+        return self.found
+
+
 async def _creep(
     axis: Axis, session: CyclicSession, settings: InertiaSettings, facts: AxisFacts,
     direction: float,
@@ -328,19 +353,15 @@ async def _creep(
     ramp = np.minimum(np.arange(n) / (0.1 * rate), 1.0)
     ramp[-1] = 0.0
     slow = 0.25 * units.velocity_raw(speed)
-    seen: list[int] = []
-
-    def stalled(rows: npt.NDArray[np.float64]) -> bool:
-        seen.append(1 if float(np.max(np.abs(rows[:, 1]))) < slow else 0)
-        # The first quarter second is the axis' own start.
-        return len(seen) > 8 and all(seen[-4:])
+    stall = _Stall(slow, round(_STALL_S * rate), round(_START_S * rate))
 
     envelope = replace(settings.envelope, travel_rev=way * 1.1)
     recording = await _csv(
-        axis, session, direction * speed * ramp, envelope, facts, lambda _fraction: None, stalled
-    )
+        axis, session, direction * speed * ramp, envelope, facts, lambda _fraction: None,
+        stall.seen,
+    )  # fmt: skip
     end = units.position(await axis.position_raw())
-    if not (len(seen) > 8 and all(seen[-4:])):
+    if not stall.found:
         raise NotAllowed(
             f"{axis.drive.name} found no end within {way:g} rev",
             drive=axis.drive.name, value=float(np.ptp(recording.position_rad)) / _TURN,
@@ -430,7 +451,9 @@ def evaluate(
         )
     except ValueError as error:
         raise NotAllowed(
-            f"the recording cannot be evaluated: {error}", remedy="allow more travel or time"
+            f"the moves are too short to be evaluated: {error}",
+            limit=f"{settings.envelope.travel_rev:g} rev",
+            remedy="allow more travel or time",
         ) from error
     reference = _reference_inertia(facts)
     if found.load_ratio is None and reference and np.isfinite(found.inertia_kgm2.value):

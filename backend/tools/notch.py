@@ -21,12 +21,12 @@ from backend.analysis.notch import (
     decode_coefficients,
     decode_hz_width_db,
     encode_coefficients,
-    encode_hz_width,
     encode_hz_width_db,
     realised,
 )
 from backend.axis import Axis
 from backend.drive import Drive
+from backend.tools.notch_meaning import NotchMeaning
 from backend.tools.temporary import write_settings
 from drivers.errors import NotAllowed, OutOfRange
 from profiles.schema import NotchSlot, NotchSpec, Parameter, Profile
@@ -97,9 +97,12 @@ def _coefficients(slot: NotchSlot, raw: Mapping[str, int]) -> NotchCoefficients:
 
 
 def encode(
-    profile: Profile, drive: str, number: int, notch: Notch | None, enable_now: int | None
-) -> Preview:
+    profile: Profile, drive: str, number: int, notch: Notch | None, enable_now: int | None,
+    meaning: NotchMeaning | None = None,
+) -> Preview:  # fmt: skip
     """Raw values for one slot; None switches it off. ``enable_now`` is its enable word as it is.
+
+    ``meaning`` is what was measured of values that no manual explains.
 
     Raises:
         NotAllowed: no notches, or an encoding without a printed formula.
@@ -112,7 +115,7 @@ def encode(
     note = ""
     if notch is not None:
         try:
-            raw, made, note = _encoded(profile, spec, slot, notch)
+            raw, made, note = _encoded(profile, spec, slot, notch, meaning)
         except ValueError as error:
             raise OutOfRange(
                 f"{drive}: notch {number + 1}: {error}", drive=drive,
@@ -128,16 +131,31 @@ def _enable(profile: Profile, slot: NotchSlot, on: bool, enable_now: int | None)
         word = enable_now or 0
         return {slot.enable_key: word | bit if on else word & ~bit}
     if not on and slot.frequency_key is not None:
-        # Families without an enable bit switch a notch off by its highest frequency.
-        _low, high = profile.by_key[slot.frequency_key].raw_limits
-        if high is None:
-            raise NotAllowed("the manual does not say how this notch is switched off")
-        return {slot.frequency_key: int(high)}
+        return {slot.frequency_key: off_raw(profile, slot.frequency_key)}
     return {}
 
 
+def off_raw(profile: Profile, frequency_key: str) -> int:
+    """What a frequency is where its notch is off, in a family without an enable bit.
+
+    All notches are off by default: some by a frequency of 0, some by the highest there is.
+
+    Raises:
+        NotAllowed: the manual does not say.
+    """
+    parameter = profile.by_key[frequency_key]
+    _low, high = parameter.raw_limits
+    default = parameter.default_raw
+    if isinstance(default, int) and default in (0, high):
+        return default
+    raise NotAllowed(
+        f"{parameter.key} {parameter.name}: the manual does not say how this notch is switched off",
+        parameter=parameter.key,
+    )
+
+
 def _encoded(
-    profile: Profile, spec: NotchSpec, slot: NotchSlot, notch: Notch
+    profile: Profile, spec: NotchSpec, slot: NotchSlot, notch: Notch, meaning: NotchMeaning | None
 ) -> tuple[dict[str, int], RealisedNotch | None, str]:
     keys = profile.by_key
     if spec.encoding == "coefficients":
@@ -151,24 +169,44 @@ def _encoded(
     if slot.frequency_key is None or slot.width_key is None:
         raise ValueError("the profile does not name its parameters")
     frequency, width = keys[slot.frequency_key], keys[slot.width_key]
-    if spec.encoding == "hz_width":
-        hz, wide = encode_hz_width(notch, _range(frequency), _range(width))
-        return (
-            {slot.frequency_key: hz, slot.width_key: wide}, None,
-            "the manual prints no depth: measure the effect",
-        )  # fmt: skip
+    if spec.encoding in ("hz_width", "hz_levels"):
+        return _by_measure(profile, slot, notch, meaning)
     if spec.encoding == "hz_width_db" and slot.depth_key is not None:
         depth = keys[slot.depth_key]
         hz, wide, db = encode_hz_width_db(notch, _range(frequency), _range(width), _range(depth))
         shown = decode_hz_width_db(hz, wide, db)
         made = RealisedNotch(shown.center_hz, shown.width_hz, shown.depth_db, 0.0, True)
         return {slot.frequency_key: hz, slot.width_key: wide, slot.depth_key: db}, made, ""
-    raise ValueError(
-        "no manual prints what its levels mean: set levels on the Parameters page and measure"
-    )
+    raise ValueError("the profile does not name its parameters")
 
 
-def response(profile: Profile, notch: Notch, frequency_hz: FloatArray) -> ComplexArray:
+def _by_measure(
+    profile: Profile, slot: NotchSlot, notch: Notch, meaning: NotchMeaning | None
+) -> tuple[dict[str, int], RealisedNotch | None, str]:
+    """Values that no manual explains, by what was measured of them."""
+    keys = profile.by_key
+    frequency, width = keys[slot.frequency_key or ""], keys[slot.width_key or ""]
+    depth = None if slot.depth_key is None else _range(keys[slot.depth_key])
+    if meaning is None and depth is not None:
+        raise ValueError(
+            "no manual prints what its levels mean: let them be measured first, or set levels on "
+            "the Parameters page and measure"
+        )
+    made = meaning or NotchMeaning(notch.center_hz)
+    hz, wide, deep = made.encoded(notch, _range(frequency), _range(width), depth)
+    raw = {frequency.key: hz, width.key: wide}
+    if slot.depth_key is not None and deep is not None:
+        raw[slot.depth_key] = deep
+    if meaning is None:
+        return raw, None, "the manual prints no depth: measure the effect"
+    got = meaning.decoded(hz, wide, deep)
+    shown = RealisedNotch(got.center_hz, got.width_hz, got.depth_db, 0.0, True)
+    return raw, shown, "as measured on this drive"
+
+
+def response(
+    profile: Profile, notch: Notch, frequency_hz: FloatArray, meaning: NotchMeaning | None = None
+) -> ComplexArray:
     """What the family's drive makes of a notch.
 
     Raises:
@@ -187,20 +225,26 @@ def response(profile: Profile, notch: Notch, frequency_hz: FloatArray) -> Comple
             encoded.raw[k] for k in (slot.frequency_key, slot.width_key, slot.depth_key) if k
         )
         return decode_hz_width_db(hz, wide, db).response(frequency_hz)
+    if meaning is not None:
+        made = encode(profile, profile.drive, 0, notch, None, meaning).realised
+        if made is not None:
+            notch = Notch(made.center_hz, made.width_hz, made.depth_db)
     return notch.response(frequency_hz)
 
 
-async def read_notches(drive: Drive) -> tuple[SlotState, ...]:
+async def read_notches(drive: Drive, meaning: NotchMeaning | None = None) -> tuple[SlotState, ...]:
     """All notches of a drive, read now.
 
     Raises:
         NotAllowed: the family documents none.
     """
     spec = spec_of(drive.profile, drive.name)
-    return tuple([await _read(drive, spec, n) for n in range(len(spec.slots))])
+    return tuple([await _read(drive, spec, n, meaning) for n in range(len(spec.slots))])
 
 
-async def _read(drive: Drive, spec: NotchSpec, number: int) -> SlotState:
+async def _read(
+    drive: Drive, spec: NotchSpec, number: int, meaning: NotchMeaning | None
+) -> SlotState:
     slot = spec.slots[number]
     raw = {key: await drive.raw(key) for key in _value_keys(slot)}
     enabled = True
@@ -208,35 +252,41 @@ async def _read(drive: Drive, spec: NotchSpec, number: int) -> SlotState:
         word = await drive.raw(slot.enable_key)
         raw[slot.enable_key] = word
         enabled = bool(word >> (slot.enable_bit or 0) & 1)
+    elif slot.frequency_key is not None:
+        enabled = raw[slot.frequency_key] != off_raw(drive.profile, slot.frequency_key)
     try:
-        return _decoded(drive, spec, slot, number, raw, enabled)
+        return _decoded(spec, slot, number, raw, enabled, meaning)
     except ValueError as error:
         return SlotState(number, enabled, None, None, raw, str(error) if enabled else "")
 
 
 def _decoded(
-    drive: Drive, spec: NotchSpec, slot: NotchSlot, number: int, raw: dict[str, int], enabled: bool
-) -> SlotState:
+    spec: NotchSpec, slot: NotchSlot, number: int, raw: dict[str, int],
+    enabled: bool, meaning: NotchMeaning | None,
+) -> SlotState:  # fmt: skip
     if spec.encoding == "coefficients" and spec.sample_time_s is not None:
         stored = _coefficients(slot, raw)
         notch = decode_coefficients(stored, spec.sample_time_s)
         return SlotState(number, enabled, notch, realised(stored, spec.sample_time_s), raw)
     frequency = raw.get(slot.frequency_key or "", 0)
     width, depth = raw.get(slot.width_key or "", 0), raw.get(slot.depth_key or "", 0)
-    if slot.enable_key is None and slot.frequency_key is not None:
-        _low, high = drive.profile.by_key[slot.frequency_key].raw_limits
-        enabled = high is None or frequency < high
     if spec.encoding == "hz_width_db":
         notch = decode_hz_width_db(frequency, width, depth)
         made = RealisedNotch(notch.center_hz, notch.width_hz, notch.depth_db, 0.0, True)
         return SlotState(number, enabled, notch, made, raw)
+    if meaning is not None:
+        notch = meaning.decoded(frequency, width, depth if slot.depth_key is not None else None)
+        made = RealisedNotch(notch.center_hz, notch.width_hz, notch.depth_db, 0.0, True)
+        return SlotState(number, enabled, notch, made, raw, "as measured on this drive")
     if spec.encoding == "hz_width":
         notch = Notch(float(frequency), float(max(width, 1)), UNKNOWN_DEPTH_DB)
         return SlotState(number, enabled, notch, None, raw, "depth not printed in the manual")
     return SlotState(number, enabled, None, None, raw, "levels without a printed meaning")
 
 
-async def plan_notches(drive: Drive, wanted: Sequence[Notch | None]) -> dict[str, int]:
+async def plan_notches(
+    drive: Drive, wanted: Sequence[Notch | None], meaning: NotchMeaning | None = None
+) -> dict[str, int]:
     """Raw values that make the drive's slots these notches, those without one switched off.
 
     Raises:
@@ -252,7 +302,8 @@ async def plan_notches(drive: Drive, wanted: Sequence[Notch | None]) -> dict[str
     raw: dict[str, int] = {}
     for number, slot in enumerate(spec.slots):
         notch = wanted[number] if number < len(wanted) else None
-        made = encode(drive.profile, drive.name, number, notch, words.get(slot.enable_key or ""))
+        word = words.get(slot.enable_key or "")
+        made = encode(drive.profile, drive.name, number, notch, word, meaning)
         raw |= made.raw
         if slot.enable_key is not None:
             words[slot.enable_key] = made.raw[slot.enable_key]
@@ -261,18 +312,23 @@ async def plan_notches(drive: Drive, wanted: Sequence[Notch | None]) -> dict[str
     return raw
 
 
-async def write_notches(axis: Axis, wanted: Sequence[Notch | None]) -> dict[str, int]:
+async def write_notches(
+    axis: Axis, wanted: Sequence[Notch | None], meaning: NotchMeaning | None = None
+) -> dict[str, int]:
     """Write all slots; returns the raw values that were there, for undo.
 
     Raises:
         NotAllowed: the axis is enabled, or the drive cannot make one. Nothing is half written.
     """
-    return await write_settings(axis, await plan_notches(axis.drive, wanted))
+    return await write_settings(axis, await plan_notches(axis.drive, wanted, meaning))
 
 
-def combined(profile: Profile, notches: Sequence[Notch], frequency_hz: FloatArray) -> ComplexArray:
+def combined(
+    profile: Profile, notches: Sequence[Notch], frequency_hz: FloatArray,
+    meaning: NotchMeaning | None = None,
+) -> ComplexArray:  # fmt: skip
     """All notches in series as the drive makes them."""
     total: ComplexArray = np.ones(frequency_hz.shape, dtype=np.complex128)
     for notch in notches:
-        total = np.asarray(total * response(profile, notch, frequency_hz))
+        total = np.asarray(total * response(profile, notch, frequency_hz, meaning))
     return total

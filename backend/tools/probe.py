@@ -33,6 +33,8 @@ _SETTLE_S = 0.3
 _READINGS = 12
 _RESTLESS_PERCENT = 5.0
 _RESTLESS_RPM = 3.0
+#: Share of the energy moved to and fro that noise alone does not make.
+_GAINED = 0.1
 
 
 @dataclass(frozen=True)
@@ -121,12 +123,27 @@ def _judged(name: str, recording: Recording, rated_nm: float) -> Probed:
         recording.torque_nm, recording.velocity_rad_s, recording.sample_rate_hz, recording.valid
     )
     if fit.inertia_kgm2 <= 0:
-        raise NotAllowed(
-            f"{name} moves against its torque: the sign of torque or speed is wrong",
-            drive=name,
-            remedy="check motor phases, encoder direction and the polarity settings",
-        )
+        raise _wrong_sign(name)
     return Probed(fit.inertia_kgm2, max(fit.coulomb_nm, 0.0), fit.gravity_nm, rated_nm)
+
+
+def require_right_sign(name: str, recording: Recording) -> None:
+    """From rest to rest and back to where it began a motor can only lose energy, to friction.
+
+    Raises:
+        NotAllowed: torque and speed say that it gained some: one of them has the wrong sign.
+    """
+    power = (recording.torque_nm * recording.velocity_rad_s)[recording.valid]
+    if float(np.sum(power)) < -_GAINED * float(np.sum(np.abs(power))):
+        raise _wrong_sign(name)
+
+
+def _wrong_sign(name: str) -> NotAllowed:
+    return NotAllowed(
+        f"{name} moves against its torque: the sign of torque or speed is wrong",
+        drive=name,
+        remedy="check motor phases, encoder direction and the polarity settings",
+    )
 
 
 @dataclass(frozen=True)

@@ -87,10 +87,13 @@ class _Catch:
         """Samples so far, those that were lost included."""
         return sum(len(block.samples) + block.dropped for block in self.blocks)
 
-    def latest(self) -> FloatArray:
-        """The newest rows of position, velocity and torque."""
-        block = self.blocks[-1]
-        return block.samples[:, [block.channels.index(name) for name in self.names[:3]]]
+    def since(self, number: int) -> FloatArray:
+        """Rows of position, velocity and torque of the blocks from this number on."""
+        rows = [
+            block.samples[:, [block.channels.index(name) for name in self.names[:3]]]
+            for block in self.blocks[number:]
+        ]
+        return np.concatenate(rows) if rows else np.empty((0, 3))
 
     def runs(self) -> list[tuple[int, FloatArray, BoolArray]]:
         """Runs without a gap: cycles missing before it, samples [n, k], validity [n]."""
@@ -198,8 +201,8 @@ async def play(
 ) -> Recording:
     """Play one sequence on an enabled axis and return the recording.
 
-    ``until`` is called about 20 times a second with the latest rows [n, 3] of raw position,
-    velocity and torque and ends the motion early, by braking, when it returns True.
+    ``until`` is called about 20 times a second with the rows [n, 3] of raw position, velocity and
+    torque that came since, and ends the motion early, by braking, when it returns True.
 
     Raises:
         NotAllowed: the envelope or a fault ended the motion; the reason is in words.
@@ -247,7 +250,7 @@ async def _drive_through(
     station = trajectory.station
     await session.cyclic.play([trajectory])
     begun = catch.rows
-    heard, deadline = 0, time.monotonic() + _TAIL_S
+    heard, deadline, judged = 0, time.monotonic() + _TAIL_S, len(catch.blocks)
     while True:
         arrived = catch.rows - begun
         if arrived > heard:
@@ -265,9 +268,11 @@ async def _drive_through(
         raise_if_ended(session, station)
         await session.cyclic.renew(station)
         progress(min(1.0, arrived / count))
-        if until is not None and catch.blocks and until(catch.latest()):
-            await session.cyclic.halt(station)
-            return True
+        if until is not None:
+            rows, judged = catch.since(judged), len(catch.blocks)
+            if len(rows) and until(rows):
+                await session.cyclic.halt(station)
+                return True
 
 
 def raise_if_ended(session: CyclicSession, station: int) -> None:

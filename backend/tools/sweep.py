@@ -8,6 +8,7 @@ speed (CSV) or position loop (CSP), as a vertical or limited axis needs. *speed_
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Literal
@@ -19,9 +20,10 @@ from backend.analysis.excitation import scaled
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
-from backend.tools import excite
+from backend.tools import excite, speed_injection
 from backend.tools import notch as notch_tool
 from backend.tools.axis_facts import AxisFacts, read_facts
+from backend.tools.gains import read_gains
 from backend.tools.go_back import go_back
 from backend.tools.probe import PULLED, Probed, holding_torque, probe_axis
 from backend.tools.recording import (
@@ -63,6 +65,9 @@ class _Setup:
     room: excite.Room
     rigid: excite.Rigid
     torque_step_nm: float
+    by_speed: bool = False
+    """Mechanics by the speed loop's reference, where no torque can be added beside the loop."""
+    integral_hz: float | None = None
 
 
 async def sweep(
@@ -98,11 +103,15 @@ async def sweep(
             else:
                 progress(0.02, "feeling the axis with a small torque")
                 probed = await probe_axis(axis, session, settings.envelope, facts, home)
-                loop = _choose(axis, session, settings, probed)
+                loop = _choose(axis, settings, probed)
         setup = await _setup(axis, session, settings, facts, loop, probed)
-        require_signals(axis, session, _MODE_OF[setup.loop], not closed and setup.loop != "none")
+        beside = not closed and setup.loop != "none" and not setup.by_speed
+        require_signals(axis, session, _MODE_OF[setup.loop], beside)
         progress(0.08, "designing the excitation")
         sequences = await asyncio.to_thread(_sequences, setup, settings)
+        if setup.by_speed:
+            progress(0.09, "feeling how much torque the speed loop makes")
+            sequences = await _by_speed(axis, session, settings, setup, sequences, home, progress)
         records = await _play_fitting(axis, session, settings, setup, sequences, home, progress)
     await go_back(axis, session, home, settings.envelope, facts)
     raw, meta = _raw(records, setup, settings, session)
@@ -111,8 +120,9 @@ async def sweep(
     progress(0.95, "evaluating")
     try:
         return await asyncio.to_thread(
-            evaluate, records, setup.rate, facts, settings, setup.loop, _dc(session)
-        )
+            evaluate, records, setup.rate, facts, settings, setup.loop, _dc(session),
+            setup.by_speed, setup.integral_hz,
+        )  # fmt: skip
     except ValueError as error:
         raise NotAllowed(
             f"{axis.drive.name}: the recording cannot be evaluated: {error}",
@@ -161,9 +171,7 @@ async def _filters_off(axis: Axis, settings: SweepSettings) -> dict[str, int]:
     return {key: raw for key, raw in sorted(reachable.items()) if await drive.raw(key) != raw}
 
 
-def _choose(
-    axis: Axis, session: CyclicSession, settings: SweepSettings, probed: Probed
-) -> Literal["none", "speed"]:
+def _choose(axis: Axis, settings: SweepSettings, probed: Probed) -> Literal["none", "speed"]:
     """No loop on an axis that stays where it is and whose inertia rules, else the speed loop.
 
     Where friction takes more of the base motion's torque than inertia, a torque that is off by
@@ -174,7 +182,7 @@ def _choose(
         return _held_by_loop(axis, settings.loop, probed.gravity_nm)
     momentum_nm = excite.base_torque_nm(probed.inertia_kgm2, settings.envelope.speed_rpm)
     light = 4 / np.pi * probed.coulomb_nm > momentum_nm
-    return "speed" if light and settings.loop == "auto" and _can_offset(axis, session) else "none"
+    return "speed" if light and settings.loop == "auto" else "none"
 
 
 def _can_offset(axis: Axis, session: CyclicSession) -> bool:
@@ -202,8 +210,9 @@ async def _setup(
     units, envelope = await axis.units(), settings.envelope
     rated = facts.rated_torque_nm
     step = units.torque(1.0) / 100.0 * rated
+    torque_percent = min(envelope.torque_percent, await _drive_limit_percent(axis))
     room = excite.Room(
-        torque_nm=envelope.torque_percent / 100.0 * rated,
+        torque_nm=torque_percent / 100.0 * rated,
         speed_rad_s=envelope.speed_rpm * _TURN / 60.0,
         travel_rad=envelope.travel_rev * _TURN,
     )
@@ -216,7 +225,23 @@ async def _setup(
     kind: Literal["none", "speed", "position"] = (
         "none" if loop == "none" else "position" if loop == "position" else "speed"
     )
-    return _Setup(1.0 / cycle_s(session), facts, kind, room, rigid, step)
+    by_speed = settings.kind == "mechanics" and kind == "speed" and not _can_offset(axis, session)
+    integral_hz = None
+    if by_speed:
+        with contextlib.suppress(NotAllowed):
+            integral_hz = (await read_gains(axis, facts)).integral_hz
+    return _Setup(1.0 / cycle_s(session), facts, kind, room, rigid, step, by_speed, integral_hz)
+
+
+async def _drive_limit_percent(axis: Axis) -> float:
+    """The drive's own torque limit: what is asked beyond it does not come."""
+    drive, units = axis.drive, await axis.units()
+    limits = [np.inf]
+    for role in ("torque_limit_positive", "torque_limit_negative", "max_torque"):
+        key = drive.key(role)
+        if key is not None and not drive.unreachable_why(drive.parameter(key)):
+            limits.append(abs(units.torque(await drive.raw(key))))
+    return float(min(limits))
 
 
 def _sequences(setup: _Setup, settings: SweepSettings) -> tuple[excite.Sequence, ...]:
@@ -236,6 +261,11 @@ def _sequences(setup: _Setup, settings: SweepSettings) -> tuple[excite.Sequence,
                 setup.rate, band, setup.room, setup.rigid, setup.torque_step_nm,
                 share=settings.share, realisations=settings.realisations,
                 base=settings.base_motion, waveform=settings.excitation,
+            )  # fmt: skip
+        if setup.by_speed:
+            return speed_injection.sequences(
+                setup.rate, band, setup.room, speed_injection.FIRST_RAD_S, settings.realisations,
+                settings.excitation, base=settings.base_motion,
             )  # fmt: skip
         return excite.beside_loop(
             setup.rate, band, setup.room, setup.torque_step_nm, share=settings.share,
@@ -258,6 +288,21 @@ def _reference_size(setup: _Setup, position: bool) -> tuple[float, float]:
     speed = min(speed, setup.room.torque_nm / 8.0 / setup.rigid.inertia_kgm2 / corner, 8.0)
     size = speed / corner if position else speed
     return size, 0.0
+
+
+async def _by_speed(
+    axis: Axis, session: CyclicSession, settings: SweepSettings, setup: _Setup,
+    sequences: tuple[excite.Sequence, ...], home: int, progress: Progress,
+) -> tuple[excite.Sequence, ...]:  # fmt: skip
+    """The excitation made so large that its torque has the wanted share."""
+    trial = Progress(lambda: progress(0.09, "feeling how much torque the speed loop makes"))
+    ((sent, recording),) = await _play_fitting(
+        axis, session, settings, setup, sequences[:1], home, trial
+    )
+    share_nm = settings.share * setup.room.torque_nm
+    peak = speed_injection.fitting_amplitude(sent, recording, setup.room, share_nm)
+    factor = peak / speed_injection.FIRST_RAD_S
+    return tuple(replace(s, excitation=scaled(s.excitation, factor)) for s in sequences)
 
 
 async def _play_all(
@@ -285,7 +330,7 @@ async def _play_all(
                 await quiet(axis)
             sent = await _to_raw(axis, sequence, setup, settings, start)
             recording = await play(axis, session, sent, limits, setup.facts.rated_torque_nm, told)
-        records.append((await _as_sent(axis, sequence, settings, sent, start), recording))
+        records.append((await _as_sent(axis, sequence, settings, setup, sent, start), recording))
     return tuple(records)
 
 
@@ -293,11 +338,11 @@ async def _play_fitting(
     axis: Axis, session: CyclicSession, settings: SweepSettings, setup: _Setup,
     sequences: tuple[excite.Sequence, ...], home_raw: int, progress: Progress,
 ) -> tuple[tuple[excite.Sequence, Recording], ...]:  # fmt: skip
-    """As `_play_all`; a loop that answers its reference with too much torque gets a smaller one.
+    """As `_play_all`; where a loop answers with too much torque the excitation becomes smaller.
 
-    How much torque a reference takes depends on the loop's gains, which are what is measured.
+    How much torque that takes depends on the loop's gains, which are what is measured.
     """
-    attempts = 1 if settings.kind == "mechanics" else _ATTEMPTS
+    attempts = _ATTEMPTS if setup.loop != "none" else 1
     for attempt in range(attempts):
         try:
             return await _play_all(axis, session, settings, setup, sequences, home_raw, progress)
@@ -323,7 +368,7 @@ async def _to_raw(
         return Play(Mode.CST, np.round(samples * torque).astype(np.int64))
     mode = _MODE_OF[setup.loop]
     scale, shift = (place, start) if mode is Mode.CSP else (speed, 0)
-    if settings.kind != "mechanics":
+    if settings.kind != "mechanics" or setup.by_speed:
         return Play(mode, shift + np.round((base + samples) * scale).astype(np.int64))
     return Play(
         mode,
@@ -337,11 +382,12 @@ async def _as_sent(
     axis: Axis,
     sequence: excite.Sequence,
     settings: SweepSettings,
+    setup: _Setup,
     sent: Play,
     start: int,
 ) -> excite.Sequence:  # fmt: skip
     """The excitation as the rounded set-points say; estimators must know what really went out."""
-    if settings.kind == "mechanics":
+    if settings.kind == "mechanics" and not setup.by_speed:
         return sequence
     units = await axis.units()
     if sent.mode is Mode.CSP:
@@ -384,6 +430,8 @@ def _raw(
         "tool": "sweep",
         "sample_rate_hz": setup.rate,
         "loop": setup.loop,
+        "by_speed": setup.by_speed,
+        "integral_hz": setup.integral_hz,
         "dc": _dc(session),
         "facts": asdict(setup.facts),
         "settings": asdict(settings),

@@ -20,6 +20,7 @@ from backend.axis import Envelope
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.recording import Recording
+from backend.tools.speed_injection import as_torque
 from backend.tools.waveform import Waveform
 
 Kind = Literal["mechanics", "speed_loop", "position_loop"]
@@ -91,8 +92,13 @@ def evaluate(
     settings: SweepSettings,
     loop: Literal["none", "speed", "position"],
     dc: bool,
+    by_speed: bool = False,
+    integral_hz: float | None = None,
 ) -> SweepResult:
     """From recordings to the answer; also works on recordings that were kept.
+
+    ``by_speed``: the speed loop's reference was the excitation, ``integral_hz`` its integral's
+    corner where the drive tells it.
 
     Raises:
         ValueError: nothing can be concluded from them.
@@ -107,6 +113,8 @@ def evaluate(
     )
     if settings.kind != "mechanics":
         return _evaluate_loop(records, path, settings, loop)
+    if by_speed:
+        records = as_torque(records, path, integral_hz)
     taken = tuple(
         Record(s.excitation, r.velocity_rad_s, r.torque_nm, r.valid, r.position_rad)
         for s, r in records
@@ -316,7 +324,11 @@ def _reevaluate(arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, obje
     closed: Literal["none", "speed", "position"] = (
         "none" if loop == "none" else "position" if loop == "position" else "speed"
     )
-    return evaluate(tuple(records), rate, AxisFacts(**told), settings, closed, bool(meta["dc"]))
+    integral = meta.get("integral_hz")
+    return evaluate(
+        tuple(records), rate, AxisFacts(**told), settings, closed, bool(meta["dc"]),
+        bool(meta.get("by_speed", False)), None if integral is None else float(str(integral)),
+    )  # fmt: skip
 
 
 def as_json(result: SweepResult) -> dict[str, object]:

@@ -1,6 +1,6 @@
-"""Frequency response, inertia and autotune over EtherCAT frames against the analytic mechanics.
+"""Frequency response and autotune over EtherCAT frames against the analytic mechanics.
 
-Limits are those of the issue: `tuning.md` sections 2, 3 and 5.
+Limits are those of `tuning.md`, sections 2, 3 and 5; more mechanics are in `test_families`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import pytest
 from backend.evaluation import recompute
 from backend.measurements import pack, unpack
 from backend.tools.autotune import AutotuneSettings, autotune
-from backend.tools.inertia import InertiaSettings, inertia
 from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import SweepSettings, as_json
 from backend.tools.temporary import put_back
@@ -19,8 +18,6 @@ from tests.virtual.tools.rig import WIDE, bench, errors, mechanics, silent
 
 TWO = mechanics((1e-4, 20.0, 0.002), (5e-5, 100.0, 0.005))
 ONE = mechanics((1e-4, 60.0, 0.006))
-HEAVY = mechanics((1.5e-3, 300.0, 0.05), viscous=1e-3, coulomb=0.06)
-LIMITED = mechanics((1e-4, 200.0, 0.005), travel=(-1.2, 0.8))
 
 
 async def test_mechanics_without_a_loop_at_1_khz(namespace: Namespace) -> None:
@@ -60,32 +57,6 @@ async def test_mechanics_beside_the_speed_loop_at_4_khz(namespace: Namespace) ->
         near = errors(found.frf, ONE, 5, 1000)
         assert near.magnitude_db < 0.3
         assert near.phase_deg < 3.0
-
-
-async def test_inertia_of_a_heavy_load(namespace: Namespace) -> None:
-    async with bench(namespace, HEAVY) as b:
-        before = await b.values()
-        found = await inertia(b.axis, b.session, InertiaSettings(WIDE, repetitions=2), silent())
-        assert await b.values() == before
-        result = found.result
-        assert result.verdict == "ok"
-        assert result.inertia_kgm2.value == pytest.approx(HEAVY.total_inertia_kgm2, rel=0.02)
-        assert result.coulomb_nm.value == pytest.approx(0.06, rel=0.10)
-        assert result.inertia_kgm2.low < HEAVY.total_inertia_kgm2 < result.inertia_kgm2.high
-        # The drive holds the rotor's inertia, 5e-5 kg·m², from the factory.
-        assert result.load_ratio == pytest.approx(30.0, rel=0.03)
-
-
-async def test_inertia_between_ends_that_are_found(namespace: Namespace) -> None:
-    async with bench(namespace, LIMITED) as b:
-        before = await b.values()
-        settings = InertiaSettings(WIDE, "limited", repetitions=2, search_speed_rpm=60.0)
-        found = await inertia(b.axis, b.session, settings, silent())
-        assert await b.values() == before
-        assert found.ends_rev == pytest.approx((-1.2, 0.8), abs=0.02)
-        assert found.result.inertia_kgm2.value == pytest.approx(1.5e-4, rel=0.02)
-        units = await b.axis.units()
-        assert abs(units.position(await b.axis.position_raw())) < 0.05
 
 
 async def test_autotune_keeps_its_promise_and_can_be_undone(namespace: Namespace) -> None:

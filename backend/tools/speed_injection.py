@@ -1,0 +1,144 @@
+"""Mechanics on a drive that takes no torque beside a closed loop: by the speed loop's reference.
+
+Whatever is added to the reference becomes torque at once by the speed gain (and by the integral
+of it), just as a torque offset would; the gain is read from the recorded torque. After that the
+recording is evaluated as if the torque had been injected.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.frf import Record
+from backend.analysis.sampling import Hold, SignalPath, sampled_command
+from backend.tools import excite
+from backend.tools.recording import Recording
+from backend.tools.waveform import Band, Waveform
+
+_TURN = 2 * np.pi
+#: Peak of the first trial in rad/s: even a high gain makes little torque of it.
+FIRST_RAD_S = 0.3
+#: Share of the permitted speed for the excitation.
+_SPEED_SHARE = 0.15
+#: Only above this share of the lines does the reference alone make the torque.
+_UPPER = 0.75
+
+
+def sequences(
+    rate: float, band: Band, room: excite.Room, amplitude_rad_s: float, realisations: int,
+    waveform: Waveform, *, base: bool,
+) -> tuple[excite.Sequence, ...]:  # fmt: skip
+    """All lines alike: above the loop's bandwidth that is a torque that is alike, too.
+
+    Raises:
+        ValueError: the room does not suffice.
+    """
+    return excite.loop_reference(
+        rate, band, room, 0.0, amplitude=amplitude_rad_s, realisations=realisations,
+        position=False, base=base, waveform=waveform, corner_hz=np.inf,
+    )  # fmt: skip
+
+
+def fitting_amplitude(
+    sequence: excite.Sequence, recording: Recording, room: excite.Room, torque_nm: float
+) -> float:
+    """Peak in rad/s whose torque peaks at ``torque_nm``, as far as the trial tells."""
+    gain = _rough_gain(_record(sequence, recording))
+    return float(min(torque_nm / gain, _SPEED_SHARE * room.speed_rad_s))
+
+
+def as_torque(
+    records: tuple[tuple[excite.Sequence, Recording], ...], path: SignalPath,
+    integral_hz: float | None,
+) -> tuple[tuple[excite.Sequence, Recording], ...]:  # fmt: skip
+    """The same recordings with the torque in Nm that the reference made in the excitation's place.
+
+    ``integral_hz`` is the corner of the loop's integral; None is none.
+    """
+    whole = [_with_integral(s, integral_hz) for s, _ in records]
+    played = [(s, r) for s, (_, r) in zip(whole, records, strict=True)]
+    gain = float(np.mean([_gain(_record(s, r), path) for s, r in played]))
+    return tuple((_scaled(s, gain), r) for s, r in played)
+
+
+def _with_integral(sequence: excite.Sequence, integral_hz: float | None) -> excite.Sequence:
+    e = sequence.excitation
+    if not integral_hz:
+        return sequence
+    steps = np.concatenate([[0.0], np.cumsum(e.samples)[:-1]]) + 0.5 * e.samples
+    total = e.samples + _TURN * integral_hz / e.sample_rate_hz * steps
+    return replace(sequence, excitation=replace(e, samples=total))
+
+
+def _scaled(sequence: excite.Sequence, gain: float) -> excite.Sequence:
+    e = sequence.excitation
+    return replace(sequence, excitation=replace(e, samples=e.samples * gain))
+
+
+def _record(sequence: excite.Sequence, recording: Recording) -> Record:
+    return Record(
+        sequence.excitation, recording.velocity_rad_s, recording.torque_nm, recording.valid
+    )
+
+
+@dataclass(frozen=True)
+class _Upper:
+    """The upper lines of the last period: bins, frequencies, and which samples."""
+
+    cut: slice
+    bins: npt.NDArray[np.int64]
+    f: FloatArray
+
+    @staticmethod
+    def of(record: Record) -> _Upper:
+        e = record.excitation
+        if e.segments:
+            # From rest to rest: the whole of it is one period of a longer signal.
+            length = e.samples.size
+            ends = np.round(e.line_hz[[0, -1]] * (length / e.sample_rate_hz)).astype(np.int64)
+            cut, bins = slice(0, length), np.arange(ends[0], ends[1])
+        else:
+            first = e.first_sample + (e.periods - 1) * e.period_samples
+            length, bins = e.period_samples, e.lines
+            cut = slice(first, first + length)
+        upper = bins[int(_UPPER * bins.size) :]
+        return _Upper(cut, upper, np.asarray(upper * (e.sample_rate_hz / length), np.float64))
+
+    def spectrum(self, signal: FloatArray) -> ComplexArray:
+        """Of these lines."""
+        return np.asarray(np.fft.rfft(signal[self.cut])[self.bins])
+
+
+def _rough_gain(record: Record) -> float:
+    """Nm per rad/s, for scaling an amplitude."""
+    assert record.torque is not None
+    lines = _Upper.of(record)
+    sent, torque = lines.spectrum(record.excitation.samples), lines.spectrum(record.torque)
+    return float(np.linalg.norm(torque) / max(float(np.linalg.norm(sent)), 1e-12))
+
+
+def _gain(record: Record, path: SignalPath) -> float:
+    """Nm per rad/s: the sampled torque is gain·(1 + a/s) times the sampled, held reference."""
+    assert record.torque is not None
+    lines = _Upper.of(record)
+    torque = lines.spectrum(record.torque)
+    best: tuple[float, float] | None = None
+    holds: tuple[Hold, ...] = ("zero", "linear")
+    for hold, cycles in itertools.product(holds, np.arange(0.0, 3.01, 0.25)):
+        late = replace(path, hold=hold, command_delay_s=float(cycles) / path.sample_rate_hz)
+        column = lines.spectrum(sampled_command(record.excitation.samples, late))
+        table = np.column_stack([column, column / (1j * lines.f)])
+        table = np.concatenate([table.real, table.imag])
+        goal = np.concatenate([torque.real, torque.imag])
+        found, *_ = np.linalg.lstsq(table, goal, rcond=None)
+        rest = float(np.sum((table @ found - goal) ** 2))
+        if found[0] > 0 and (best is None or rest < best[0]):
+            best = rest, float(found[0])
+    if best is None:
+        raise ValueError("the torque does not follow the reference: its gain cannot be read")
+    return best[1]
