@@ -624,7 +624,10 @@ class Drive:
 def _shown(parameter: Parameter, raw: Raw | None) -> str:
     if raw is None:
         return "no limit"
-    value = parameter.to_value(raw)
+    try:
+        value = parameter.to_value(raw)
+    except OverflowError:
+        return "a number beyond all measure"
     unit = f" {parameter.unit}" if parameter.unit else ""
     return f"{value}{unit}" if value == raw else f"{value}{unit} (raw {raw})"
 

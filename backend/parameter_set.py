@@ -155,7 +155,7 @@ def parse(data: bytes, name: str = "the file") -> ParameterSet:
         raise BadSet(f"{name} is larger than {MAX_BYTES} bytes", remedy="choose another file")
     try:
         content = tomllib.loads(data.decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # also of dates and of numbers without end
         raise BadSet(
             f"{name} is damaged or no parameter set: {error}",
             remedy="use an undamaged copy",

@@ -16,6 +16,7 @@ from functools import partial
 
 from fastapi import WebSocket, WebSocketDisconnect
 from pydantic import BaseModel, ValidationError
+from starlette.websockets import WebSocketState
 
 import backend
 from backend.api import convert
@@ -216,7 +217,11 @@ class Connection:
         for task in done:
             error = None if task.cancelled() else task.exception()
             # A page may go in the middle of a message, or sleep for so long that its messages
-            # wait for ever; both are ordinary ends.
+            # wait for ever; both are ordinary ends. Samples and words are sent beside each other:
+            # the one finds the line closed, the other that it is known to be.
+            known_closed = self._socket.application_state is WebSocketState.DISCONNECTED
+            if isinstance(error, RuntimeError) and known_closed:
+                continue
             if error is not None and not isinstance(error, (WebSocketDisconnect, TimeoutError)):
                 raise error
 

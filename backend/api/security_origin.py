@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ipaddress
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from backend.people.errors import Forbidden
 
 Headers = list[tuple[bytes, bytes]]
+_HOST = re.compile(r"(?P<name>\[[^\[\]@]*\]|[^:\[\]@]*)(:\d{1,5})?")
 
 
 def header(headers: Iterable[tuple[bytes, bytes]], name: bytes) -> str | None:
@@ -80,6 +82,6 @@ class Addresses:
 
 
 def _name(host: str) -> str:
-    if host.startswith("["):
-        return host.split("]", 1)[0] + "]"
-    return host.rsplit(":", 1)[0] if ":" in host else host
+    """The name of a Host header without its port; the whole where it is no name and port."""
+    found = _HOST.fullmatch(host)
+    return found["name"] if found else host

@@ -10,6 +10,10 @@ from collections import Counter
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import Frame
+
+from backend.people.throttle import Bucket
 
 #: Time for the head of a request, from the connection or the first byte on.
 HEAD_S = 10.0
@@ -18,7 +22,43 @@ DRAIN_S = 60.0
 #: Connections from one address that is not this machine. A page needs about eight.
 MOST_PER_ADDRESS = 100
 
+#: Frames beside messages at once, and a second. A page of ours answers a ping every 5 s.
+_FRAMES = (100.0, 20.0)
+
 _open: Counter[str] = Counter()
+
+
+class PatientSocket(WebSocketsSansIOProtocol):
+    """A websocket that ends where the other side sends frames that no application sees.
+
+    Messages are counted where they are understood (`backend.api.security_socket`); pings, pongs
+    and empty parts of messages never come there.
+    """
+
+    _frames: Bucket | None = None
+
+    def handle_ping(self) -> None:
+        """Answered, unless there are too many."""
+        if self._is_bearable():
+            super().handle_ping()
+
+    def handle_pong(self, event: Frame) -> None:
+        """Noted, unless there are too many."""
+        if self._is_bearable():
+            super().handle_pong(event)
+
+    def handle_cont(self, event: Frame) -> None:
+        """Part of a message, unless there are too many."""
+        if self._is_bearable():
+            super().handle_cont(event)
+
+    def _is_bearable(self) -> bool:
+        if self._frames is None:
+            self._frames = Bucket(*_FRAMES)
+        if self._frames.take():
+            return True
+        self.transport.abort()
+        return False
 
 
 class PatientProtocol(H11Protocol):

@@ -12,7 +12,7 @@ from pathlib import Path
 import uvicorn
 
 from backend.api.app import make_app
-from backend.api.security_protocol import PatientProtocol
+from backend.api.security_protocol import PatientProtocol, PatientSocket
 from backend.bench import Bench
 from backend.people.station import People
 from backend.people.tls import Certificate, machine_names, own_certificate, station_certificate
@@ -24,7 +24,7 @@ LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 WS_MAX_BYTES = 64 << 10
 #: A line that is dead but not closed (lid shut, cable pulled) is given up after both together.
 #: Control, jog and enabling button do not wait for that: they end by their own silence.
-PING_S, PONG_S = 5.0, 8.0
+PING_S, PONG_S = 5.0, 10.0
 #: Connections at once, over all. STOP comes by those that are open already.
 MOST_CONNECTIONS = 500
 
@@ -130,6 +130,7 @@ def _config(
         app,
         log_level="warning",
         http=PatientProtocol,
+        ws=PatientSocket,
         ws_per_message_deflate=False,
         ws_max_size=WS_MAX_BYTES,
         ws_ping_interval=PING_S,

@@ -63,6 +63,17 @@ def test_deep_and_wide_json_is_no_defect(cast: Cast) -> None:
         assert answer.status_code in (400, 422), answer.text[:200]
 
 
+def test_numbers_without_end_are_refused_in_words(cast: Cast) -> None:
+    for method, path, body in (
+        ("PUT", "/drives/x/parameters/2005:03", b'{"raw": 1' + b"0" * 400 + b"}"),
+        ("POST", "/drives/x/tune/undo", b'{"before": {"2005:03": 1' + b"0" * 400 + b"}}"),
+        ("PUT", "/sets/endless", b"version = 1" + b"0" * 5000),
+        ("PUT", "/sets/endless", b"saved = 9999-99-99"),
+    ):
+        answer = cast.operator.ask(method, path, content=body)
+        assert answer.status_code in (409, 422), (path, answer.text[:200])
+
+
 def test_a_slow_body_is_given_up(
     server: GuardedServer, cast: Cast, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -93,6 +104,25 @@ def test_slow_heads_are_closed_and_do_not_keep_others_out(
     finally:
         for line in lines:
             line.close()
+
+
+def test_who_does_not_read_the_answers_is_cut_off(
+    server: GuardedServer, cast: Cast, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(security_protocol, "DRAIN_S", 0.5)
+    head = (
+        "GET /api/v1/openapi.json HTTP/1.1\r\nHost: localhost\r\n"
+        f"Cookie: servodeck={cast.operator.cookie}\r\n\r\n"
+    )
+    known = set(server.connections)
+    with socket.socket() as line:
+        line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 8192)
+        line.connect(("127.0.0.1", server.port))
+        line.sendall(head.encode() * 60)
+        (stuck,) = until(lambda: set(server.connections) - known, 5)
+        until(lambda: stuck not in server.connections, 10, "the connection is given up")
+        assert stuck.transport.get_write_buffer_size() == 0
+    assert cast.operator.ask("GET", "/health").status_code == 200
 
 
 # --- guessing -------------------------------------------------------------------------

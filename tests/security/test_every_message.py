@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import json
 import re
 import socket
 import time
+from types import SimpleNamespace
 from typing import Any, get_args
 
 import pytest
@@ -13,7 +16,10 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from backend.api import live_messages as live
+from backend.api import security_socket
 from backend.api.security_messages import MESSAGES
+from backend.commands.serve import PING_S, PONG_S
+from backend.people.identity import Actor, acting
 from backend.people.rights import RIGHTS, Right, Role
 from tests.security.conftest import Cast
 from tests.support.guarded import Caller, GuardedServer, Page
@@ -149,6 +155,62 @@ def drain(page: Page) -> None:
         page.receive(10)
 
 
+@pytest.mark.parametrize(
+    ("first", "more"),
+    [
+        (b"", b"\x89\x80\x00\x00\x00\x00"),  # pings, whose answers nobody reads
+        (b"", b"\x8a\x80\x00\x00\x00\x00"),  # pongs that nobody asked for
+        (b"\x01\x80\x00\x00\x00\x00", b"\x00\x80\x00\x00\x00\x00"),  # a message without end
+    ],
+    ids=["ping", "pong", "part"],
+)
+def test_a_flood_of_frames_that_are_no_messages_ends_the_connection(
+    server: GuardedServer, cast: Cast, first: bytes, more: bytes
+) -> None:
+    known = server.connections
+    with socket.create_connection(("127.0.0.1", server.port), timeout=15) as line:
+        line.sendall(upgrade(server, cast))
+        assert b" 101 " in line.recv(65536)
+        (flooded,) = server.connections - known
+        line.sendall(first + more * 200)
+        until(lambda: flooded not in server.connections, 5, "it is ended")
+    assert cast.operator.ask("GET", "/health").status_code == 200
+
+
+def upgrade(server: GuardedServer, cast: Cast) -> bytes:
+    """The beginning of a live connection of the operator's."""
+    return (
+        f"GET /api/v1/live HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nUpgrade: websocket\r\n"
+        "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+        f"Cookie: servodeck={cast.operator.cookie}\r\n\r\n"
+    ).encode()
+
+
+def test_one_log_in_does_not_take_all_places(
+    server: GuardedServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert security_socket.MOST_PER_SESSION <= 100
+    monkeypatch.setattr(security_socket, "MOST_PER_SESSION", 3)
+    caller = server.log_in(Role.VIEWER)
+    cookie = {"Cookie": f"servodeck={caller.cookie}"}
+    with contextlib.ExitStack() as pages:
+        for _ in range(3):
+            pages.enter_context(caller.live())
+        assert handshake(server, cookie) == 403
+        assert (
+            handshake(server, {"Cookie": f"servodeck={server.log_in(Role.VIEWER).cookie}"}) == 101
+        )
+        assert caller.ask("POST", "/stop", json={}).status_code == 200
+    until(lambda: handshake(server, cookie) == 101, 5)
+
+
+def test_nobody_talks_the_log_full(cast: Cast) -> None:
+    with cast.operator.live() as page:
+        problems = [page.refused(type="chat", text=f"line {n}") for n in range(12)]
+    assert [problem["status"] for problem in problems if problem] == [429, 429]
+
+
 def test_a_flood_ends_the_connection(cast: Cast) -> None:
     def flood(page: Page) -> None:
         for _ in range(3000):
@@ -198,13 +260,7 @@ def _receive(line: socket.socket) -> bytes:
 def test_a_malformed_frame_ends_its_connection_only(
     server: GuardedServer, cast: Cast, frame: bytes
 ) -> None:
-    head = (
-        f"GET /api/v1/live HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nUpgrade: websocket\r\n"
-        "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-        "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
-        f"Cookie: servodeck={cast.operator.cookie}\r\n\r\n"
-    )
-    answer = raw(server, head.encode(), frame, until_seen=CLOSED)
+    answer = raw(server, upgrade(server, cast), frame, until_seen=CLOSED)
     assert b"101 Switching Protocols" in answer
     closed = CLOSED.search(answer)
     assert closed is not None
@@ -227,25 +283,60 @@ def test_a_silent_connection_loses_control_within_two_seconds(
         assert page.wait("lease_notice", drive="x")["kind"] == "lost"
 
 
-def test_a_closed_connection_ends_what_it_began(server: GuardedServer, cast: Cast) -> None:
-    """A motion cannot outlive the page of the person who asked for it."""
-    import asyncio
+def began_by(server: GuardedServer, cast: Cast, page: Page) -> Any:
+    """A motion that would go on for ever, begun by the operator through this page."""
 
     async def forever(_progress: object) -> None:
         await asyncio.Event().wait()
 
     def start() -> Any:
-        from backend.people.identity import Actor, acting
-
         identity = server.people.identify(cast.operator.cookie, None)
         assert identity is not None
         acting.set(Actor(identity, page.connection))
         return server.bench.jobs.start("sweep", "Sweep", forever, drive="x", motion=True)
 
+    return server.call(start)
+
+
+def test_a_closed_connection_ends_what_it_began(server: GuardedServer, cast: Cast) -> None:
+    """A motion cannot outlive the page of the person who asked for it."""
     with cast.operator.live() as page:
-        job = server.call(start)
+        job = began_by(server, cast, page)
         assert job.person == "Olaf"
     until(lambda: job.state == "cancelled", 3, "the job has ended")
+
+
+def test_a_line_that_is_dead_but_open_moves_nothing_and_is_given_up(
+    server: GuardedServer, cast: Cast
+) -> None:
+    """A laptop's lid is shut: no word, no end of the connection, no answer to pings."""
+    live = server.app.state.live
+    known = set(live.connections)
+    config = server.config
+    config.ws_ping_interval, config.ws_ping_timeout = 0.5, 2.5
+    try:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=15) as line:
+            line.sendall(upgrade(server, cast))
+            (name,) = until(lambda: set(live.connections) - known, 5)
+            page = live.connections[name]
+            server.call(lambda: server.bench.leases.take("x", name, "Olaf"))
+            job = began_by(server, cast, SimpleNamespace(connection=name))  # type: ignore[arg-type]
+            began = time.monotonic()
+            until(lambda: server.bench.leases.holder("x") is None, 4, "control is lost")
+            until(lambda: job.state == "cancelled", 2, "the motion has ended")
+            assert time.monotonic() - began < 2.2
+            assert name in live.connections, "and all that while the line still looked open"
+            until(lambda: name not in live.connections, 5, "the line is given up")
+            assert page.id not in {
+                each["connection"] for each in cast.viewer.ok("GET", "/people")["people"]
+            }
+    finally:
+        config.ws_ping_interval, config.ws_ping_timeout = PING_S, PONG_S
+
+
+def test_dead_lines_are_given_up_within_a_quarter_minute(server: GuardedServer) -> None:
+    config = server.config
+    assert (config.ws_ping_interval or 99) + (config.ws_ping_timeout or 99) <= 15
 
 
 def test_a_viewer_stops_what_moves(server: GuardedServer, cast: Cast) -> None:
@@ -325,10 +416,6 @@ def test_the_button_on_site_is_dead_within_200_ms(server: GuardedServer, cast: C
 
 
 def _guest_motion(server: GuardedServer, cast: Cast) -> Any:
-    import asyncio
-
-    from backend.people.identity import Actor, acting
-
     async def forever(_progress: object) -> None:
         await asyncio.Event().wait()
 

@@ -24,7 +24,7 @@ ENDS_IT = {"DELETE /api/v1/session"}
 
 
 def operations(server: GuardedServer) -> list[str]:
-    paths = server.app.openapi()["paths"]
+    paths = server.interface["paths"]
     return [f"{method.upper()} {path}" for path, known in paths.items() for method in known]
 
 
@@ -134,6 +134,9 @@ FOREIGN = [
     {"Host": "evil.example"},
     {"Host": "127.0.0.1.evil.example"},
     {"Host": "localhost@evil.example"},
+    {"Host": "localhost:80@evil.example"},
+    {"Host": "[::1].evil.example"},
+    {"Host": "[::1]evil.example:80"},
     {"Origin": "http://evil.example"},
     {"Origin": "null"},
     {"Origin": "https://localhost"},

@@ -30,6 +30,9 @@ CHEAP = Passwords(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
 NAMES = {Role.ADMINISTRATOR: "Anna", Role.OPERATOR: "Olaf", Role.VIEWER: "Vera"}
 
 
+_interface: dict[str, Any] = {}
+
+
 class Caller:
     """Somebody with a cookie or a token, or nobody."""
 
@@ -103,6 +106,13 @@ class GuardedServer:
     @property
     def url(self) -> str:
         return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def interface(self) -> dict[str, Any]:
+        """The OpenAPI document: slow to make, and the same of every server."""
+        if not _interface:
+            _interface.update(self.app.openapi())
+        return _interface
 
     @property
     def connections(self) -> set[Any]:
