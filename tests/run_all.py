@@ -33,6 +33,11 @@ REAL_TIME = [
     "tests/wire/ethercat_host",
     "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
 ]  # fmt: skip
+#: The pages whose tests move axes in real time, or compare what two browsers see.
+BROWSERS_ALONE = [
+    f"tests/browser/test_{page}.py"
+    for page in ("motion", "people", "recordings", "response", "scope", "segment", "tune")
+]
 #: Suites that compute and keep no time: what the others leave of the machine is enough for them.
 PATIENT = ["tests/profiles", "tests/unit", "tests/virtual/conformance", "tests/virtual/firmware"]
 #: Runs only while nothing else wants to (SCHED_IDLE), so that no bus is kept waiting for it.
@@ -67,7 +72,9 @@ TIMED = [
     pytest("tests", "-n", "2", "--dist", "loadfile", "-m", "not browser", "tests",
            *(f"--ignore={path}" for path in (*REAL_TIME, *PATIENT))),
     pytest("EtherCAT tests", *REAL_TIME),
-    pytest("browser tests", "-m", "browser", "tests/browser"),
+    pytest("browser tests", "-m", "browser", *BROWSERS_ALONE),
+    pytest("pages", "-n", "2", "--dist", "loadfile", "-m", "browser", "tests/browser",
+           *(f"--ignore={path}" for path in BROWSERS_ALONE)),
 ]  # fmt: skip
 BESIDE = [
     Check("docs", [str(BIN / "mkdocs"), "build", "--strict", "--quiet"]),
