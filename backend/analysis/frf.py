@@ -114,10 +114,10 @@ def estimate_periodic(
         coulomb_nm = 0.0 if quantity == "closed_loop" else estimate_coulomb(s, path, quantity)
     inputs = continuous_input(s, path, quantity, coulomb_nm, position=position)
     g, _, s_ur = instrument_estimate(s, inputs)
-    # What friction did to the answer is known to about a half only: when exactly the speed
-    # reverses is seen once a cycle. That is charged to the band.
+    # What friction did to the answer is known to about a fifth only; that is charged to the band
+    # (more of it would also weigh lines less that tell the speed filter well).
     plain = instrument_estimate(s, continuous_input(s, path, quantity, position=position))[0]
-    doubt = 0.5 * np.log(g / plain)
+    doubt = 0.2 * np.log(g / plain)
     power = np.asarray(sum(np.abs(r.mean(axis=0)) ** 2 for r in s.sent))
     noise_var, total_var, freedom = _variances(s, inputs, g, smooth_lines)
     relative = total_var * power / np.abs(g * s_ur) ** 2

@@ -38,6 +38,8 @@ _SCALE = 1e4
 _OWN_SHARE = 0.15
 #: Another hold is worth a trial when it leaves less than this multiple unexplained.
 _ALIKE = 3.0
+#: A delay so near to whole cycles is one of whole cycles.
+_WHOLE = 0.06
 #: So much stays unexplained by rounding alone.
 _ROUNDING = 1.5e-7
 
@@ -67,7 +69,15 @@ def find_paths(
     holds: tuple[Hold, ...] = (path.hold,) if hold_known else ("zero", "linear")
     found = sorted((fit.best(hold) for hold in holds), key=lambda t: t[1])
     least = max(found[0][1], _ROUNDING)
-    return tuple(p for p, cost in found if cost < _ALIKE * least)
+    alike = tuple(p for p, cost in found if cost < _ALIKE * least)
+    return tuple(p for p in alike if _at_whole_cycles(p)) or alike
+
+
+def _at_whole_cycles(path: SignalPath) -> bool:
+    """Whether set-points take effect with a cycle of the bus, as drives in step with it do."""
+    lead_s = STEP_LEAD_S if path.hold == "linear" else 0.0
+    cycles = (path.command_delay_s + lead_s) * path.sample_rate_hz
+    return abs(cycles - round(cycles)) < _WHOLE
 
 
 @dataclass(frozen=True)
