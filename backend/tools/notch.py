@@ -219,17 +219,25 @@ def response(
         stored = encode_coefficients(notch, spec.sample_time_s)
         return coefficients_response(stored, frequency_hz, spec.sample_time_s)
     if spec.encoding == "hz_width_db":
-        encoded = encode(profile, profile.drive, 0, notch, None)
+        encoded = _possible(profile, notch, None)
         slot = spec.slots[0]
         hz, wide, db = (
             encoded.raw[k] for k in (slot.frequency_key, slot.width_key, slot.depth_key) if k
         )
         return decode_hz_width_db(hz, wide, db).response(frequency_hz)
     if meaning is not None:
-        made = encode(profile, profile.drive, 0, notch, None, meaning).realised
+        made = _possible(profile, notch, meaning).realised
         if made is not None:
             notch = Notch(made.center_hz, made.width_hz, made.depth_db)
     return notch.response(frequency_hz)
+
+
+def _possible(profile: Profile, notch: Notch, meaning: NotchMeaning | None) -> Preview:
+    """As `encode`; ValueError where the drive's ranges do not hold the notch."""
+    try:
+        return encode(profile, profile.drive, 0, notch, None, meaning)
+    except OutOfRange as error:
+        raise ValueError(error.message) from error
 
 
 async def read_notches(drive: Drive, meaning: NotchMeaning | None = None) -> tuple[SlotState, ...]:

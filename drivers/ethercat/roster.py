@@ -67,7 +67,7 @@ class Roster:
         if self.segment.replaced():
             self._interface_gone()
             return
-        if self._search_due:
+        if self._search_due or any(station.badly_found for station in self.stations):
             self._search_again(now)
         for station in self.stations:
             if not self.lanes.busy(station.number, "register"):

@@ -15,6 +15,8 @@ from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError
 from drivers.ethercat.mailbox import Pause, Read, Steps, Write
 
 ALIAS_WORD, CHECKSUM_WORD, SERIAL_WORD, BOOT_WORD = 0x0004, 0x0007, 0x000E, 0x0014
+MAILBOX_WORD = 0x0018
+"""Offset and size of the mailbox out, of the mailbox in, and the protocols (ETG.1000.6 5.4)."""
 CONFIG_WORDS = 7
 
 _OWNER, _CONTROL, _DATA = 0x500, 0x502, 0x508
@@ -107,6 +109,17 @@ def boot_mailbox(clock: Callable[[], float]) -> Steps[BootMailbox | None]:
     told = BootMailbox(*struct.unpack("<HHHH", (yield from read(BOOT_WORD, 4, clock))))
     sane = min(told.out_size, told.in_size) >= _LEAST_MAILBOX and told.out_address >= _RAM
     return told if sane and 0xFFFF not in (told.out_size, told.in_size) else None
+
+
+def has_mailbox(clock: Callable[[], float]) -> Steps[bool]:
+    """Whether the EEPROM names mailboxes and a protocol for them; False where it cannot be read."""
+    try:
+        words = struct.unpack("<HHHHH", (yield from read(MAILBOX_WORD, 5, clock)))
+    except DriveError:
+        return False
+    _, out_size, _, in_size, protocols = words
+    blank = 0xFFFF in (out_size, in_size, protocols)
+    return not blank and min(out_size, in_size) >= _LEAST_MAILBOX and protocols != 0
 
 
 def _take() -> Steps[None]:

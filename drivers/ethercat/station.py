@@ -41,6 +41,8 @@ class Station:
     al_state: int = 0
     al_code: int = 0
     lost: bool = False
+    badly_found: bool = False
+    """Its EEPROM names a mailbox that the search did not set up: a frame of the search was lost."""
     complete_access: bool = True
     single_only: set[int] = field(default_factory=set)
     """Objects whose complete access was not certain."""
@@ -70,7 +72,13 @@ class Station:
 
         Raises:
             NotAllowed: a device without one.
+            LinkLost: the search did not set it up.
         """
+        if self.badly_found:
+            raise LinkLost(
+                f"station {self.number} ({self.name}) was found only in part: frames were lost",
+                remedy="the segment is searched again by itself as soon as no axis is moved by it",
+            )
         if self.mailbox is None:
             raise NotAllowed(f"station {self.number} ({self.name}) has no mailbox: no parameters")
         return self.mailbox
@@ -211,7 +219,12 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         station.notes.append(error.message)
     if station.mailbox is None:
         yield from al_status(station)
-        station.notes.append("no mailbox: only process data")
+        station.badly_found = yield from sii.has_mailbox(clock)
+        station.notes.append(
+            "it was found only in part: the segment is searched again"
+            if station.badly_found
+            else "no mailbox: only process data"
+        )
         return
     try:
         yield from _to_preop(station, clock)

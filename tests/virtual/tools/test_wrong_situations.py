@@ -158,7 +158,10 @@ async def test_single_tools_are_cancelled(tool: str, fraction: float) -> None:
         works: dict[str, Callable[[], Awaitable[object]]] = {
             "sweep": lambda: sweep(b.axis, b.session, SweepSettings(WIDE), progress),
             "inertia": lambda: inertia(b.axis, b.session, InertiaSettings(WIDE), progress),
-            "step": lambda: step_response(b.axis, b.session, StepSettings(WIDE), progress),
+            # Long enough to be told of progress more than once while it moves.
+            "step": lambda: step_response(
+                b.axis, b.session, StepSettings(WIDE, hold_s=2.0), progress
+            ),
         }
         task = asyncio.ensure_future(works[tool]())
         with pytest.raises(asyncio.CancelledError):

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -84,8 +85,11 @@ def test_canopen_follows_the_network_state(remote: tuple[Bench, canopen.RemoteNo
     node.sdo.download(0x1017, 0, b"\x0a\x00")
     node.nmt.wait_for_heartbeat(timeout=2)
     assert node.nmt.state == "OPERATIONAL"
+    # canopen's own wait misses a boot-up that comes before it begins.
+    booted = threading.Event()
+    node.network.subscribe(0x705, lambda _id, data, _at: booted.set() if data == b"\0" else None)
     node.nmt.send_command(0x81)
-    node.nmt.wait_for_bootup(timeout=2)
+    assert booted.wait(timeout=2)
     assert bench.node.state == 127
     bench.wire.do(lambda: bench.device.inject("2310"))
     assert node.emcy.wait(0x2310, timeout=2).code == 0x2310
@@ -104,8 +108,10 @@ def test_canopen_reads_and_writes_its_process_data(
     node.tpdo.save()
     node.nmt.send_command(0x01)
     node.sdo.download(0x607A, 0, (1234).to_bytes(4, "little"))
+    received = threading.Event()
+    node.tpdo[1].add_callback(lambda _pdo: received.set())
     node.network.sync.transmit()
-    assert node.tpdo[1].wait_for_reception(2) is not None
+    assert received.wait(timeout=2)
     assert node.tpdo[1][0].raw == 1234
     node.network.send_message(0x205, b"\x0f\x00")  # RPDO 1 is event-driven by default
     deadline = time.monotonic() + 2

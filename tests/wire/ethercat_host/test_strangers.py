@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,14 +14,16 @@ import numpy as np
 import pytest
 
 from drivers.cia402 import Mode, State
-from drivers.errors import DriveError, NotAllowed, Rejected
+from drivers.errors import DriveError, LinkLost, NotAllowed, Rejected
 from drivers.ethercat.information import EntryDescription, ObjectInfo
 from drivers.ethercat.link import EthercatLink
+from drivers.ethercat.mailbox import Read, Write
+from drivers.ethercat.station import Station, identify
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
 from drivers.virtual.wires.netns import Namespace
 from profiles.schema import PdoSet, PdoSpec, Profile
 from tests.wire.ethercat_host.conftest import Bus, until
-from tests.wire.ethercat_host.plain_slaves import LONG
+from tests.wire.ethercat_host.plain_slaves import LONG, Coupler, Servo, Slave
 from tests.wire.ethercat_host.servo_device import servo_profile
 
 HERE = Path(__file__).parent
@@ -156,3 +160,23 @@ async def test_a_drive_with_a_bare_eeprom_is_read_whole_and_moved_by_nobody(bus:
             )
     finally:
         await bus.link.close()
+
+
+@pytest.mark.parametrize(("slave", "badly"), [(Servo(), True), (Coupler(), False)])
+def test_a_mailbox_that_a_search_missed_is_told_from_none_at_all(slave: Slave, badly: bool) -> None:
+    """Frames with its EEPROM were lost, so its sync managers were never set up."""
+    station = Station(1)
+    steps = identify(station, time.monotonic)
+    reply: bytes | None = None
+    with contextlib.suppress(StopIteration):
+        while True:
+            step = steps.send(reply)
+            if isinstance(step, Read):
+                reply = slave.read(step.register, step.size)
+            elif isinstance(step, Write):
+                reply = b"" if slave.write(step.register, step.data) else None
+            else:
+                reply = b""
+    assert station.badly_found is badly
+    with pytest.raises(LinkLost if badly else NotAllowed, match="in part" if badly else "mailbox"):
+        _ = station.box
