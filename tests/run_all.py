@@ -25,23 +25,26 @@ BIN = Path(sys.executable).parent
 NPM = ["npm"] if shutil.which("npm") else [sys.executable, str(ROOT / "hatch_build.py")]
 
 PYTEST = [sys.executable, "-m", "pytest", "-q", "--durations=12"]
-#: Suites with a bus in real time have the machine to themselves: a master that is kept from its
+#: Suites with a bus in real time, and pages that move axes or compare what two browsers see. They
+#: wait for most of their time; two at a time leave the buses enough: a master that is kept from its
 #: cycle for 30 ms must brake the axis, and then the test does not see what it wants to see.
+#: The longest come first.
 REAL_TIME = [
-    "tests/api/test_ethercat.py", "tests/api/test_ethercat_faults.py",
-    "tests/api/test_ethercat_segment.py", "tests/api/test_every_family.py",
-    "tests/wire/ethercat_host",
-    "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
+    "tests/browser/test_tune.py", "tests/api/test_every_family.py",
+    "tests/api/test_ethercat_faults.py", "tests/api/test_ethercat.py",
+    "tests/browser/test_response.py", "tests/browser/test_recordings.py",
+    "tests/api/test_scope_soak.py", "tests/browser/test_scope.py", "tests/browser/test_people.py",
+    "tests/browser/test_segment.py", "tests/browser/test_motion.py",
+    "tests/wire/ethercat_host", "tests/api/test_ethercat_segment.py",
+    "tests/api/test_scope_streams.py",
 ]  # fmt: skip
-#: The pages whose tests move axes in real time, or compare what two browsers see.
-BROWSERS_ALONE = [
-    f"tests/browser/test_{page}.py"
-    for page in ("motion", "people", "recordings", "response", "scope", "segment", "tune")
-]
 #: Suites that compute and keep no time: what the others leave of the machine is enough for them.
 PATIENT = ["tests/profiles", "tests/unit", "tests/virtual/conformance", "tests/virtual/firmware"]
 #: Runs only while nothing else wants to (SCHED_IDLE), so that no bus is kept waiting for it.
 AT_IDLE = ["chrt", "--idle", "0"]
+
+
+TWO = ["-n", "2", "--dist", "loadfile"]
 
 
 class Check(NamedTuple):
@@ -57,6 +60,11 @@ def pytest(name: str, *arguments: str) -> Check:
     return Check(name, [*PYTEST, "-o", f"cache_dir=.pytest_cache/{name}", *arguments])
 
 
+def ignoring(paths: Sequence[str]) -> list[str]:
+    """Arguments that leave these out."""
+    return [f"--ignore={path}" for path in paths]
+
+
 QUICK = [
     Check("format", [str(BIN / "ruff"), "format", "--check", "."]),
     Check("lint", [str(BIN / "ruff"), "check", "."]),
@@ -69,13 +77,10 @@ QUICK = [
 ]
 #: One after the other, with the machine to themselves but for `BESIDE`.
 TIMED = [
-    pytest("tests", "-n", "2", "--dist", "loadfile", "-m", "not browser", "tests",
-           *(f"--ignore={path}" for path in (*REAL_TIME, *PATIENT))),
-    pytest("EtherCAT tests", *REAL_TIME),
-    pytest("browser tests", "-m", "browser", *BROWSERS_ALONE),
-    pytest("pages", "-n", "2", "--dist", "loadfile", "-m", "browser", "tests/browser",
-           *(f"--ignore={path}" for path in BROWSERS_ALONE)),
-]  # fmt: skip
+    pytest("tests", *TWO, "-m", "not browser", "tests", *ignoring(REAL_TIME), *ignoring(PATIENT)),
+    pytest("real time", *TWO, "--no-loadscope-reorder", *REAL_TIME),
+    pytest("pages", *TWO, "-m", "browser", "tests/browser", *ignoring(REAL_TIME)),
+]
 BESIDE = [
     Check("docs", [str(BIN / "mkdocs"), "build", "--strict", "--quiet"]),
     pytest("patient tests", *PATIENT),

@@ -154,7 +154,8 @@ class Live:
     """A page's websocket."""
 
     def __init__(self, url: str) -> None:
-        self.socket: ClientConnection = connect(url, max_size=None)
+        # With messages unread, this client does not see the server's close and would wait 10 s.
+        self.socket: ClientConnection = connect(url, max_size=None, close_timeout=1)
         self.binary: list[bytes] = []
         hello = self.wait("hello")
         self.connection = hello["connection"]
