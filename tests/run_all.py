@@ -13,9 +13,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import IO, NamedTuple
 
@@ -83,7 +83,8 @@ TIMED = [
 ]
 BESIDE = [
     Check("docs", [str(BIN / "mkdocs"), "build", "--strict", "--quiet"]),
-    pytest("patient tests", *PATIENT),
+    # A worker of its own writes to a pipe: tests of full disks bound the length of files.
+    pytest("patient tests", "-n", "1", *PATIENT),
 ]
 
 
@@ -107,7 +108,7 @@ class Runner:
                 # Whole files, as the tests of some follow one another.
                 files = last_failed(check.name)
                 self._say(f"== {check.name}: once more, alone: {' '.join(files)}")
-                code = self._once(pytest(check.name, *files).command, ROOT)
+                code = self._once(pytest(check.name, *files).command, ROOT) if files else code
             self._say(f"== {check.name}: {time.monotonic() - began:.0f} s, exit {code}")
             if code != 0:
                 self.failed.append(check.name)
@@ -124,8 +125,13 @@ class Runner:
 
 
 def last_failed(name: str) -> list[str]:
-    """Files with tests that failed in the last run of a suite; forgotten with this answer."""
+    """Files with tests that failed in the last run of a suite; forgotten with this answer.
+
+    None where the suite came to no end.
+    """
     note = ROOT / ".pytest_cache" / name / "v" / "cache" / "lastfailed"
+    if not note.exists():
+        return []
     failed = json.loads(note.read_text("utf-8"))
     note.unlink()
     return sorted({test.partition("::")[0] for test in failed})
@@ -141,10 +147,10 @@ def main() -> int:
     if not fast:
         with tempfile.TemporaryFile("w+", encoding="utf-8") as printed:
             beside = Runner(printed, AT_IDLE)
-            thread = threading.Thread(target=beside.run, args=(BESIDE,))
-            thread.start()
-            runner.run(TIMED)
-            thread.join()
+            with ThreadPoolExecutor() as pool:
+                ending = pool.submit(beside.run, BESIDE)
+                runner.run(TIMED)
+                ending.result()
             printed.seek(0)
             shutil.copyfileobj(printed, sys.stdout)
         checks, failed = [*QUICK, *TIMED, *BESIDE], runner.failed + beside.failed
