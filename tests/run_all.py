@@ -25,18 +25,14 @@ BIN = Path(sys.executable).parent
 NPM = ["npm"] if shutil.which("npm") else [sys.executable, str(ROOT / "hatch_build.py")]
 
 PYTEST = [sys.executable, "-m", "pytest", "-q", "--durations=12"]
-#: Suites with a bus in real time, and pages that move axes or compare what two browsers see. They
-#: wait for most of their time; two at a time leave the buses enough: a master that is kept from its
-#: cycle for 30 ms must brake the axis, and then the test does not see what it wants to see.
-#: The longest come first.
+#: Suites with a bus in real time. They wait for most of their time, so that the pages may be tested
+#: beside them, but no more: a master that is kept from its cycle for 30 ms must brake the axis, and
+#: then the test does not see what it wants to see.
 REAL_TIME = [
-    "tests/browser/test_tune.py", "tests/api/test_every_family.py",
-    "tests/api/test_ethercat_faults.py", "tests/api/test_ethercat.py",
-    "tests/browser/test_response.py", "tests/browser/test_recordings.py",
-    "tests/api/test_scope_soak.py", "tests/browser/test_scope.py", "tests/browser/test_people.py",
-    "tests/browser/test_segment.py", "tests/browser/test_motion.py",
-    "tests/wire/ethercat_host", "tests/api/test_ethercat_segment.py",
-    "tests/api/test_scope_streams.py",
+    "tests/api/test_ethercat.py", "tests/api/test_ethercat_faults.py",
+    "tests/api/test_ethercat_segment.py", "tests/api/test_every_family.py",
+    "tests/wire/ethercat_host",
+    "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
 ]  # fmt: skip
 #: Suites that compute and keep no time: what the others leave of the machine is enough for them.
 PATIENT = ["tests/profiles", "tests/unit", "tests/virtual/conformance", "tests/virtual/firmware"]
@@ -75,12 +71,11 @@ QUICK = [
     Check("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),
     Check("client drift", [sys.executable, "tests/client_drift.py"]),
 ]
-#: One after the other, with the machine to themselves but for `BESIDE`.
 TIMED = [
     pytest("tests", *TWO, "-m", "not browser", "tests", *ignoring(REAL_TIME), *ignoring(PATIENT)),
-    pytest("real time", *TWO, "--no-loadscope-reorder", *REAL_TIME),
-    pytest("pages", *TWO, "-m", "browser", "tests/browser", *ignoring(REAL_TIME)),
 ]
+BUSES = [pytest("EtherCAT tests", *REAL_TIME)]
+PAGES = [pytest("browser tests", "-m", "browser", "tests/browser")]
 BESIDE = [
     Check("docs", [str(BIN / "mkdocs"), "build", "--strict", "--quiet"]),
     # A worker of its own writes to a pipe: tests of full disks bound the length of files.
@@ -93,24 +88,28 @@ class Runner:
 
     def __init__(self, out: IO[str], before: Sequence[str] = ()) -> None:
         self.failed: list[str] = []
+        self.again: list[Check] = []
+        """What failed in suites, to be run once more when nothing else runs."""
         self._out = out
         self._before = before
         self._environment = os.environ | {"PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
 
-    def run(self, checks: Sequence[Check]) -> None:
-        """Run them in turn; what they print goes where this prints."""
+    def run(self, checks: Sequence[Check], *, last: bool = False) -> None:
+        """Run them in turn; what they print goes where this prints.
+
+        Files with failed tests go to `again`, whole, as the tests of some follow one another; not
+        at the ``last`` time. A busy machine is no defect, and a defect stays one.
+        """
         for check in checks:
             self._say(f"== {check.name}")
             began = time.monotonic()
             code = self._once(check.command, check.folder)
-            if code == 1 and list(check.command[: len(PYTEST)]) == PYTEST:
-                # Once more, alone, and said aloud: a busy machine is no defect, a defect stays one.
-                # Whole files, as the tests of some follow one another.
-                files = last_failed(check.name)
-                self._say(f"== {check.name}: once more, alone: {' '.join(files)}")
-                code = self._once(pytest(check.name, *files).command, ROOT) if files else code
             self._say(f"== {check.name}: {time.monotonic() - began:.0f} s, exit {code}")
-            if code != 0:
+            suite = list(check.command[: len(PYTEST)]) == PYTEST
+            files = last_failed(check.name) if code == 1 and suite and not last else []
+            if files:
+                self.again.append(pytest(check.name, *files))
+            elif code != 0:
                 self.failed.append(check.name)
 
     def _say(self, line: str) -> None:
@@ -139,24 +138,41 @@ def last_failed(name: str) -> list[str]:
 
 def main() -> int:
     """Run the checks; the exit code is the number of those that failed."""
-    fast = "--fast" in sys.argv
     shutil.rmtree(ROOT / ".pytest_cache", ignore_errors=True)
     runner = Runner(sys.stdout)
     runner.run(QUICK)
     checks, failed = QUICK, runner.failed
-    if not fast:
-        with tempfile.TemporaryFile("w+", encoding="utf-8") as printed:
-            beside = Runner(printed, AT_IDLE)
-            with ThreadPoolExecutor() as pool:
-                ending = pool.submit(beside.run, BESIDE)
-                runner.run(TIMED)
-                ending.result()
-            printed.seek(0)
-            shutil.copyfileobj(printed, sys.stdout)
-        checks, failed = [*QUICK, *TIMED, *BESIDE], runner.failed + beside.failed
+    if "--fast" not in sys.argv:
+        checks, failed = [*QUICK, *TIMED, *BUSES, *PAGES, *BESIDE], run_suites(runner)
     print(f"failed: {', '.join(failed)}" if failed else "all checks passed")
     print(f"{len(checks) - len(failed)} passed, {len(failed)} failed")
     return len(failed)
+
+
+def run_suites(runner: Runner) -> list[str]:
+    """Run the suites in three lanes; returns the names of those that failed twice."""
+    with (
+        tempfile.TemporaryFile("w+", encoding="utf-8") as idle,
+        tempfile.TemporaryFile("w+", encoding="utf-8") as seen,
+        ThreadPoolExecutor() as pool,
+    ):
+        beside, pages = Runner(idle, AT_IDLE), Runner(seen)
+        lanes = [pool.submit(beside.run, BESIDE)]
+        runner.run(TIMED)
+        lanes.append(pool.submit(pages.run, PAGES))
+        runner.run(BUSES)
+        for lane in lanes:
+            lane.result()
+        for printed in (seen, idle):
+            printed.seek(0)
+            shutil.copyfileobj(printed, sys.stdout)
+    again = [*runner.again, *pages.again, *beside.again]
+    if again:
+        alone = Runner(sys.stdout)
+        print("== once more, alone", flush=True)
+        alone.run(again, last=True)
+        runner.failed += alone.failed
+    return runner.failed + pages.failed + beside.failed
 
 
 if __name__ == "__main__":
