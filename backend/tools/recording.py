@@ -144,6 +144,12 @@ def require_signals(axis: Axis, session: CyclicSession, mode: Mode, offset: bool
             )
 
 
+def takes_torque(axis: Axis, session: CyclicSession) -> bool:
+    """Whether the axis is given torques with every cycle."""
+    key = axis.drive.key(_TARGET_OF[Mode.CST])
+    return key is not None and session.carries(axis.drive, key)
+
+
 @asynccontextmanager
 async def enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterator[int]:
     """Operation enabled through the loop, for the length of the block; yields the position.
