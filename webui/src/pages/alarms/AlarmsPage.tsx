@@ -1,14 +1,12 @@
-import { Button } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { LogEntry } from '../../api/schema'
 import { useT } from '../../i18n'
-import { setState, useAxisState, useDrive, useLink, useLog } from '../../live/store'
+import { useAxisState, useDrive, useLink, useLog } from '../../live/store'
 import { FaultList } from '../../widgets/FaultList'
+import { FaultResetButton, FaultResetProblem, useFaultReset } from '../../widgets/FaultReset'
 import { dateTime } from '../../widgets/format'
 import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
 import { Bundles } from './Bundles'
 import { History } from './History'
 
@@ -16,7 +14,7 @@ export function AlarmsPage({ drive }: { drive: string }) {
   const t = useT()
   const state = useAxisState(drive)
   const summary = useDrive(drive)
-  const reset = useAction()
+  const reset = useFaultReset(drive)
   const faults = state?.faults.filter((fault) => fault.kind === 'fault') ?? []
   const warnings = state?.faults.filter((fault) => fault.kind === 'warning') ?? []
   return (
@@ -32,26 +30,10 @@ export function AlarmsPage({ drive }: { drive: string }) {
       <Panel
         title={t('faults.active')}
         tools={
-          <Button
-            disabled={!state?.fresh || state.faults.length === 0}
-            loading={reset.busy}
-            onClick={() =>
-              void reset.run(async () =>
-                setState(
-                  await ask(
-                    api.POST('/api/v1/drives/{drive_id}/fault-reset', {
-                      params: { path: { drive_id: drive } },
-                    }),
-                  ),
-                ),
-              )
-            }
-          >
-            {t('faults.reset')}
-          </Button>
+          <FaultResetButton reset={reset} disabled={!state?.fresh || state.faults.length === 0} />
         }
       >
-        <ProblemNote problem={reset.problem} onClose={reset.clear} />
+        <FaultResetProblem reset={reset} />
         {state?.fresh && faults.length === 0 && <p className="good-text">{t('faults.none')}</p>}
         <FaultList faults={faults} />
       </Panel>

@@ -5,6 +5,7 @@ import type { DriveSummary } from '../../api/schema'
 import { href } from '../../app/router'
 import { linkLook } from '../../app/states'
 import { useT } from '../../i18n'
+import { ConfirmDelete } from '../../widgets/ConfirmDelete'
 import { Icon } from '../../widgets/Icon'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
@@ -135,32 +136,27 @@ function Remove({ drive, onClose }: { drive: DriveSummary; onClose: () => void }
   const t = useT()
   const remove = useAction()
   return (
-    <Modal opened onClose={onClose} title={t('connect.remove')}>
+    <ConfirmDelete
+      title={t('connect.remove')}
+      action={t('connect.remove')}
+      busy={remove.busy}
+      problem={remove.problem}
+      onClose={onClose}
+      onDelete={async () => {
+        const done = await remove.run(() =>
+          ask(
+            api.DELETE('/api/v1/drives/{drive_id}', {
+              params: { path: { drive_id: drive.id } },
+            }),
+          ),
+        )
+        if (done) onClose()
+      }}
+    >
       <p>{t('connect.removeText', { name: drive.name })}</p>
       {drive.unsaved > 0 && (
         <p className="warn-text">{t('connect.removeUnsaved', { count: drive.unsaved })}</p>
       )}
-      <ProblemNote problem={remove.problem} />
-      <div className="row end">
-        <Button onClick={onClose}>{t('cancel')}</Button>
-        <Button
-          color="red"
-          variant="filled"
-          loading={remove.busy}
-          onClick={async () => {
-            const done = await remove.run(() =>
-              ask(
-                api.DELETE('/api/v1/drives/{drive_id}', {
-                  params: { path: { drive_id: drive.id } },
-                }),
-              ),
-            )
-            if (done) onClose()
-          }}
-        >
-          {t('connect.remove')}
-        </Button>
-      </div>
-    </Modal>
+    </ConfirmDelete>
   )
 }

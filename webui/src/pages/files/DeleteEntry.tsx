@@ -1,8 +1,7 @@
-import { Button, Modal } from '@mantine/core'
 import { api, ask } from '../../api/client'
 import type { LibraryEntry } from '../../api/schema'
 import { useT } from '../../i18n'
-import { ProblemNote } from '../../widgets/ProblemNote'
+import { ConfirmDelete } from '../../widgets/ConfirmDelete'
 import { useAction } from '../../widgets/useAction'
 
 /** Sets are put aside and can be taken back; a file of the station is gone for good. */
@@ -27,19 +26,15 @@ export function DeleteEntry({
     onDeleted()
   }
   return (
-    <Modal
-      opened
-      onClose={onClose}
+    <ConfirmDelete
       title={t(forGood ? 'library.delete' : 'library.putAside', { name: entry.name })}
+      action={t(forGood ? 'library.deleteNow' : 'library.putAsideNow')}
+      busy={act.busy}
+      problem={act.problem}
+      onClose={onClose}
+      onDelete={() => void remove()}
     >
       <p>{t(forGood ? 'library.deleteText' : 'library.putAsideText')}</p>
-      <ProblemNote problem={act.problem} />
-      <div className="row end">
-        <Button onClick={onClose}>{t('cancel')}</Button>
-        <Button color="red" variant="filled" loading={act.busy} onClick={() => void remove()}>
-          {t(forGood ? 'library.deleteNow' : 'library.putAsideNow')}
-        </Button>
-      </div>
-    </Modal>
+    </ConfirmDelete>
   )
 }

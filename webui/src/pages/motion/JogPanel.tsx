@@ -4,12 +4,12 @@ import { known, useT } from '../../i18n'
 import { useLink } from '../../live/store'
 import { quantity } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
-import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
-import { useRemembered } from './remembered'
-import { placeIn, startIn, type TravelUnit } from './travelUnit'
+import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
+import type { TravelUnit } from './travelUnit'
 import { type JogSettings, useJog } from './useJog'
+import { useMotionNumbers } from './useMotionNumbers'
 
 /** Hold to run: by mouse, finger or arrow key; whatever ends the hold stops the axis. */
 export function JogPanel({
@@ -24,28 +24,16 @@ export function JogPanel({
   const t = useT()
   const link = useLink()
   const { units } = unit
-  const [speed, setSpeed] = useRemembered(
-    drive,
-    placeIn(unit, 'jog.speed'),
-    startIn(unit, 'velocity', 60),
-  )
-  const [acceleration, setAcceleration] = useRemembered(
-    drive,
-    placeIn(unit, 'jog.acceleration'),
-    startIn(unit, 'acceleration', 600),
-  )
-  const [travel, setTravel] = useRemembered(
-    drive,
-    placeIn(unit, 'jog.travel'),
-    startIn(unit, 'position', 5),
-  )
-  const [torque, setTorque] = useRemembered(drive, 'jog.torque', 50)
+  const numbers = useMotionNumbers(drive, unit, 'jog', 5)
+  const [speed, acceleration] = [numbers.speed.value, numbers.acceleration.value]
+  const [travel, torque] = [numbers.travel.value, numbers.torque.value]
   const settings: JogSettings | null =
     speed !== null && acceleration !== null && travel !== null && torque !== null
       ? { speed, acceleration, travel_limit: travel, torque_limit: torque, unit: unit.name }
       : null
   const { direction, ended, hold, press } = useJog(drive, settings)
-  const taken = direction === null && state?.moving_job != null
+  const running = direction !== null
+  const taken = !running && state?.moving_job != null
   const ready = settings !== null && link.open && (state?.fresh ?? false) && !taken
   const pad = useRef<HTMLDivElement>(null)
   const keys: Record<string, -1 | 1> = { ArrowLeft: -1, ArrowRight: 1 }
@@ -66,39 +54,10 @@ export function JogPanel({
     <Panel title={t('jog.title')} className="jog-panel">
       <p className="dim">{t('jog.help')}</p>
       <div className="fields">
-        <NumberField
-          label={t('motion.speed')}
-          unit={units.velocity ?? ''}
-          value={speed}
-          onChange={setSpeed}
-          above={0}
-          disabled={direction !== null}
-        />
-        <NumberField
-          label={t('motion.acceleration')}
-          unit={units.acceleration ?? ''}
-          value={acceleration}
-          onChange={setAcceleration}
-          above={0}
-          disabled={direction !== null}
-        />
-        <NumberField
-          label={t('motion.travelLimit')}
-          unit={units.position ?? ''}
-          value={travel}
-          onChange={setTravel}
-          above={0}
-          disabled={direction !== null}
-        />
-        <NumberField
-          label={t('motion.torqueLimit')}
-          unit="%"
-          value={torque}
-          onChange={setTorque}
-          above={0}
-          max={400}
-          disabled={direction !== null}
-        />
+        <Speed units={units} {...numbers.speed} disabled={running} />
+        <Acceleration units={units} {...numbers.acceleration} disabled={running} />
+        <TravelLimit units={units} {...numbers.travel} disabled={running} />
+        <TorqueLimit {...numbers.torque} disabled={running} />
       </div>
       <div
         ref={pad}

@@ -10,7 +10,8 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
 import { useRemembered } from './remembered'
-import { placeIn, startIn, type TravelUnit } from './travelUnit'
+import type { TravelUnit } from './travelUnit'
+import { useMotionNumbers } from './useMotionNumbers'
 
 /** CiA 402 modes of operation that this panel commands. */
 const MODES = { PP: 1, PV: 3, PT: 4 } as const
@@ -33,22 +34,9 @@ export function MovePanel({
   const [target, setTarget] = useState<number | null>(null)
   const [relative, setRelative] = useState(true)
   const [consent, setConsent] = useState(false)
-  const [speed, setSpeed] = useRemembered(
-    drive.id,
-    placeIn(unit, 'move.speed'),
-    startIn(unit, 'velocity', 60),
-  )
-  const [acceleration, setAcceleration] = useRemembered(
-    drive.id,
-    placeIn(unit, 'move.acceleration'),
-    startIn(unit, 'acceleration', 600),
-  )
-  const [travel, setTravel] = useRemembered(
-    drive.id,
-    placeIn(unit, 'move.travel'),
-    startIn(unit, 'position', 10),
-  )
-  const [torque, setTorque] = useRemembered(drive.id, 'move.torque', 50)
+  const numbers = useMotionNumbers(drive.id, unit, 'move', 10)
+  const [speed, acceleration] = [numbers.speed.value, numbers.acceleration.value]
+  const [travel, torque] = [numbers.travel.value, numbers.torque.value]
   const [time, setTime] = useRemembered(drive.id, 'move.time', 10)
   const start = useAction()
   const key = `${drive.id} ${mode}`
@@ -117,13 +105,12 @@ export function MovePanel({
           <Speed
             units={units}
             label={t(mode === 'PT' ? 'move.speedLimit' : 'motion.speed')}
-            value={speed}
-            onChange={setSpeed}
+            {...numbers.speed}
           />
         )}
-        <Acceleration units={units} value={acceleration} onChange={setAcceleration} />
-        <TravelLimit units={units} value={travel} onChange={setTravel} />
-        <TorqueLimit value={torque} onChange={setTorque} />
+        <Acceleration units={units} {...numbers.acceleration} />
+        <TravelLimit units={units} {...numbers.travel} />
+        <TorqueLimit {...numbers.torque} />
         <NumberField
           label={t(mode === 'PP' ? 'move.timeout' : 'move.time')}
           unit="s"

@@ -10,7 +10,8 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
 import { useRemembered } from './remembered'
-import { placeIn, startIn, type TravelUnit } from './travelUnit'
+import type { TravelUnit } from './travelUnit'
+import { useMotionNumbers } from './useMotionNumbers'
 
 /** Back and forth between two absolute positions. */
 export function SequencePanel({
@@ -30,22 +31,9 @@ export function SequencePanel({
   const [second, setSecond] = useState<number | null>(null)
   const [dwell, setDwell] = useRemembered(drive, 'sequence.dwell', 0.5)
   const [count, setCount] = useRemembered(drive, 'sequence.count', 5)
-  const [speed, setSpeed] = useRemembered(
-    drive,
-    placeIn(unit, 'sequence.speed'),
-    startIn(unit, 'velocity', 60),
-  )
-  const [acceleration, setAcceleration] = useRemembered(
-    drive,
-    placeIn(unit, 'sequence.acceleration'),
-    startIn(unit, 'acceleration', 600),
-  )
-  const [travel, setTravel] = useRemembered(
-    drive,
-    placeIn(unit, 'sequence.travel'),
-    startIn(unit, 'position', 5),
-  )
-  const [torque, setTorque] = useRemembered(drive, 'sequence.torque', 50)
+  const numbers = useMotionNumbers(drive, unit, 'sequence', 5)
+  const [speed, acceleration] = [numbers.speed.value, numbers.acceleration.value]
+  const [travel, torque] = [numbers.travel.value, numbers.torque.value]
   const start = useAction()
   useEffect(() => {
     // Positions of another axis are never carried over.
@@ -115,8 +103,8 @@ export function SequencePanel({
             {t('sequence.here')}
           </Button>
         </div>
-        <Speed units={units} value={speed} onChange={setSpeed} />
-        <Acceleration units={units} value={acceleration} onChange={setAcceleration} />
+        <Speed units={units} {...numbers.speed} />
+        <Acceleration units={units} {...numbers.acceleration} />
         <NumberField
           label={t('sequence.dwell')}
           unit="s"
@@ -133,8 +121,8 @@ export function SequencePanel({
           max={100000}
           integer
         />
-        <TravelLimit units={units} value={travel} onChange={setTravel} />
-        <TorqueLimit value={torque} onChange={setTorque} />
+        <TravelLimit units={units} {...numbers.travel} />
+        <TorqueLimit {...numbers.torque} />
       </div>
       <Button
         variant="filled"

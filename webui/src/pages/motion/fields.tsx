@@ -1,14 +1,14 @@
 import { useT } from '../../i18n'
 import { NumberField } from '../../widgets/NumberField'
+import type { Typed } from './useMotionNumbers'
 
 /** Units of an axis by quantity, as its state tells them. */
 type Units = Record<string, string>
 
-interface Field {
+interface Field extends Typed {
   units: Units
-  value: number | null
-  onChange: (value: number | null) => void
   optional?: boolean
+  disabled?: boolean
 }
 
 /** How far the axis may go from where it stands. */

@@ -1,9 +1,9 @@
-import { Button } from '@mantine/core'
 import { api, ask } from '../../api/client'
 import type { AxisState, TransitionRequest } from '../../api/schema'
 import { known, useT } from '../../i18n'
 import { setState, useAxisState, useDrive } from '../../live/store'
 import { FaultList } from '../../widgets/FaultList'
+import { FaultResetButton, FaultResetProblem, useFaultReset } from '../../widgets/FaultReset'
 import { quantity } from '../../widgets/format'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -21,7 +21,7 @@ export function OverviewPage({ drive }: { drive: string }) {
   const state = useAxisState(drive)
   const summary = useDrive(drive)
   const change = useAction()
-  const reset = useAction()
+  const reset = useFaultReset(drive)
   const goTo = (goal: string) =>
     change.run(async () =>
       setState(
@@ -46,23 +46,8 @@ export function OverviewPage({ drive }: { drive: string }) {
       {state && state.faults.length > 0 && (
         <Panel title={t('faults.active')} className="fault-panel">
           <FaultList faults={state.faults} />
-          <Button
-            loading={reset.busy}
-            onClick={() =>
-              void reset.run(async () =>
-                setState(
-                  await ask(
-                    api.POST('/api/v1/drives/{drive_id}/fault-reset', {
-                      params: { path: { drive_id: drive } },
-                    }),
-                  ),
-                ),
-              )
-            }
-          >
-            {t('faults.reset')}
-          </Button>
-          <ProblemNote problem={reset.problem} onClose={reset.clear} />
+          <FaultResetButton reset={reset} />
+          <FaultResetProblem reset={reset} />
         </Panel>
       )}
       <div className="overview-columns">

@@ -1,8 +1,9 @@
-import { ActionIcon, Button, Modal } from '@mantine/core'
+import { ActionIcon, Button } from '@mantine/core'
 import { useState } from 'react'
 import { api, API_ROOT, ask } from '../../api/client'
 import type { JobInfo, RecordingInfo } from '../../api/schema'
 import { useT } from '../../i18n'
+import { ConfirmDelete } from '../../widgets/ConfirmDelete'
 import { dateTime, duration } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
 import { JobNote, useJobEnd } from '../../widgets/JobNote'
@@ -126,25 +127,17 @@ export function RecordingRow({
         </ActionIcon>
       )}
       {deleting && (
-        <Modal opened onClose={() => setDeleting(false)} title={t('recordings.delete', { name })}>
+        <ConfirmDelete
+          title={t('recordings.delete', { name })}
+          action={t('recordings.deleteNow')}
+          onClose={() => setDeleting(false)}
+          onDelete={() => {
+            setDeleting(false)
+            void act.run(() => ask(api.DELETE('/api/v1/recordings/{name}', path))).then(onChanged)
+          }}
+        >
           <p>{t('recordings.deleteText')}</p>
-          <div className="row end">
-            <Button onClick={() => setDeleting(false)}>{t('cancel')}</Button>
-            <Button
-              color="red"
-              variant="filled"
-              loading={act.busy}
-              onClick={() => {
-                setDeleting(false)
-                void act
-                  .run(() => ask(api.DELETE('/api/v1/recordings/{name}', path)))
-                  .then(onChanged)
-              }}
-            >
-              {t('recordings.deleteNow')}
-            </Button>
-          </div>
-        </Modal>
+        </ConfirmDelete>
       )}
     </article>
   )

@@ -1,8 +1,9 @@
-import { Button, FileButton, Modal } from '@mantine/core'
+import { Button, FileButton } from '@mantine/core'
 import { useState } from 'react'
 import { API_ROOT, api, ask } from '../../api/client'
 import type { MeasurementInfo, Problem } from '../../api/schema'
 import { known, useT } from '../../i18n'
+import { ConfirmDelete } from '../../widgets/ConfirmDelete'
 import { dateTime } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
@@ -116,22 +117,18 @@ export function MeasurementList({
       </ul>
       <ProblemNote problem={problem ?? act.problem} onClose={act.clear} />
       {doomed !== null && (
-        <Modal opened onClose={() => setDoomed(null)} title={t('measured.deleteTitle')}>
+        <ConfirmDelete
+          title={t('measured.deleteTitle')}
+          action={t('measured.deleteNow')}
+          onClose={() => setDoomed(null)}
+          onDelete={() => {
+            setDoomed(null)
+            void remove(doomed)
+          }}
+        >
           <p className="mono">{doomed}</p>
           <p>{t('measured.deleteText')}</p>
-          <div className="row end">
-            <Button onClick={() => setDoomed(null)}>{t('cancel')}</Button>
-            <Button
-              variant="filled"
-              onClick={() => {
-                setDoomed(null)
-                void remove(doomed)
-              }}
-            >
-              {t('measured.deleteNow')}
-            </Button>
-          </div>
-        </Modal>
+        </ConfirmDelete>
       )}
     </Panel>
   )

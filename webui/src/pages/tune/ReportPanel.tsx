@@ -1,8 +1,9 @@
-import { Button, Modal, NativeSelect, SegmentedControl, Textarea, TextInput } from '@mantine/core'
+import { Button, NativeSelect, SegmentedControl, Textarea, TextInput } from '@mantine/core'
 import { useCallback, useEffect, useState } from 'react'
 import { API_ROOT, api, ask, problemOf } from '../../api/client'
 import type { Problem, ReportInfo, ReportRequest } from '../../api/schema'
 import { useLanguage, useT } from '../../i18n'
+import { ConfirmDelete } from '../../widgets/ConfirmDelete'
 import { dateTime } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
@@ -130,21 +131,17 @@ export function ReportPanel({ drive, of }: { drive: string; of: ReturnType<typeo
         ))}
       </ul>
       {doomed !== null && (
-        <Modal opened onClose={() => setDoomed(null)} title={t('report.deleteTitle')}>
+        <ConfirmDelete
+          title={t('report.deleteTitle')}
+          action={t('measured.deleteNow')}
+          onClose={() => setDoomed(null)}
+          onDelete={() => {
+            setDoomed(null)
+            void drop(doomed)
+          }}
+        >
           <p className="mono">{doomed}</p>
-          <div className="row end">
-            <Button onClick={() => setDoomed(null)}>{t('cancel')}</Button>
-            <Button
-              variant="filled"
-              onClick={() => {
-                setDoomed(null)
-                void drop(doomed)
-              }}
-            >
-              {t('measured.deleteNow')}
-            </Button>
-          </div>
-        </Modal>
+        </ConfirmDelete>
       )}
     </Panel>
   )
