@@ -153,8 +153,8 @@ def cycle_figures(http: httpx.Client) -> dict[str, Any]:
     return details
 
 
-def open_scope(browser: Browser, url: str, drives: list[str], watch: str = "") -> Page:
-    """A Scope page with all channels; ``watch`` is a script that runs before the page's own."""
+def open_scope(page: Page, url: str, drives: list[str]) -> None:
+    """A Scope page with all channels."""
     setup = {
         "traces": [
             {"id": f"c{n}", "drive": drive, "key": key, "show": "axis", "factor": 1, "offset": 0,
@@ -163,15 +163,45 @@ def open_scope(browser: Browser, url: str, drives: list[str], watch: str = "") -
         ],
         "maths": [], "window_s": 5, "persistence": 0, "trigger": {"mode": "off"},
     }  # fmt: skip
-    page = browser.new_page(bypass_csp=bool(watch))
-    if watch:
-        page.add_init_script(watch)
     page.goto(url)
     page.evaluate("s => localStorage.setItem('servodeck.scope.setup', s)", json.dumps(setup))
     page.goto(f"{url}/#/scope")
     page.reload()
     page.locator('[data-trace="c16"]').wait_for(timeout=60_000)
-    return page
+
+
+class Chromium:
+    """A browser that runs by itself; it is only looked into while its `attached` is entered.
+
+    Whatever stays attached is told of every frame of its sockets, gigabytes in half an hour.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        program = shutil.which("chromium") or "/usr/bin/chromium"
+        self._told = folder / "DevToolsActivePort"
+        self._process = subprocess.Popen(
+            [program, *FLAGS, "--remote-debugging-port=0", f"--user-data-dir={folder}",
+             "about:blank"],
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+
+    @contextmanager
+    def attached(self) -> Iterator[Browser]:
+        """The browser, for as long as this is entered."""
+        deadline = time.monotonic() + 30
+        while not self._told.exists() or not (lines := self._told.read_text().splitlines()):
+            if time.monotonic() > deadline:
+                raise TimeoutError("Chromium did not start within 30 s")
+            time.sleep(0.05)
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.connect_over_cdp(f"http://127.0.0.1:{lines[0]}")
+            # Not closed: when the connection ends the pages of the first context stay open.
+            yield browser
+
+    def end(self) -> None:
+        """Close it."""
+        self._process.terminate()
+        self._process.wait(timeout=20)
 
 
 def processes(browser: Browser) -> list[dict[str, Any]]:
@@ -180,6 +210,11 @@ def processes(browser: Browser) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = session.send("SystemInfo.getProcessInfo")["processInfo"]
     session.detach()
     return found
+
+
+def scope_page(browser: Browser) -> Page:
+    """The page that `open_scope` left open."""
+    return next(page for page in browser.contexts[0].pages if page.url.endswith("#/scope"))
 
 
 def lost(page: Page) -> int:
@@ -212,38 +247,40 @@ def soak(http: httpx.Client, server: int, url: str, folder: Path) -> None:
     time.sleep(BASELINE_S)
     quiet = cycle_figures(http)
     channels = [{"drive": d, "key": k} for d in drives for k in KEYS]
-    program = shutil.which("chromium") or "/usr/bin/chromium"
-    with sync_playwright() as playwright:
-        browsers = [
-            playwright.chromium.launch(executable_path=program, args=FLAGS) for _ in range(2)
-        ]
-        pages = [open_scope(browser, url, drives) for browser in browsers]
-        sleeping = [int(p["id"]) for p in processes(browsers[1]) if p["type"] != "browser"]
-        http.post("/recordings", json={"name": "soak", "channels": channels}).raise_for_status()
-        poller = Poller(url)
-        poller.start()
-        began, used = time.monotonic(), cpu_s(server)
-        before = [sum(p["cpuTime"] for p in processes(b)) for b in browsers]
-        memory = []
-        stopped = False
-        while (now := time.monotonic() - began) < SECONDS:
-            asleep = SECONDS / 3 < now < 2 * SECONDS / 3
-            if asleep is not stopped:
-                for pid in sleeping:
-                    os.kill(pid, signal.SIGSTOP if asleep else signal.SIGCONT)
-                stopped = asleep
-            memory.append(memory_mib(server))
-            time.sleep(1)
-        took = time.monotonic() - began
-        after = [sum(p["cpuTime"] for p in processes(b)) for b in browsers]
-        server_cpu = cpu_s(server) - used
-        poller.stop.set()
-        poller.join()
-        pages[1].wait_for_timeout(6000)  # it connects again and draws
-        views = [lost(page) for page in pages]
-        info = http.post("/recordings/soak.sdrec/stop").raise_for_status().json()
-        for browser in browsers:
-            browser.close()
+    browsers = [Chromium(folder / f"browser{n}") for n in (1, 2)]
+    before, sleeping = [], []
+    for each in browsers:
+        with each.attached() as browser:
+            open_scope(browser.contexts[0].new_page(), url, drives)
+            found = processes(browser)
+        before.append(sum(p["cpuTime"] for p in found))
+        sleeping = [int(p["id"]) for p in found if p["type"] != "browser"]
+    http.post("/recordings", json={"name": "soak", "channels": channels}).raise_for_status()
+    poller = Poller(url)
+    poller.start()
+    began, used = time.monotonic(), cpu_s(server)
+    memory = []
+    stopped = False
+    while (now := time.monotonic() - began) < SECONDS:
+        asleep = SECONDS / 3 < now < 2 * SECONDS / 3
+        if asleep is not stopped:
+            for pid in sleeping:
+                os.kill(pid, signal.SIGSTOP if asleep else signal.SIGCONT)
+            stopped = asleep
+        memory.append(memory_mib(server))
+        time.sleep(1)
+    took = time.monotonic() - began
+    server_cpu = cpu_s(server) - used
+    poller.stop.set()
+    poller.join()
+    after, views = [], []
+    for each in browsers:
+        with each.attached() as browser:
+            after.append(sum(p["cpuTime"] for p in processes(browser)))
+            views.append(lost(scope_page(browser)))
+    info = http.post("/recordings/soak.sdrec/stop").raise_for_status().json()
+    for each in browsers:
+        each.end()
     busy = cycle_figures(http)
     samples, left_out, missing = disk_figures(folder / "state/recordings/soak.sdrec")
     rate = samples / AXES / took
