@@ -203,11 +203,11 @@ class Axis(PowerState):
             for role in ("torque_limit_positive", "torque_limit_negative", "max_torque")
             if (key := drive.key(role)) is not None
         ]
-        mode_keys = await self._restorable_mode()
+        mode_keys = await self.restorable_mode()
         async with self.restoring(*limits, *mode_keys) as earlier:
             shown = next((earlier[key] for key in mode_keys if key in earlier), None)
             previous = Mode(int(shown)) if shown in set(Mode) else mode
-            await self._limit_torque(limits, envelope.torque_percent)
+            await self.limit_torque(limits, envelope.torque_percent)
             # A stale set-point must not start to move the axis: neither at the change of mode,
             # where it is enabled already, nor when it is enabled.
             await self.aim_here(mode)
@@ -228,7 +228,7 @@ class Axis(PowerState):
             self.owes_stop = True
             raise
 
-    async def _restorable_mode(self) -> list[str]:
+    async def restorable_mode(self) -> list[str]:
         """The mode's key, unless the drive shows one that cannot be written (none, at power-on)."""
         key = self.drive.key("mode")
         if key is None:
@@ -239,7 +239,8 @@ class Axis(PowerState):
             return []
         return [key]
 
-    async def _limit_torque(self, limits: list[str], percent: float) -> None:
+    async def limit_torque(self, limits: list[str], percent: float) -> None:
+        """Lower these limits of the drive to ``percent`` of rated torque; none is raised."""
         units = await self.units()
         for key in limits:
             parameter = self.drive.parameter(key)

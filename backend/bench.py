@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import re
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -169,8 +169,17 @@ class Bench:
 
     # --- cyclic exchange --------------------------------------------------------------
 
-    async def start_cyclic(self, url: str, cycle_s: float) -> CyclicSession:
+    async def start_cyclic(
+        self,
+        url: str,
+        cycle_s: float,
+        *,
+        by_speed: Collection[str] = (),
+        in_job_of: str | None = None,
+    ) -> CyclicSession:
         """Exchange process data with all drives of a bus.
+
+        ``by_speed`` as in `CyclicSession`. ``in_job_of`` is the drive whose own job asks for it.
 
         Raises:
             NotAllowed: no drives, no cyclic data on this bus, or a drive refuses.
@@ -181,14 +190,15 @@ class Bench:
         if not users:
             raise NotAllowed(f"{url} has no connected drives", remedy="connect a drive first")
         for member in users:
-            self.require_idle(member)
+            if member.drive.id != in_job_of:
+                self.require_idle(member)
         if url in self._changing:
             raise Busy(f"{url}: the cyclic exchange is just being changed", remedy="wait for it")
         if (old := self.sessions.get(url)) is not None:
             if old.running:
                 raise Busy(f"{url}: the cyclic exchange runs already", remedy="end it first")
             await self.stop_cyclic(url)
-        session = CyclicSession(link, [m.drive for m in users])
+        session = CyclicSession(link, [m.drive for m in users], by_speed)
         self._changing.add(url)
         try:
             await session.start(cycle_s)

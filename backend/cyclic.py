@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from drivers.link import (
     OwnsPowerState,
     RecoversByItself,
     ScopeBlock,
+    TakesSpeeds,
     Unsubscribe,
 )
 
@@ -29,6 +30,8 @@ OUTPUT_ROLES = (
     "control_word", "mode", "position_target", "velocity_target", "torque_target",
     "position_offset", "velocity_offset", "torque_offset",
 )  # fmt: skip
+#: For a drive that is commanded by its profile velocity.
+_SPEED_ROLES = ("control_word", "velocity_target")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +45,13 @@ class CyclicState:
 
 
 class CyclicSession:
-    """The running exchange of one bus, between `start` and `stop`."""
+    """The running exchange of one bus, between `start` and `stop`.
 
-    def __init__(self, link: Link, drives: Sequence[Drive]) -> None:
+    The drives with the identifiers ``by_speed`` have no cyclic mode and are given speeds in
+    Profile velocity; without that such drives keep taking their commands one by one.
+    """
+
+    def __init__(self, link: Link, drives: Sequence[Drive], by_speed: Collection[str] = ()) -> None:
         if link.cyclic is None:
             raise NotAllowed(
                 f"{link.url} has no cyclic process data", remedy="use an EtherCAT or CANopen bus"
@@ -52,6 +59,7 @@ class CyclicSession:
         self.link = link
         self.cyclic: Cyclic = link.cyclic
         self.drives = tuple(drives)
+        self.by_speed = frozenset(by_speed)
         self.state: CyclicState | None = None
 
     async def start(self, cycle_s: float) -> CyclicState:
@@ -68,8 +76,12 @@ class CyclicSession:
             port = self._port(drive)
             if isinstance(self.link, KnowsFamilies):
                 self.link.know(port.station, drive.profile)
+            by_speed = drive.id in self.by_speed
+            if isinstance(self.cyclic, TakesSpeeds):
+                self.cyclic.take_speeds(port.station, by_speed)
+            roles = _SPEED_ROLES if by_speed else OUTPUT_ROLES
             inputs += _signals(drive, port, INPUT_ROLES, ("tx", "rxtx"))
-            outputs += _signals(drive, port, OUTPUT_ROLES, ("rx", "rxtx"))
+            outputs += _signals(drive, port, roles, ("rx", "rxtx"))
         outputs = _fitting_outputs(self.drives, outputs)
         mapped = await self.cyclic.configure(inputs, outputs, cycle_s)
         await self.cyclic.start()
@@ -103,6 +115,18 @@ class CyclicSession:
     def power(self) -> OwnsPowerState | None:
         """The loop, where it owns the control words."""
         return self.cyclic if isinstance(self.cyclic, OwnsPowerState) else None
+
+    def unwatched(self, drive: Drive) -> bool:
+        """Whether nothing in the drive ends a speed or torque when this computer falls silent."""
+        port = self._port(drive)
+        if port.spec is None or not port.spec.watchdog.present:
+            return True
+        return isinstance(self.cyclic, TakesSpeeds) and port.station in self.cyclic.unguarded
+
+    @property
+    def synchronous(self) -> bool:
+        """Whether set-points take effect, and samples are taken, at the same instant each cycle."""
+        return self.state is not None and (bool(self.state.dc) or self.link.kind == "canopen")
 
     def _port(self, drive: Drive) -> Port:
         return next(port for port in drive.ports if port.link is self.link)

@@ -12,6 +12,7 @@ from backend.faults import active_faults, fault_keys
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.codec import encode
+from drivers.dialect import dialect_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError
 from drivers.link import OwnsPowerState
 from profiles.schema import Fault
@@ -28,6 +29,8 @@ class PowerState:
         self.drive = drive
         pause = drive.profile.quirk("enable_pause")
         self._enable_pause_s = ((pause.milliseconds if pause else None) or 0.0) / 1000.0
+        #: What stops this family: only this word is printed in its manual.
+        self._stop_word = dialect_of(drive.profile).quick_stop
         #: The last control word written, for edges.
         self.control_word = 0
         #: The running cyclic exchange of the axis' bus, which then writes the control word.
@@ -64,6 +67,8 @@ class PowerState:
                 drive=self.drive.name,
                 remedy="end the cyclic exchange, or use a cyclic mode",
             )
+        if word == cia402.QUICK_STOP:
+            word = self._stop_word
         enables = word & cia402.ENABLE_OPERATION == cia402.ENABLE_OPERATION
         if self.stopped and enables:
             raise NotAllowed(
@@ -262,7 +267,7 @@ class PowerState:
         except (LinkLost, LinkTimeout, ProtocolError):
             parameter = drive.parameter(key)
             first = drive.port_for(parameter)
-            data = encode(parameter.type, cia402.QUICK_STOP)
+            data = encode(parameter.type, self._stop_word)
             for port in drive.ports:
                 if port is first or not port.carries(parameter):
                     continue

@@ -6,6 +6,7 @@ word that echoes the control word.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 
@@ -110,6 +111,25 @@ def decode_state(status_word: int, *, echoes_control: bool = False) -> State:
         if status_word & mask == value:
             return state
     return State.UNKNOWN
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """How a family takes commands with its process data, where CiA 402-2 has it otherwise.
+
+    ``echoes_control`` as in `decode_state`; ``quick_stop`` is the control word that stops it; at
+    least ``pause_s`` lies between two steps towards Operation enabled; ``speed_mode`` is the mode
+    that takes a speed with every cycle (Profile velocity where there is no CSV).
+    """
+
+    echoes_control: bool = False
+    quick_stop: int = QUICK_STOP
+    pause_s: float = 0.0
+    speed_mode: Mode = Mode.CSV
+
+    def mode(self, mode: int) -> int:
+        """The mode that does the work of ``mode`` on this drive."""
+        return int(self.speed_mode) if mode == Mode.CSV else mode
 
 
 def stops(control_word: int) -> bool:

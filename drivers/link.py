@@ -241,6 +241,20 @@ class RecoversByItself(Protocol):
 
 
 @runtime_checkable
+class TakesSpeeds(Protocol):
+    """An exchange that can give speeds with every cycle to a drive that has no cyclic mode."""
+
+    unguarded: frozenset[int]
+    """Stations commanded by the exchange whose drive would not notice that it ended."""
+
+    def take_speeds(self, station: int, by_profile_velocity: bool) -> None:
+        """Command ``station`` in Profile velocity from the next `configure` on, or not any more.
+
+        Where speeds of the mode CSV are asked for, the mode is then Profile velocity.
+        """
+
+
+@runtime_checkable
 class OwnsPowerState(Protocol):
     """A cyclic exchange whose loop writes the control word, so that nobody else may."""
 

@@ -335,7 +335,8 @@ class Signal(Frozen):
         "profile_velocity", "profile_acceleration", "profile_deceleration",
         "quick_stop_deceleration", "max_speed", "homing_method", "home_offset",
         "homing_speed_switch", "homing_speed_zero", "homing_acceleration",
-        "software_limit_min", "software_limit_max", "following_error_window",
+        "software_limit_min", "software_limit_max", "software_limits_on",
+        "following_error_window",
         "following_error_time", "supported_modes", "motor_inertia", "load_inertia",
         "torque_constant",
     ]  # fmt: skip
@@ -444,6 +445,7 @@ class Quirk(Frozen):
         "error_code_low_byte", "warning_bit_7", "home_found_bit_15", "save_readback_ambiguous",
         "sdo_pause_on_save", "gear_on_init", "brake_by_pdo", "unit_switch", "write_protect",
         "partial_manual", "types_unreliable", "no_watchdog", "positive_limit_first",
+        "quick_stop_word",
     ]  # fmt: skip
     key: str | None = None
     raw: int | None = None

@@ -11,7 +11,7 @@ import array
 import asyncio
 import math
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -23,9 +23,9 @@ from drivers.canopen.frames import Frame
 from drivers.canopen.images import CONTROL_WORD, Images
 from drivers.canopen.pdo import PdoPlan, plan_within_load
 from drivers.canopen.port import CanPort
-from drivers.canopen.synchronous import SyncLoop
+from drivers.canopen.synchronous import LoopClock, SyncLoop
 from drivers.canopen.url import CanUrl
-from drivers.cia402 import State
+from drivers.cia402 import Dialect, Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.ethercat.playback import AxisLoop, Limits, Motion
 from drivers.link import CyclicSignal, LinkEvent, ScopeBlock, Trajectory, Unsubscribe
@@ -55,6 +55,7 @@ class CanopenCyclic:
         read: ReadObject,
         write: WriteObject,
         in_worker: InWorker,
+        clock: LoopClock | None = None,
     ) -> None:
         self.load: BusLoad | None = None
         self.left_over: tuple[tuple[CyclicSignal, str], ...] = ()
@@ -69,6 +70,8 @@ class CanopenCyclic:
         self._in_worker = in_worker
         self._configured: _Configured | None = None
         self._without_cyclic_modes: set[int] = set()
+        self._dialects: dict[int, Dialect] = {}
+        self._clock = clock
         self._loop: SyncLoop | None = None
         self._consumers: list[Callable[[ScopeBlock], None]] = []
         self._tell: Callable[[LinkEvent], None] = lambda _event: None
@@ -83,6 +86,23 @@ class CanopenCyclic:
             self._without_cyclic_modes.discard(station)
         else:
             self._without_cyclic_modes.add(station)
+
+    def speak(self, station: int, dialect: Dialect) -> None:
+        """How the drive takes its commands; by SDO all the same where it has no cyclic mode."""
+        self._dialects[station] = dialect
+
+    def take_speeds(self, station: int, by_profile_velocity: bool) -> None:
+        """See `drivers.link.TakesSpeeds`."""
+        mode = Mode.PV if by_profile_velocity else Mode.CSV
+        self._dialects[station] = replace(self._dialect(station), speed_mode=mode)
+
+    def _dialect(self, station: int) -> Dialect:
+        return self._dialects.get(station, Dialect())
+
+    def _by_sdo(self, station: int) -> bool:
+        """Whether the commands of this drive stay out of the process data."""
+        by_speed = self._dialect(station).speed_mode is Mode.PV
+        return station in self._without_cyclic_modes and not by_speed
 
     async def configure(
         self, inputs: Sequence[CyclicSignal], outputs: Sequence[CyclicSignal], cycle_s: float
@@ -104,8 +124,8 @@ class CanopenCyclic:
                 limit="1 ms",
                 remedy="use 1 ms or longer",
             )
-        by_sdo = [s for s in outputs if s.station in self._without_cyclic_modes]
-        cyclic = [s for s in outputs if s.station not in self._without_cyclic_modes]
+        by_sdo = [s for s in outputs if self._by_sdo(s.station)]
+        cyclic = [s for s in outputs if not self._by_sdo(s.station)]
         planned = plan_within_load(inputs, cyclic, cycle_s, self._settings.bitrate)
         why = "the drive has no cyclic mode: it is commanded by SDO"
         self.left_over = (*planned.left_over, *((s, why) for s in by_sdo))
@@ -129,7 +149,7 @@ class CanopenCyclic:
         if self._loop is not None:
             return
         event_loop = asyncio.get_running_loop()
-        images = Images(configured.pdos, configured.cycle_s, self._report)
+        images = Images(configured.pdos, configured.cycle_s, self._report, self._dialects)
         try:
             await self._in_worker(partial(self._prepare, configured, images))
         except BaseException:
@@ -146,6 +166,7 @@ class CanopenCyclic:
             deliver=deliver,
             tell=self._tell,
             own_id=self._settings.own_id,
+            clock=self._clock,
         )
         self._loop.start()
         await self._in_worker(partial(self._nmt, frames.NMT_START, images.stations))
@@ -238,7 +259,7 @@ class CanopenCyclic:
         loop = self._require_running()
         self._require_axis(station)
         if mode is not None and (station, _MODE, 0) not in loop.images.outputs:
-            data = mode.to_bytes(1, "little", signed=True)
+            data = self._dialect(station).mode(mode).to_bytes(1, "little", signed=True)
             await self._in_worker(partial(self._write, station, _MODE, 0, data))
         loop.axis(station, lambda axis: axis.drive_to(goal, mode))
 
@@ -330,6 +351,7 @@ class CanopenCyclic:
         self._setup.map_pdos(configured.pdos)
         unguarded = set()
         for station in sorted({station for station, _, _ in images.outputs}):
+            self._setup.interpolate(station, configured.cycle_s)
             if not self._setup.guard(station):
                 unguarded.add(station)
                 self._tell(

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from drivers.canopen.pdo import INVALID, PdoPlan, SdoWrite, set_up
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
+from drivers.ethercat.setup import interpolation_period
 
 WATCHDOG_MS = 200
 _PDO_FLAGS = 0x60000000
@@ -49,6 +50,15 @@ class DriveSetup:
             return False
         return self._read(station, 0x1016, 1) == value
 
+    def interpolate(self, station: int, cycle_s: float) -> None:
+        """Tell a drive that interpolates between set-points how far apart they come (60C2h)."""
+        try:
+            value, exponent = interpolation_period(round(cycle_s * 1e9))
+            self._change(station, SdoWrite(0x60C2, 1, bytes([value])))
+            self._change(station, SdoWrite(0x60C2, 2, exponent.to_bytes(1, "little", signed=True)))
+        except (Rejected, NotAllowed):
+            return  # it does not interpolate, or not over this time: then it keeps its own
+
     def unguard(self) -> None:
         """Undo `guard`: before the heartbeat ends, or the drives would report a fault."""
         mine = [(s, w) for s, w in self._undo if w.index == 0x1016]
@@ -67,7 +77,11 @@ class DriveSetup:
     def _change(self, station: int, write: SdoWrite) -> None:
         before = self._read(station, write.index, write.subindex)
         self._undo.append((station, SdoWrite(write.index, write.subindex, before)))
-        self._write(station, write.index, write.subindex, write.data)
+        try:
+            self._write(station, write.index, write.subindex, write.data)
+        except Rejected:
+            self._undo.pop()  # it is as it was
+            raise
 
     def _silence(self, station: int, communication: int) -> None:
         try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from drivers import cia402
@@ -21,7 +21,7 @@ _RATES = (0x60FF, 0x6071, 0x60B1, 0x60B2)
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """One signal: its PDO, where it starts there, and its column among the inputs."""
+    """One signal: its PDO, where it starts there, and its column among inputs or outputs."""
 
     cob_id: int
     start: int
@@ -38,9 +38,14 @@ class Images:
     """Inputs of the last cycle and outputs of the next. One thread at a time."""
 
     def __init__(
-        self, pdos: Sequence[PdoPlan], cycle_s: float, report: Callable[[int, str], None]
+        self,
+        pdos: Sequence[PdoPlan],
+        cycle_s: float,
+        report: Callable[[int, str], None],
+        dialects: Mapping[int, cia402.Dialect] | None = None,
     ) -> None:
         self.channels: tuple[str, ...] = ()
+        """Names of the inputs, and after them of the outputs."""
         self.inputs: dict[Key, Slot] = {}
         self.outputs: dict[Key, Slot] = {}
         self.frames: dict[int, bytearray] = {}
@@ -52,30 +57,30 @@ class Images:
         self.values: list[int | float] = []
         self._cycle_s = cycle_s
         self._report = report
+        self._dialects = dialects or {}
         self._place(pdos)
         for station in self.stations:
             if (station, CONTROL_WORD, 0) in self.outputs:
                 self.axes[station] = self._axis(station)
 
     def _place(self, pdos: Sequence[PdoPlan]) -> None:
-        names: list[str] = []
+        taken: list[str] = []
+        given: list[str] = []
         for pdo in pdos:
             start = 0
+            names, slots = (taken, self.inputs) if pdo.direction == "tx" else (given, self.outputs)
             for signal in pdo.signals:
                 slot = Slot(pdo.cob_id, start, signal.address.type, len(names))
                 key = (signal.station, signal.address.index or 0, signal.address.subindex)
-                if pdo.direction == "tx":
-                    self.inputs[key] = slot
-                    names.append(signal.channel)
-                else:
-                    self.outputs[key] = slot
+                slots[key] = slot
+                names.append(signal.channel)
                 start += slot.size
             if pdo.direction == "tx":
                 self.lengths[pdo.cob_id] = start
             else:
                 self.frames[pdo.cob_id] = bytearray(start)
-        self.channels = tuple(names)
-        self.values = [0] * len(names)
+        self.channels = (*taken, *given)
+        self.values = [0] * len(taken)
 
     def _axis(self, station: int) -> AxisLoop:
         objects = self._objects(station)
@@ -91,6 +96,7 @@ class Images:
             output_count=len(objects),
             cycle_s=self._cycle_s,
             report=self._report,
+            dialect=self._dialects.get(station, cia402.Dialect()),
         )
 
     def _objects(self, station: int) -> list[int]:
@@ -109,6 +115,15 @@ class Images:
         if axis is not None and key[2] == 0 and slot.type in INTEGER_RANGE:
             value = decode(slot.type, data)
             axis.outputs[self._objects(key[0]).index(key[1])] = int(value)
+
+    def sent(self) -> list[int | float]:
+        """What the output PDOs say now, in the order of the outputs' names."""
+        values: list[int | float] = [0] * len(self.outputs)
+        for slot in self.outputs.values():
+            frame = self.frames[slot.cob_id]
+            value = decode(slot.type, bytes(frame[slot.start : slot.start + slot.size]))
+            values[slot.column] = value if not isinstance(value, str) else 0
+        return values
 
     def take(self, arrived: dict[int, bytes]) -> set[int]:
         """Take over the input PDOs of one cycle; returns the stations that are complete."""

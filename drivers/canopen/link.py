@@ -23,8 +23,10 @@ from drivers.canopen.frames import HEARTBEAT, NMT, SDO_ANSWER, SDO_REQUEST, Fram
 from drivers.canopen.nodes import NodeWatch
 from drivers.canopen.port import CanPort
 from drivers.canopen.scanning import identify, probe
+from drivers.canopen.synchronous import LoopClock
 from drivers.canopen.url import CanUrl, parse_canopen_url
 from drivers.codec import size_of
+from drivers.dialect import dialect_of
 from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.link import (
     Address,
@@ -57,6 +59,7 @@ class CanopenLink:
         self,
         url: str | CanUrl,
         opener: Callable[[CanUrl], can.BusABC] = open_bus,
+        clock: LoopClock | None = None,
     ) -> None:
         self._settings = parse_canopen_url(url) if isinstance(url, str) else url
         self.url = self._settings.url
@@ -75,7 +78,7 @@ class CanopenLink:
         self._used: set[int] = set()
         self._strays_told = dict.fromkeys(range(1, 128), 0)
         self._cyclic = CanopenCyclic(
-            self._port, self._settings, self._sdo_read, self._sdo_write, self._in_worker
+            self._port, self._settings, self._sdo_read, self._sdo_write, self._in_worker, clock
         )
         self._cyclic.tell_events_to(self._announce)
         self.cyclic: Cyclic | None = self._cyclic
@@ -109,6 +112,7 @@ class CanopenLink:
     def configure_station(self, station: int, profile: Profile) -> None:
         """Learn which family answers at ``station`` (`drivers.link.NeedsProfile`)."""
         self._cyclic.set_modes(station, profile.supported_modes)
+        self._cyclic.speak(station, dialect_of(profile))
 
     async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
         """Ask every node number for its device type, then who answers for its identity.

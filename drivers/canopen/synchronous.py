@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,28 @@ _OPERATIONAL = b"\x05"
 _BRAKE_WHEN_SILENT_S = 0.05
 _GIVE_UP_WHEN_SILENT_S = 0.3
 _LATENESS_KEPT = 4096
+
+
+class LoopClock(Protocol):
+    """What the loop takes time from; a test may let it pass as it likes."""
+
+    def now_s(self) -> float:
+        """Seconds since any point."""
+
+    def wait_until(self, due_s: float) -> None:
+        """Return at ``due_s``, or at once when that is over."""
+
+
+class ComputerClock:
+    """The computer's monotonic clock."""
+
+    def now_s(self) -> float:
+        """See `LoopClock`."""
+        return time.monotonic()
+
+    def wait_until(self, due_s: float) -> None:
+        """See `LoopClock`."""
+        time.sleep(max(due_s - time.monotonic(), 0.0))
 
 
 @dataclass(slots=True)
@@ -57,8 +80,10 @@ class SyncLoop:
         deliver: Callable[[ScopeBlock], None],
         tell: Callable[[LinkEvent], None],
         own_id: int,
+        clock: LoopClock | None = None,
     ) -> None:
         self.images = images
+        self._clock = clock or ComputerClock()
         self.cycle_s = cycle_s
         self._send = send
         self._deliver = deliver
@@ -70,6 +95,7 @@ class SyncLoop:
         self._sent_cycle = -1
         self._arrived: dict[int, bytes] = {}
         self._silent_s = dict.fromkeys(images.stations, 0.0)
+        self._sent: list[int | float] = []
         self._rows: list[list[int | float]] = []
         self._row_valid: list[bool] = []
         self._block_start_s = 0.0
@@ -188,12 +214,12 @@ class SyncLoop:
             }
 
     def _run(self) -> None:
-        due_s = time.monotonic() + self.cycle_s
+        due_s = self._clock.now_s() + self.cycle_s
         heartbeat_due_s = 0.0
         self._block_start_s = due_s
         while True:
-            time.sleep(max(due_s - time.monotonic(), 0.0))
-            now_s = time.monotonic()
+            self._clock.wait_until(due_s)
+            now_s = self._clock.now_s()
             with self._lock:
                 if self._stopping:
                     self._flush()
@@ -201,6 +227,7 @@ class SyncLoop:
                 if self._cycle > 0:
                     self._close_sample()
                 outgoing = [Frame(c, bytes(image)) for c, image in self.images.frames.items()]
+                self._sent = self.images.sent()
             if now_s >= heartbeat_due_s:
                 heartbeat_due_s = now_s + _HEARTBEAT_S
                 outgoing.append(self._heartbeat)
@@ -212,7 +239,7 @@ class SyncLoop:
                 self._cycle += 1
                 self._lock.notify_all()
             due_s += self.cycle_s
-            missed = int(max(time.monotonic() - due_s, 0.0) / self.cycle_s)
+            missed = int(max(self._clock.now_s() - due_s, 0.0) / self.cycle_s)
             if missed:
                 self._skip(missed)
                 due_s += missed * self.cycle_s
@@ -246,7 +273,8 @@ class SyncLoop:
         complete = self.images.take(arrived)
         valid = len(arrived) == len(self.images.lengths)
         self._statistics.incomplete += not valid
-        self._rows.append(list(self.images.values))
+        # Beside what SYNC called for stands what went out in the same cycle, for the next SYNC.
+        self._rows.append([*self.images.values, *self._sent])
         self._row_valid.append(valid)
         for station, axis in self.images.axes.items():
             if station in complete:

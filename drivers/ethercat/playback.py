@@ -31,6 +31,7 @@ _MODE_OF = {_POSITION: cia402.Mode.CSP, _VELOCITY: cia402.Mode.CSV, _TORQUE: cia
 _RESTLESS = 2
 """Increments per cycle that encoder noise may make of an axis at rest."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
+_STANDARD = cia402.Dialect()
 
 
 class Phase(Enum):
@@ -79,6 +80,7 @@ class AxisLoop:
         output_count: int,
         cycle_s: float,
         report: Callable[[int, str], None],
+        dialect: cia402.Dialect = _STANDARD,
     ) -> None:
         self.station = station
         self.outputs: list[int] = [0] * output_count
@@ -90,6 +92,9 @@ class AxisLoop:
         self._in = inputs
         self._out = outputs
         self._report = report
+        self._dialect = dialect
+        self._pause_cycles = round(dialect.pause_s / cycle_s)
+        self._pause_left = 0
         self._stop_cycles = max(round(STOP_S / cycle_s), 1)
         self._mode: int | None = None
         self._motion: Motion | None = None
@@ -134,7 +139,7 @@ class AxisLoop:
         if mode is not None and self.phase is not Phase.IDLE:
             raise NotAllowed(f"station {self.station} moves: its mode cannot be changed now")
         if mode is not None and _MODE in self._out:
-            self.outputs[self._out[_MODE]] = mode
+            self.outputs[self._out[_MODE]] = self._dialect.mode(mode)
         if (
             goal is not State.OPERATION_ENABLED
             and goal is not State.QUICK_STOP_ACTIVE
@@ -205,7 +210,9 @@ class AxisLoop:
             self._mode = values[place]
         place = self._in.get(_STATUS)
         if place is not None:
-            self.state = cia402.decode_state(values[place])
+            self.state = cia402.decode_state(
+                values[place], echoes_control=self._dialect.echoes_control
+            )
         place = self._in.get(_ACTUAL_POSITION)
         if place is not None:
             position = values[place]
@@ -232,7 +239,7 @@ class AxisLoop:
         elif self.goal not in (None, State.OPERATION_ENABLED) and _CONTROL in self._out:
             word = self.outputs[self._out[_CONTROL]]
             if word & cia402.ENABLE_OPERATION == cia402.ENABLE_OPERATION:
-                self.outputs[self._out[_CONTROL]] = cia402.QUICK_STOP
+                self.outputs[self._out[_CONTROL]] = self._dialect.quick_stop
 
     def _fell_out(self) -> None:
         if self.goal is State.OPERATION_ENABLED:
@@ -343,7 +350,14 @@ class AxisLoop:
         if self.goal is State.QUICK_STOP_ACTIVE and self.state not in _ALIVE_STATES:
             self.goal = self._after_quick_stop
         word = cia402.next_control_word(self.state, self.goal, self.outputs[place])
+        if word == cia402.QUICK_STOP:
+            word = self._dialect.quick_stop
+        self._pause_left = max(self._pause_left - 1, 0)
         if word is not None:
+            if word != self.outputs[place] and not cia402.stops(word):
+                if self._pause_left:
+                    return
+                self._pause_left = self._pause_cycles
             self.outputs[place] = word
         elif self.state is self.goal:
             self._reset = False
@@ -369,7 +383,7 @@ class AxisLoop:
                 f"{where} is in {self.state.value!r}, a motion needs 'Operation enabled'",
                 remedy=self.halted or "enable the axis first",
             )
-        wanted = _MODE_OF[motion.target]
+        wanted = cia402.Mode(self._dialect.mode(_MODE_OF[motion.target]))
         if self._mode is not None and self._mode != wanted:
             raise NotAllowed(
                 f"{where} is in mode {self._mode}, this setpoint needs mode {int(wanted)}"

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 RPM = math.pi / 30
 """rad/s per rpm."""
+_NO_TIME_MS = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +35,12 @@ class Units:
     ramp_reference_rad_s: float = 0.0
 
     def ramp(self, raw: float) -> float:
-        """Magnitude of an acceleration [rad/s²]; zero counts as the smallest step above it."""
+        """Magnitude of an acceleration [rad/s²]; zero counts as the smallest step above it.
+
+        A time of zero is no ramp (003:318 lets it be set).
+        """
         if self.ramps_are_times_ms:
-            return self.ramp_reference_rad_s / max(raw, 1.0) * 1000.0
+            return self.ramp_reference_rad_s / (raw or _NO_TIME_MS) * 1000.0
         return max(raw, 1.0) / abs(self.acceleration_per_rad_s2)
 
 

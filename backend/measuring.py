@@ -1,0 +1,81 @@
+"""The exchange of process data that a measurement needs: the one that runs, or one of its own."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass
+
+from backend.bench import Bench, Member
+from backend.cyclic import CyclicSession
+from backend.drive import Port
+from backend.tools import profile_speed
+from drivers.errors import DriveError
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """A running exchange, and what to do with it afterwards."""
+
+    session: CyclicSession
+    bench: Bench
+    drive: str
+    url: str
+    own: bool
+    """It was started for this measurement."""
+    before_s: float | None = None
+    """Cycle of the exchange that had to give way to it."""
+
+    async def end(self) -> None:
+        """Leave the bus as it was. A drive that does not let itself be set up again is told of."""
+        if not self.own:
+            return
+        with contextlib.suppress(DriveError):
+            await self.bench.stop_cyclic(self.url)
+        if self.before_s is None:
+            return
+        try:
+            await self.bench.start_cyclic(self.url, self.before_s, in_job_of=self.drive)
+        except DriveError as error:
+            self.bench.journal.add(
+                f"{self.url}: the cyclic exchange was not started again: {error.message}",
+                level="warning", drive=self.drive,
+            )  # fmt: skip
+
+
+def port_of(member: Member) -> Port:
+    """The port with process data, else the first."""
+    ports = member.drive.ports
+    return next((port for port in ports if port.link.cyclic is not None), ports[0])
+
+
+async def exchange_for(bench: Bench, member: Member, cycle_s: float) -> Exchange:
+    """The running exchange if it suits, else one that is started for the measurement.
+
+    A drive without cyclic modes is commanded by its profile velocity during the measurement only,
+    so an exchange that runs gives way meanwhile.
+
+    Raises:
+        Busy: a drive of the bus is moved.
+        NotAllowed: no cyclic data on this bus, or a drive refuses.
+    """
+    port = port_of(member)
+    drive, url = member.drive.id, bench.url_of(port)
+    by_speed = {drive} if profile_speed.needed(member.drive, port.link) else set[str]()
+    running = bench.sessions.get(url)
+    before_s = None
+    if running is not None and running.running:
+        if by_speed <= running.by_speed:
+            return Exchange(running, bench, drive, url, own=False)
+        for other in bench.members.values():
+            if other.drive in running.drives:
+                bench.require_idle(other)
+        before_s = running.state.cycle_s if running.state is not None else None
+        await bench.stop_cyclic(url)
+    try:
+        session = await bench.start_cyclic(url, cycle_s, by_speed=by_speed)
+    except DriveError:
+        if before_s is not None:
+            with contextlib.suppress(DriveError):
+                await bench.start_cyclic(url, before_s)
+        raise
+    return Exchange(session, bench, drive, url, own=True, before_s=before_s)

@@ -1,0 +1,188 @@
+"""Speeds with every SYNC for a drive that has no cyclic mode, and what must hold before that.
+
+Such a drive takes its speeds in Profile velocity. For a measurement its ramps are put out of the
+way, so that each set-point takes effect with its SYNC; they come back on every exit. Nothing in
+the drive ends the last speed when this computer falls silent (DS_C documents no watchdog): so the
+drive's own travel limits must be active and a person must agree, for every measurement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import numpy as np
+
+from backend.axis import Axis, Envelope
+from backend.cyclic import CyclicSession
+from backend.drive import Drive
+from backend.io_functions import read_terminals
+from backend.tools.recording import Play, bus_limits, cycle_s, enabled, play, quiet
+from drivers.cia402 import Mode, State
+from drivers.errors import LinkTimeout, NotAllowed
+from drivers.link import Link, TakesSpeeds
+
+CONSENT = (
+    "the drive has no watchdog that ends a speed when this computer falls silent: if the cable is "
+    "pulled or the program dies during the measurement, the axis goes on with its last speed "
+    "until its own travel limit or its emergency stop"
+)
+#: Ramps that are times may be 0 (003:318); others become as steep as this.
+_RAMP_MS = 0
+_RAMP_RPM_S = 1e6
+#: While the sign of a speed is tried: from 0 to the highest speed in this time, at this speed.
+_SLOW_RPM_S = 1500.0
+_TRIED_RPM, _TRIED_S = 20.0, 0.25
+_ALLOWED_RPM, _ALLOWED_REV = 60.0, 0.25
+#: The drive's own torque limit lies above the envelope's, so that the loop sees who exceeds it.
+_ABOVE = 1.2
+#: Bit 8 of DS_C's status word (003:305).
+_HOMED = 1 << 8
+_WHOLE_RANGE = 2**31
+
+
+def needed(drive: Drive, link: Link) -> bool:
+    """Whether this drive takes speeds with every cycle only in Profile velocity."""
+    modes = set(drive.profile.supported_modes)
+    target = drive.profile.by_role.get("velocity_target")
+    mapped = target is not None and target.pdo in ("rx", "rxtx")
+    only_profile = Mode.PV in modes and not modes & {Mode.CSP, Mode.CSV, Mode.CST}
+    return mapped and only_profile and isinstance(link.cyclic, TakesSpeeds)
+
+
+def require_consent(session: CyclicSession, drive: Drive, consent: bool) -> None:
+    """Raises NotAllowed where nothing in the drive ends a speed and nobody agreed to that."""
+    if not consent and session.unwatched(drive):
+        raise NotAllowed(
+            f"{drive.name}: {CONSENT}",
+            drive=drive.name,
+            remedy="activate the drive's travel limits, keep a hand on the emergency stop, and "
+            "agree to this measurement",
+        )
+
+
+async def require_travel_limits(axis: Axis) -> None:
+    """The drive itself must stop at the ends of travel.
+
+    Raises:
+        NotAllowed: it has neither both limit switches nor active software limits.
+    """
+    drive = axis.drive
+    functions = {t.function_name for t in await read_terminals(drive)}
+    if {"positive limit", "negative limit"} <= functions:
+        return
+    switch = drive.key("software_limits_on")
+    if switch is None and await _limits_in_use(drive):
+        return
+    if switch is not None and await drive.raw(switch) and await axis.status_word() & _HOMED:
+        return
+    raise NotAllowed(
+        f"{drive.name}: none of its own travel limits is active, so nothing would stop the axis "
+        "if this computer fell silent",
+        drive=drive.name,
+        parameter=switch,
+        remedy="assign a positive and a negative limit to its inputs, or home it and switch its "
+        "software limits on",
+    )
+
+
+async def _limits_in_use(drive: Drive) -> bool:
+    """607Dh as CiA 402-2 has it: limits that are equal, or the whole range, are none."""
+    keys = [drive.key(role) for role in ("software_limit_min", "software_limit_max")]
+    if None in keys:
+        return False
+    low, high = [await drive.raw(key) for key in keys if key is not None]
+    return 0 < high - low < _WHOLE_RANGE
+
+
+@asynccontextmanager
+async def prepared(
+    axis: Axis, session: CyclicSession, envelope: Envelope, consent: bool
+) -> AsyncIterator[None]:
+    """Around a measurement: what must hold before, and ramps and torque limit for its length.
+
+    A drive with cyclic modes is only asked whether it watches the exchange.
+
+    Raises:
+        NotAllowed: no consent where it is needed, no travel limit in the drive, the axis is
+            enabled, or the drive takes a negative speed for something else. Nothing has moved
+            but a quarter turn at most.
+        RestoreFailed: on leaving, naming what could not be put back.
+    """
+    drive = axis.drive
+    require_consent(session, drive, consent)
+    if drive.id not in session.by_speed:
+        yield
+        return
+    await require_travel_limits(axis)
+    if await axis.state() is State.OPERATION_ENABLED:
+        raise NotAllowed(
+            f"{drive.name} is enabled", drive=drive.name, remedy="disable it before the measurement"
+        )
+    ramps = [drive.require("profile_acceleration"), drive.require("profile_deceleration")]
+    limits = [key for key in [drive.key("max_torque")] if key is not None]
+    async with axis.restoring(*ramps, *limits, *await axis.restorable_mode()):
+        await axis.limit_torque(limits, _ABOVE * envelope.torque_percent)
+        await _write_ramps(axis, ramps, _SLOW_RPM_S)
+        await _require_signed(axis, session, envelope)
+        await _write_ramps(axis, ramps, None)
+        yield
+
+
+async def _write_ramps(axis: Axis, keys: list[str], rpm_per_s: float | None) -> None:
+    """Ramps of this rate, or as good as none."""
+    drive, units = axis.drive, await axis.units()
+    times = units.spec.acceleration.startswith("ms")
+    for key in keys:
+        raw = units.acceleration_raw(rpm_per_s or _RAMP_RPM_S)
+        if rpm_per_s is None and times:
+            raw = _RAMP_MS
+        low, high = drive.parameter(key).raw_limits
+        raw = int(max(raw, raw if low is None else low))
+        await drive.write(key, int(min(raw, raw if high is None else high)))
+
+
+async def _require_signed(axis: Axis, session: CyclicSession, envelope: Envelope) -> None:
+    """A short turn backwards with a slow ramp: a drive that takes it for a high speed shows.
+
+    60FFh of DS_C is printed as an unsigned number (003:317), with which −1 would be the highest.
+    """
+    drive, units = axis.drive, await axis.units()
+    steps = round(_TRIED_S / cycle_s(session))
+    speed = -min(_TRIED_RPM, 0.3 * envelope.speed_rpm)
+    pause = np.zeros(steps // 4, dtype=np.int64)
+    values = np.concatenate([pause, np.full(steps, units.velocity_raw(speed)), pause])
+    room = Envelope(
+        min(_ALLOWED_REV, envelope.travel_rev), min(_ALLOWED_RPM, envelope.speed_rpm),
+        envelope.torque_percent, envelope.time_s,
+    )  # fmt: skip
+    try:
+        async with enabled(axis, session, Mode.CSV) as start:
+            await quiet(axis)
+            recording = await play(
+                axis, session, Play(Mode.CSV, values), await bus_limits(axis, room, start), 1.0,
+                lambda _fraction: None,
+            )  # fmt: skip
+    except NotAllowed as error:
+        if "speed" not in error.message and "position" not in error.message:
+            raise
+        raise _other_way(drive) from error
+    if not await axis.standstill(2.0):
+        raise LinkTimeout(
+            f"{drive.name} still turns after its speed was tried",
+            drive=drive.name,
+            remedy="use the machine's emergency stop",
+        )
+    turned = recording.position_rad[-1] - recording.position_rad[0]
+    if turned > 0.1 * abs(speed) / 60.0 * 2 * np.pi * _TRIED_S:
+        raise _other_way(drive)
+
+
+def _other_way(drive: Drive) -> NotAllowed:
+    return NotAllowed(
+        f"{drive.name} does not turn backwards at a low negative speed: it takes negative speeds "
+        "for something else",
+        drive=drive.name,
+        parameter=drive.key("velocity_target"),
+        remedy="this drive cannot be measured by its speed; see its page in the documentation",
+    )
