@@ -24,6 +24,11 @@ class TuneLimits(Message):
         default=1.0, gt=0, le=10,
         description="cycle of the exchange that is started where none runs, and ended afterwards",
     )  # fmt: skip
+    consent: bool = Field(
+        default=False,
+        description="the user agreed that nothing in the drive ends a speed when this computer "
+        "falls silent; needed where the drive has no watchdog (DS_C)",
+    )
 
 
 class SweepRequest(TuneLimits):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections.abc import Awaitable, Callable, Sequence
 from datetime import UTC, datetime
 
@@ -28,8 +27,16 @@ from backend.bench import Bench, Member
 from backend.cyclic import CyclicSession
 from backend.jobs import JobResult, Progress
 from backend.measurements import MeasurementStore
+from backend.measuring import exchange_for
 from backend.report.changes import Change
-from backend.tools import autotune, inertia, step_response, sweep, sweep_evaluation
+from backend.tools import (
+    autotune,
+    inertia,
+    profile_speed,
+    step_response,
+    sweep,
+    sweep_evaluation,
+)
 from backend.tools.sweep_preview import preview
 from drivers.errors import DriveError
 
@@ -46,12 +53,13 @@ async def _start(
 ) -> JobInfo:
     """Start a measurement as a job; raw data are stored before they are evaluated."""
     bench.require_idle(member)
-    url = bench.url_of(member.drive.ports[0])
-    running = member.axis.session
-    ran = running is not None and running.running
-    if running is None or not ran:
-        running = await bench.start_cyclic(url, request.cycle_ms / 1e3)
-    session = running
+    exchange = await exchange_for(bench, member, request.cycle_ms / 1e3)
+    session = exchange.session
+    try:
+        profile_speed.require_consent(session, member.drive, request.consent)
+    except DriveError:
+        await exchange.end()
+        raise
     files: list[str] = []
 
     def keep(
@@ -60,13 +68,13 @@ async def _start(
         files.append(bench.measurements.save(name, member.drive, arrays, meta))
 
     async def work(progress: Progress) -> JobResult:
+        limits = _envelope(request)
         try:
-            result = await tool(session, progress, keep)
+            async with profile_speed.prepared(member.axis, session, limits, request.consent):
+                result = await tool(session, progress, keep)
             await asyncio.to_thread(_conclude, bench.measurements, files, result)
         finally:
-            if not ran:
-                with contextlib.suppress(DriveError):
-                    await bench.stop_cyclic(url)
+            await exchange.end()
         return result | {"measurements": files}
 
     job = bench.jobs.start(

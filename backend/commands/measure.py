@@ -29,6 +29,14 @@ Travel = Annotated[float, typer.Option(help="longest way from the start, in revo
 Speed = Annotated[float, typer.Option(help="highest speed, in rpm")]
 Torque = Annotated[float, typer.Option(help="highest torque, in % of rated")]
 Rated = Annotated[float | None, typer.Option(help="rated torque in Nm, if not the drive's")]
+Consent = Annotated[
+    bool,
+    typer.Option(
+        "--consent",
+        help="measure although nothing in the drive ends a speed when this computer falls silent "
+        "(DS_C): its travel limits are active and a hand is on the emergency stop",
+    ),
+]
 
 
 class KindName(StrEnum):
@@ -84,11 +92,12 @@ def sweep(
     realisations: Annotated[int, typer.Option(help="pairs of realisations")] = 2,
     excitation: Annotated[WaveformName, typer.Option(help="signal")] = WaveformName.multisine,
     rated_torque_nm: Rated = None,
+    consent: Consent = False,
 ) -> None:
     """Measure a frequency response and write it as JSON. The axis moves."""
     limits = {
         "travel_limit": travel_rev, "speed_limit": speed_rpm, "torque_limit": torque_percent,
-        "time_limit_s": 60.0,
+        "time_limit_s": 60.0, "consent": consent,
     }  # fmt: skip
     more: dict[str, object] = {
         "kind": kind.value, "loop": loop.value, "f_min_hz": f_min_hz, "f_max_hz": f_max_hz,
@@ -106,7 +115,10 @@ def sweep(
             f_min_hz, f_max_hz, share, realisations, rated_torque_nm=rated_torque_nm,
             excitation=excitation.value,
         )  # fmt: skip
-        async with _session(url, station, profile, cycle_ms) as (found, session):
+        async with _session(url, station, profile, cycle_ms, settings.envelope, consent) as (
+            found,
+            session,
+        ):
             return sweep_evaluation.as_json(
                 await sweep_tool.sweep(found, session, settings, progress())
             )
@@ -131,6 +143,7 @@ def inertia(
     repetitions: Annotated[int, typer.Option(help="moves forth and back")] = 4,
     rated_torque_nm: Rated = None,
     motor_inertia_kgm2: Annotated[float | None, typer.Option(help="of the motor alone")] = None,
+    consent: Consent = False,
 ) -> None:
     """Measure inertia and friction and write them as JSON. The axis moves."""
     ends = None
@@ -138,7 +151,7 @@ def inertia(
         ends = (end_low_rev, end_high_rev)
     request: dict[str, object] = {
         "travel_limit": travel_rev, "speed_limit": speed_rpm, "torque_limit": torque_percent,
-        "time_limit_s": 60.0, "scheme": scheme.value, "ends_rev": ends,
+        "time_limit_s": 60.0, "consent": consent, "scheme": scheme.value, "ends_rev": ends,
         "repetitions": repetitions, "rated_torque_nm": rated_torque_nm,
         "motor_inertia_kgm2": motor_inertia_kgm2,
     }  # fmt: skip
@@ -151,7 +164,10 @@ def inertia(
             repetitions=repetitions, rated_torque_nm=rated_torque_nm,
             motor_inertia_kgm2=motor_inertia_kgm2,
         )  # fmt: skip
-        async with _session(url, station, profile, cycle_ms) as (found, session):
+        async with _session(url, station, profile, cycle_ms, settings.envelope, consent) as (
+            found,
+            session,
+        ):
             return inertia_tool.as_json(
                 await inertia_tool.inertia(found, session, settings, progress())
             )
@@ -161,18 +177,24 @@ def inertia(
 
 @asynccontextmanager
 async def _session(
-    url: str | None, station: int, profile: str | None, cycle_ms: float
-) -> AsyncIterator[tuple[Axis, CyclicSession]]:
+    url: str | None, station: int, profile: str | None, cycle_ms: float, envelope: Envelope,
+    consent: bool,
+) -> AsyncIterator[tuple[Axis, CyclicSession]]:  # fmt: skip
     """The drive with its bus exchanging process data, all of it ended afterwards."""
+    from backend.tools import profile_speed
+
     if url is None:
         raise NotAllowed("give a bus URL, or --server and --axis", remedy="see --help")
     async with drive_at(url, station, profile) as drive:
         axis = Axis(drive)
-        session = CyclicSession(drive.ports[0].link, [drive])
+        link = drive.ports[0].link
+        by_speed = {drive.id} if profile_speed.needed(drive, link) else set[str]()
+        session = CyclicSession(link, [drive], by_speed)
         await session.start(cycle_ms / 1e3)
         axis.session = session
         try:
-            yield axis, session
+            async with profile_speed.prepared(axis, session, envelope, consent):
+                yield axis, session
         finally:
             axis.session = None
             await session.stop()

@@ -18,6 +18,7 @@ from backend.analysis.frf import Record
 from backend.analysis.sampling import Hold, SignalPath, sampled_command
 from backend.tools import excite
 from backend.tools.recording import Recording
+from backend.tools.speed_integral import integral_hz as found_integral_hz
 from backend.tools.waveform import Band, Waveform
 
 _TURN = 2 * np.pi
@@ -58,8 +59,10 @@ def as_torque(
 ) -> tuple[tuple[excite.Sequence, Recording], ...]:  # fmt: skip
     """The same recordings with the torque in Nm that the reference made in the excitation's place.
 
-    ``integral_hz`` is the corner of the loop's integral; None is none.
+    ``integral_hz`` is the corner of the loop's integral; None: the recording tells.
     """
+    if integral_hz is None:
+        integral_hz = found_integral_hz(tuple(_record(s, r) for s, r in records), path)
     whole = [_with_integral(s, integral_hz) for s, _ in records]
     played = [(s, r) for s, (_, r) in zip(whole, records, strict=True)]
     gain = float(np.mean([_gain(_record(s, r), path) for s, r in played]))

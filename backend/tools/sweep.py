@@ -36,6 +36,7 @@ from backend.tools.recording import (
     quiet,
     require_signals,
     share,
+    takes_torque,
 )
 from backend.tools.sweep_evaluation import (
     Loop,
@@ -87,7 +88,7 @@ async def sweep(
     _check(settings)
     closed = settings.kind != "mechanics"
     loop = {"speed_loop": "speed", "position_loop": "position"}.get(settings.kind, settings.loop)
-    if settings.excitation == "stepped" and loop == "auto":
+    if loop == "auto" and (settings.excitation == "stepped" or not takes_torque(axis, session)):
         loop = "speed"
     facts = await read_facts(axis, settings.rated_torque_nm)
     home = await axis.position_raw()
@@ -158,7 +159,12 @@ async def _filters_off(axis: Axis, settings: SweepSettings) -> dict[str, int]:
         return {}
     drive, off = axis.drive, dict[str, int]()
     for number, slot in enumerate(drive.profile.notch.slots if drive.profile.notch else ()):
-        if slot.enable_key is not None:
+        if slot.enable_key is not None and slot.enable_bit is not None:
+            # The other bits switch filters that the loop is used with.
+            if not drive.unreachable_why(drive.parameter(slot.enable_key)):
+                before = off.get(slot.enable_key, await drive.raw(slot.enable_key))
+                off[slot.enable_key] = before & ~(1 << slot.enable_bit)
+        elif slot.enable_key is not None:
             off[slot.enable_key] = 0
         else:
             off |= notch_tool.encode(drive.profile, drive.name, number, None, None).raw
@@ -400,7 +406,7 @@ async def _as_sent(
 
 
 def _dc(session: CyclicSession) -> bool:
-    return bool(session.state and session.state.dc)
+    return session.synchronous
 
 
 def _raw(
