@@ -43,6 +43,10 @@ _USUAL_ZERO = 0.1
 USUAL_DAMPING, _DAMPING_SPREAD = 0.03, 2.0
 #: Lines with a larger relative deviation take no part.
 _NOISE = 0.3
+#: Residuals beyond this count linearly.
+_OUTLIER = 3.0
+#: How far delays (cycles) and the filter (logarithm) go while mechanics are looked for.
+_NEAR_ANCHOR = np.array([0.15, 0.15, 0.7])
 #: Highest antiresonance that is tried, relative to the highest line.
 HIGHEST_TRIED = 4.0
 
@@ -64,13 +68,16 @@ class View:
         frf: Frf, use: BoolArray, path: SignalPath, loop: LoopModel, floor: float, *,
         integrated: bool, second: bool,
     ) -> View:  # fmt: skip
-        """Weights are those of the lines' accuracy, but nothing is better than the floor."""
-        f = frf.frequency_hz[use]
-        relative = np.nan_to_num(frf.std_db, nan=0.0)[use] * np.log(10) / 20
+        """Weights are those of the lines' accuracy, but nothing is better than the floor.
+
+        Lines that are not in ``use`` weigh nothing.
+        """
+        f = frf.frequency_hz
+        relative = np.nan_to_num(frf.std_db, nan=0.0) * np.log(10) / 20
         # The logarithm of a line that is mostly noise is biased.
-        weight = np.where(relative < _NOISE, 1.0 / np.hypot(relative, floor), 0.0)
+        weight = np.where(use & (relative < _NOISE), 1.0 / np.hypot(relative, floor), 0.0)
         sampler = Sampler.of(f, path, loop, integrated=integrated)
-        return View(f, frf.response[use], weight, sampler, integrated, second)
+        return View(f, frf.response, weight, sampler, integrated, second)
 
     def thinned(self, lines: npt.NDArray[np.int64]) -> View:
         """Some of the lines."""
@@ -113,13 +120,15 @@ class Problem:
     form: Form
     free_filter: bool
     """Whether the drive's speed filter is unknown."""
+    anchor: FloatArray | None = None
+    """Delays and filter that a search stays near to as long as mechanics are missing."""
 
     @cached_property
     def _frequencies(self) -> FloatArray:
         # All views have the same lines, and so the same images.
         return self.views[0].sampler.frequency_hz
 
-    def _parts(self, x: FloatArray) -> tuple[list[ComplexArray], list[ComplexArray]]:
+    def logs(self, x: FloatArray) -> tuple[list[ComplexArray], list[ComplexArray]]:
         """Per view log(seen/measured) [lines] and its slopes [parameters, lines]."""
         f = self._frequencies
         plant, slopes = self.form.response(x, f)
@@ -131,11 +140,7 @@ class Problem:
         values, gradients = [], []
         for view in self.views:
             corner = np.exp(x[4])
-            further: ComplexArray | None = None
-            if view.integrated:
-                further = delay_response(f, float(x[3] - x[2]) * self.period_s)
-            elif self.free_filter:
-                further = lag_response(f, float(corner))
+            further = self.further(x, view, f)
             seen, by_plant, by_further = view.sampler.seen(plant, further)
             gradient = np.einsum("pil,il->pl", slopes, by_plant)
             if further is not None and view.integrated:
@@ -149,9 +154,15 @@ class Problem:
             gradients.append(gradient / seen)
         return values, gradients
 
+    def further(self, x: FloatArray, view: View, f: FloatArray) -> ComplexArray | None:
+        """What lies on the way of this view's signal alone, by the parameters."""
+        if view.integrated:
+            return delay_response(f, float(x[3] - x[2]) * self.period_s)
+        return lag_response(f, float(np.exp(x[4]))) if self.free_filter else None
+
     def misfit(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Weighted logarithmic error, peaks and valleys alike, and its slopes [n, parameters]."""
-        values, gradients = self._parts(x)
+        values, gradients = self.logs(x)
         return self._rows(x, values), self._slopes(x, gradients)
 
     def _rows(self, x: FloatArray, values: list[ComplexArray]) -> FloatArray:
@@ -168,30 +179,47 @@ class Problem:
         usual = [path, self.form.prior(x)[1]]
         return np.concatenate([p.T for e in rows for p in (e.real, e.imag)] + usual)
 
+    def with_views(self, views: tuple[View, ...]) -> Problem:
+        """The same with other views."""
+        return replace(self, views=views)
+
     def thinned(self, lines: npt.NDArray[np.int64]) -> Problem:
         """The same with some of the lines, for a first look at many starts."""
         return replace(self, views=tuple(view.thinned(lines) for view in self.views))
 
-    def solve(self, start: FloatArray, steps: int = 40) -> Found:
-        """Best parameters near ``start``, as far as ``steps`` evaluations lead."""
+    def solve(self, start: FloatArray, steps: int = 40, *, bound: bool = False) -> Found:
+        """Best parameters near ``start``, as far as ``steps`` evaluations lead.
+
+        ``bound`` keeps delays and filter near to the anchor: where mechanics are missing, they
+        would imitate them.
+        """
         low, high = self.form.bounds(start, self.views[0].f)
         # A delay that a start brings along is looked for around it.
-        around = start[2:4]
-        low[2:4], high[2:4] = np.maximum(around - 1.0, -0.3), around + 1.0
+        low[2:4], high[2:4] = np.maximum(start[2:4] - 1.0, -0.3), start[2:4] + 1.0
         low[4], high[4] = np.log(100.0), np.log(20000.0)
-        fit = minimise(self.misfit, np.clip(start, low + 1e-9, high - 1e-9), low, high, scale=3.0,
-                       steps=steps)  # fmt: skip
+        if bound and self.anchor is not None:
+            low[2:5] = np.maximum(low[2:5], self.anchor - _NEAR_ANCHOR)
+            high[2:5] = np.minimum(high[2:5], self.anchor + _NEAR_ANCHOR)
+        fit = minimise(
+            self.misfit, np.clip(start, low + 1e-9, high - 1e-9), low, high, scale=_OUTLIER,
+            steps=steps,
+        )  # fmt: skip
         points = sum(2 * int(np.count_nonzero(view.weight)) for view in self.views)
         # No data are better than the floor of their weights, whatever synthetic ones are.
         misfit = max(2 * fit.cost, 1e-6 * points)
         score = points * np.log(misfit / points) + start.size * np.log(points)
-        values, _ = self._parts(fit.x)
+        values, _ = self.logs(fit.x)
         errors = [
             _median(np.abs(np.expm1(v)), w.weight) for v, w in zip(values, self.views, strict=True)
         ]
         noise = min(_median(1.0 / np.maximum(v.weight, 1e-9), v.weight) for v in self.views)
         return Found(fit.x, fit.jacobian, fit.residuals, float(score), min(errors),
                       noise, self.form.model(fit.x))  # fmt: skip
+
+
+def robust_rows(residuals: FloatArray) -> FloatArray:
+    """Weights of rows as the robust loss has them."""
+    return np.asarray((1.0 + (residuals / _OUTLIER) ** 2) ** -0.25)
 
 
 def _median(values: FloatArray, weight: FloatArray) -> float:

@@ -14,11 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backend.analysis.arrays import ComplexArray
+from backend.analysis.doubt import Doubt, Shifted
+from backend.analysis.doubt import doubt as joint_doubt
 from backend.analysis.frf import Frf, estimate_periodic, valid_band_hz
 from backend.analysis.line_spectra import Quantity, Record, loop_spectra
 from backend.analysis.loop_fit import fit_loop
-from backend.analysis.model_fit import fit_sampled_model
-from backend.analysis.path_fit import find_paths
+from backend.analysis.model_fit import Solution, fit_sampled_model, views_of
+from backend.analysis.path_fit import find_paths, moved_path, path_covariance
 from backend.analysis.sampled_model import LoopModel, SampledFit
 from backend.analysis.sampling import STEP_LEAD_S, SignalPath, delay_response, lag_response
 from backend.analysis.settling import settled
@@ -32,6 +34,9 @@ TRUSTED_ERROR = 0.03
 
 #: At most this many rounds of refining loop, path and mechanics against each other.
 _PASSES = 4
+#: Path parameters are moved by this much (cycles, logarithm) to see what they do, and moved at
+#: all where torque and motion together put them further off than this share of their deviation.
+_STEP, _SETTLED, _LEAST_STEP = 0.02, 0.2, 1e-4
 #: What half a cycle of delay weighs, in the criterion's units, is half of this.
 _FRACTION = 100.0
 
@@ -67,8 +72,8 @@ def identify_mechanics(
     left is found by the fit. ``coulomb_nm`` as in :func:`estimate_periodic`, None estimates it.
     """
     task = _Task(settled(records), quantity, max_modes, jitter_s)
-    first = task.trial(path, coulomb_nm)
-    return _identification(task.refined(first, lambda _: path), jitter_s)
+    found = task.refined(task.trial(path, coulomb_nm), lambda _: path)
+    return _identification(task, found, task.doubt(found, corner_known=True))
 
 
 def identify_with_path(
@@ -81,17 +86,26 @@ def identify_with_path(
     closed loop, path and mechanics need each other, and are refined in turn.
     """
     closed = quantity == "torque_injection"
-    records = settled(records)
-    task = _Task(records, quantity)
-    paths = find_paths(records, path, loop_closed=closed, hold_known=hold_known)
+    corner_known = path.current_bandwidth_hz is not None
+    task = _Task(settled(records), quantity)
+    paths = find_paths(task.records, path, loop_closed=closed, hold_known=hold_known)
     trials = [task.trial(each) for each in paths]
     best = min(trials, key=lambda t: t.fit.score + _implausible(t.fit))
 
     def again(fit: SampledFit) -> SignalPath:
         known = replace(path, hold=fit.path.hold)
-        return find_paths(records, known, loop_closed=True, hold_known=True, motion=fit)[0]
+        return find_paths(
+            task.records, known, loop_closed=True, hold_known=True, motion=fit
+        )[0]  # fmt: skip
 
-    return _identification(task.refined(best, again), 0.0)
+    found = task.refined(best, again)
+    doubt = task.doubt(found, corner_known)
+    for _ in range(_PASSES if np.all(np.isfinite(doubt.path_step)) else 0):
+        if np.all(np.abs(doubt.path_step) < _SETTLED * doubt.path_std):
+            break
+        found = task.moved(found, doubt)
+        doubt = task.doubt(found, corner_known)
+    return _identification(task, found, doubt)
 
 
 @dataclass(frozen=True)
@@ -100,7 +114,12 @@ class _Trial:
 
     views: _Views
     path: SignalPath
-    fit: SampledFit
+    solution: Solution
+
+    @property
+    def fit(self) -> SampledFit:
+        """What it says."""
+        return self.solution.fit
 
 
 @dataclass(frozen=True)
@@ -113,17 +132,31 @@ class _Task:
     jitter_s: float = 0.0
 
     def trial(
-        self, path: SignalPath, coulomb_nm: float | None = None, motion: SampledFit | None = None
-    ) -> _Trial:
+        self, path: SignalPath, coulomb_nm: float | None = None, motion: SampledFit | None = None,
+        start: Solution | None = None,
+    ) -> _Trial:  # fmt: skip
         """Estimates and fit with one path; ``motion`` is a fit before, which tells the images."""
         if self.quantity == "closed_loop":
             raise ValueError("mechanics are identified from torque, not from a loop's reference")
-        views = _views(self.records, path, self.quantity, coulomb_nm, self.jitter_s)
-        fit = fit_sampled_model(
+        views = self.views(path, coulomb_nm)
+        solution = fit_sampled_model(
             views.velocity, path, from_position=views.position, loop=self._loop(path, motion),
-            max_modes=self.max_modes,
+            max_modes=self.max_modes, start=start,
         )  # fmt: skip
-        return _Trial(views, path, fit)
+        return _Trial(views, path, solution)
+
+    def views(self, path: SignalPath, coulomb_nm: float | None) -> _Views:
+        """Estimates from what was recorded."""
+        velocity = estimate_periodic(
+            self.records, path, self.quantity, coulomb_nm=coulomb_nm, jitter_s=self.jitter_s
+        )
+        if any(record.position is None for record in self.records):
+            return _Views(velocity, None)
+        position = estimate_periodic(
+            self.records, path, self.quantity, coulomb_nm=velocity.coulomb_nm,
+            jitter_s=self.jitter_s, position=True,
+        )  # fmt: skip
+        return _Views(velocity, position)
 
     def refined(self, first: _Trial, path_of: Callable[[SampledFit], SignalPath]) -> _Trial:
         """Loop, path and mechanics in turn: each is needed to take the images out of the others."""
@@ -135,6 +168,34 @@ class _Task:
                 break
             last = self.trial(path, last.views.velocity.coulomb_nm, last.fit)
         return last
+
+    def moved(self, trial: _Trial, doubt: Doubt) -> _Trial:
+        """The same mechanics refined on the path that torque and motion together would have."""
+        most = 2.0 * np.maximum(doubt.path_std, _LEAST_STEP)
+        step = np.clip(doubt.path_step, -most, most)
+        path = moved_path(trial.path, float(step[0]), float(step[1]) if step.size > 1 else 0.0)
+        motion = trial.fit if self.quantity == "torque_injection" else None
+        return self.trial(path, trial.views.velocity.coulomb_nm, motion, trial.solution)
+
+    def doubt(self, trial: _Trial, corner_known: bool) -> Doubt:
+        """How far path and mechanics may be off together."""
+        closed = self.quantity == "torque_injection"
+        covariance = path_covariance(
+            self.records, trial.path, loop_closed=closed, corner_known=corner_known,
+            motion=trial.fit if closed else None,
+        )  # fmt: skip
+        problem = trial.solution.problem
+        shifted = []
+        for n in range(len(covariance)):
+            path = moved_path(trial.path, _STEP * (n == 0), _STEP * (n == 1))
+            other = self.views(path, trial.views.velocity.coulomb_nm)
+            seen = views_of(other.velocity, other.position, path, trial.fit.loop)
+            views = tuple(
+                replace(v, g=o.g, sampler=o.sampler)
+                for v, o in zip(problem.views, seen, strict=True)
+            )
+            shifted.append(Shifted(views, _STEP))
+        return joint_doubt(problem, trial.solution.x, shifted, covariance)
 
     def _loop(self, path: SignalPath, motion: SampledFit | None) -> LoopModel:
         """The controller that is closed meanwhile."""
@@ -163,7 +224,7 @@ def _implausible(fit: SampledFit) -> float:
     return 1e3 * early + _FRACTION * abs(cycles - round(cycles))
 
 
-def _identification(trial: _Trial, jitter_s: float) -> Identification:
+def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
     """The estimates with what the fit found taken out."""
     views, path, fit = trial.views, trial.path, trial.fit
     if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
@@ -173,23 +234,20 @@ def _identification(trial: _Trial, jitter_s: float) -> Identification:
         plain = replace(raw, valid_band_hz=(low, min(high, 0.1 * raw.sample_rate_hz)))
         return Identification(plain, plain, fit, trusted=False)
     direct, corrected = [], []
-    ways = [(views.velocity, fit.delay_s, fit.delay_std_s, False)]
+    ways = [(views.velocity, fit.delay_s, False)]
     if views.position is not None:
-        ways.append((views.position, fit.position_delay_s, fit.position_delay_std_s, True))
-    for raw, late_s, late_std_s, integrated in ways:
-        delay_deg = 360.0 * raw.frequency_hz * late_std_s
+        ways.append((views.position, fit.position_delay_s, True))
+    for place, (raw, late_s, integrated) in enumerate(ways):
         late = delay_response(raw.frequency_hz, late_s)
         if not integrated and path.response_bandwidth_hz is None:
             late = late * lag_response(raw.frequency_hz, fit.path.response_bandwidth_hz)
-        plain = replace(
-            raw,
-            response=np.asarray(raw.response / late),
-            std_deg=np.hypot(raw.std_deg, delay_deg),
-        )
+        plain = replace(raw, response=np.asarray(raw.response / late))
         factor = fit.image_factor(raw.frequency_hz, integrated=integrated)
         # Images stay in the direct estimate: its band must contain them.
-        direct.append(_widened(plain, factor, 1.0))
-        corrected.append(_without_images(plain, factor, jitter_s))
+        direct.append(_widened(plain, factor, 1.0, doubt.direct[place]))
+        corrected.append(
+            _without_images(plain, factor, task.jitter_s, doubt.corrected[place])
+        )  # fmt: skip
     return Identification(_pooled(direct), _pooled(corrected), fit)
 
 
@@ -199,20 +257,6 @@ class _Views:
 
     velocity: Frf
     position: Frf | None
-
-
-def _views(
-    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, coulomb_nm: float | None,
-    jitter_s: float,
-) -> _Views:  # fmt: skip
-    """Estimates from what was recorded."""
-    velocity = estimate_periodic(records, path, quantity, coulomb_nm=coulomb_nm, jitter_s=jitter_s)
-    if any(record.position is None for record in records):
-        return _Views(velocity, None)
-    position = estimate_periodic(
-        records, path, quantity, coulomb_nm=velocity.coulomb_nm, jitter_s=jitter_s, position=True
-    )
-    return _Views(velocity, position)
 
 
 def _pooled(parts: list[Frf]) -> Frf:
@@ -234,19 +278,22 @@ def _pooled(parts: list[Frf]) -> Frf:
     )
 
 
-def _widened(frf: Frf, factor: ComplexArray, share: float) -> Frf:
-    """Charge a share of the image factor, and what no estimate is better than, to the band."""
-    doubt_db = np.hypot(np.abs(20 * np.log10(np.abs(factor))) * share, SYSTEMATIC_DB)
-    doubt_deg = np.hypot(np.abs(np.degrees(np.angle(factor))) * share, SYSTEMATIC_DEG)
+def _widened(frf: Frf, factor: ComplexArray, share: float, doubt: ComplexArray) -> Frf:
+    """Charge a share of the image factor, the doubt, and what none is better than, to the band."""
+    image = np.log(factor)
+    doubt_db = 20 / np.log(10) * np.hypot(image.real * share, doubt.real)
+    doubt_deg = np.degrees(np.hypot(image.imag * share, doubt.imag))
     return replace(
-        frf, std_db=np.hypot(frf.std_db, doubt_db), std_deg=np.hypot(frf.std_deg, doubt_deg)
+        frf,
+        std_db=np.hypot(frf.std_db, np.hypot(doubt_db, SYSTEMATIC_DB)),
+        std_deg=np.hypot(frf.std_deg, np.hypot(doubt_deg, SYSTEMATIC_DEG)),
     )
 
 
-def _without_images(direct: Frf, factor: ComplexArray, jitter_s: float) -> Frf:
+def _without_images(direct: Frf, factor: ComplexArray, jitter_s: float, doubt: ComplexArray) -> Frf:
     # The correction is as uncertain as the model: a fifth of it stays in the band.
     return replace(
-        _widened(direct, factor, 0.2),
+        _widened(direct, factor, 0.2, doubt),
         response=np.asarray(direct.response / factor),
         valid_band_hz=valid_band_hz(
             float(direct.frequency_hz[0]), direct.sample_rate_hz, model=True, jitter_s=jitter_s

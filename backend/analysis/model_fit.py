@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.arrays import FloatArray
+from backend.analysis.arrays import BoolArray, FloatArray
 from backend.analysis.chain_model import (
     LOAD_PARAMETERS,
     chain_of_modes,
@@ -28,6 +28,7 @@ from backend.analysis.fit_problem import (
     MODAL,
     USUAL_CORNER,
     USUAL_DAMPING,
+    Form,
     Found,
     Problem,
     View,
@@ -43,9 +44,30 @@ _WORTHWHILE, _MODES_GAIN = 10.0, 60.0
 #: Antiresonances that are tried, from this multiple of the lowest line.
 _LOWEST_TRIED = 1.3
 #: A first look takes about twice so many lines and so many steps; so many starts get further.
-_COARSE_LINES, _COARSE_STEPS, _FINISHED = 40, 12, 2
+_COARSE_LINES, _COARSE_STEPS, _FINISHED = 40, 12, 3
+#: Lines with less coherence take no part, and none is believed to be more accurate than this.
+_LEAST_COHERENCE, _FLOOR = 0.6, 0.01
+#: Starts nearer to each other than this (logarithm of their frequencies) lead to the same place,
+#: but for what is seen by its images alone: that fits at many places which lie close together.
+_APART, _APART_FOLDED, _FOLDED = 0.5, 0.12, 4
+#: Below this misfit mechanics are there, and delays and filter are free.
+_FREED = 0.1
+#: Images to either side of a line that are looked at in a search.
+_IMAGES = 2
 #: Inertia of one more load, relative to the one that it hangs on.
 _RATIOS = (0.05, 0.12, 0.25, 0.5, 1.0, 2.0, 5.0, 12.0, 30.0)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A fit and what it was made of, for what follows from its parameters.
+
+    ``views`` have all lines, those that took no part in the fit with a weight of zero.
+    """
+
+    fit: SampledFit
+    problem: Problem
+    x: FloatArray
 
 
 def fit_sampled_model(
@@ -56,22 +78,24 @@ def fit_sampled_model(
     loop: LoopModel | None = None,
     max_modes: int = 4,
     longest_delay_s: float | None = None,
-    floor: float = 0.01,
-    minimum_coherence: float = 0.6,
-) -> SampledFit:
+    start: Solution | None = None,
+) -> Solution:
     """Fit mechanics and delay to a direct estimate, images included.
 
     ``frf`` is a direct estimate made with ``path`` from the velocity, ``from_position`` one from
     the position of the same recording, with the same lines; one of them may be None. Lines up to
     0.4 of the sample rate with enough coherence take part. A delay is looked for within
     ``longest_delay_s`` (three bus cycles in torque mode, a quarter of one in a closed loop)
-    where none explains nothing.
+    where none explains nothing. With ``start`` only the numbers of another solution are refined.
+
+    Raises:
+        ValueError: too few lines are coherent.
     """
     given = [part for part in (frf, from_position) if part is not None]
     lines = given[0].frequency_hz
     coherence = np.max([part.coherence for part in given], axis=0)
     band = valid_band_hz(float(lines[0]), path.sample_rate_hz, model=True)
-    use = np.asarray((lines <= band[1]) & (coherence >= minimum_coherence))
+    use = np.asarray((lines <= band[1]) & (coherence >= _LEAST_COHERENCE))
     if np.count_nonzero(use) < 12:
         raise ValueError("fewer than 12 coherent lines: too little excitation for a model")
     loop = LoopModel() if loop is None else loop
@@ -79,19 +103,16 @@ def fit_sampled_model(
     if longest_delay_s is None:
         # Torque and velocity are reported together: only injection itself can be cycles late.
         longest_delay_s = 0.25 * period_s if loop.closed else 3 * period_s
-    views = tuple(
-        View.of(
-            part, use, path, loop, floor, integrated=part is not frf, second=part is not given[0]
-        )
-        for part in given
-    )
+    all_views = views_of(frf, from_position, path, loop, use)
+    views = tuple(view.thinned(np.flatnonzero(use)) for view in all_views)
     free_filter = path.response_bandwidth_hz is None and from_position is not None
-    found = _best(views, period_s, longest_delay_s, max_modes, free_filter)
-    freedom = max(found.residuals.size - found.x.size, 1)
-    variance = float(found.residuals @ found.residuals) / freedom
-    covariance = np.linalg.pinv(found.jacobian.T @ found.jacobian) * variance
-    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0)) * period_s
-    return SampledFit(
+    if start is None:
+        found, form = _best(views, period_s, longest_delay_s, max_modes, free_filter)
+    else:
+        form = start.problem.form
+        found = Problem(views, period_s, form, free_filter).solve(start.x)
+    spread = _spread(found) * period_s
+    fit = SampledFit(
         model=found.model,
         loop=loop,
         path=replace(path, response_bandwidth_hz=float(np.exp(found.x[4])))
@@ -106,12 +127,37 @@ def fit_sampled_model(
         score=found.score,
         valid_band_hz=band,
     )
+    return Solution(fit, Problem(all_views, period_s, form, free_filter), found.x)
+
+
+def views_of(
+    frf: Frf | None, from_position: Frf | None, path: SignalPath, loop: LoopModel,
+    use: BoolArray | None = None,
+) -> tuple[View, ...]:  # fmt: skip
+    """The estimates as the fit sees them, all lines; those not in ``use`` weigh nothing."""
+    given = [part for part in (frf, from_position) if part is not None]
+    if use is None:
+        use = np.ones(given[0].frequency_hz.size, dtype=np.bool_)
+    return tuple(
+        View.of(
+            part, use, path, loop, _FLOOR, integrated=part is not frf, second=part is not given[0]
+        )
+        for part in given
+    )
+
+
+def _spread(found: Found) -> FloatArray:
+    """Standard deviation of every parameter."""
+    freedom = max(found.residuals.size - found.x.size, 1)
+    variance = float(found.residuals @ found.residuals) / freedom
+    covariance = np.linalg.pinv(found.jacobian.T @ found.jacobian) * variance
+    return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
 
 
 def _best(
     views: tuple[View, ...], period_s: float, longest_delay_s: float, max_modes: int,
     free_filter: bool,
-) -> Found:  # fmt: skip
+) -> tuple[Found, Form]:  # fmt: skip
     """The chain that the criterion likes best, or modes where they gain much over it."""
     chain = Problem(views, period_s, CHAIN, free_filter)
     found = _grown(chain, _rigid_start(views[0], 0.0), max_modes)
@@ -127,8 +173,8 @@ def _best(
         modal = Problem(views, period_s, MODAL, free_filter).solve(modal_start(found.x))
         # Free modes also imitate delays and noise, so they must explain much that no chain does.
         if modal.score < found.score - _MODES_GAIN and modal.error < 0.7 * found.error:
-            return modal
-    return found
+            return modal, MODAL
+    return found, CHAIN
 
 
 def _rigid_start(view: View, delay: float) -> FloatArray:
@@ -141,7 +187,8 @@ def _rigid_start(view: View, delay: float) -> FloatArray:
 
 def _grown(problem: Problem, start: FloatArray, max_modes: int) -> Found:
     """Loads one by one as long as the criterion gains."""
-    best = now = problem.solve(start)
+    problem = replace(problem, anchor=start[2:RIGID_PARAMETERS])
+    best = now = problem.solve(start, bound=True)
     misses = 0
     for _ in range(max_modes):
         starts = [*_with_one_more(problem, now), *_with_one_more_mode(problem, now)]
@@ -152,14 +199,17 @@ def _grown(problem: Problem, start: FloatArray, max_modes: int) -> Found:
             misses += 1
         if misses == 2 or best.error < 0.0004:
             break
-    return best
+    return problem.solve(best.x)
 
 
 def _best_end(problem: Problem, now: Found, starts: list[FloatArray]) -> Found:
     """Where the starts lead: all of them on few lines first, the most promising on all lines."""
     coarse = problem.thinned(_telling_lines(best_view(problem.views), now, _COARSE_LINES))
-    looked = sorted((coarse.solve(x, _COARSE_STEPS) for x in starts), key=lambda t: t.score)
-    return min((problem.solve(t.x) for t in looked[:_FINISHED]), key=lambda t: t.score)
+    looked = sorted(
+        (coarse.solve(x, _COARSE_STEPS, bound=True) for x in starts), key=lambda t: t.score
+    )
+    ends = [problem.solve(t.x, bound=True) for t in looked[:_FINISHED]]
+    return min((problem.solve(e.x, bound=e.error > _FREED) for e in ends), key=lambda t: t.score)
 
 
 def _with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
@@ -167,20 +217,24 @@ def _with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
     view = best_view(problem.views)
     lines = _telling_lines(view, found)
     f = view.f[lines]
-    # Images are left out here, and they come in at the upper end.
-    trusted = np.where(f < 0.6 * view.f[-1], 1.0, 0.3)
-    weight = np.minimum(view.weight[lines], 100.0) * trusted
-    delay = found.x[3 if view.integrated else 2] * problem.period_s
-    goal = view.g[lines] * np.conj(delay_response(f, float(delay)))
+    weight = np.minimum(view.weight[lines], 100.0)
+    sampler = view.sampler.thinned(lines).nearest(_IMAGES)
+    every = sampler.frequency_hz
+    late = delay_response(every, float(found.x[2]) * problem.period_s)
+    further = problem.further(found.x, view, every)
     top = float(view.f[-1])
-    grid_hz = np.geomspace(_LOWEST_TRIED * float(f[0]), HIGHEST_TRIED * top, 36)
+    grid_hz = np.concatenate(
+        [np.geomspace(_LOWEST_TRIED * float(f[0]), 0.8 * top, 26),
+         np.geomspace(0.8 * top, HIGHEST_TRIED * top, 20)]
+    )  # fmt: skip
     worst_hz = _worst_hz(view, found)
     places = range(1 + (found.x.size - RIGID_PARAMETERS) // LOAD_PARAMETERS)
     trials: list[_Trial] = []
     for place in places:
         new = _new_loads(found.x, place, grid_hz, worst_hz)
-        responses = responses_with_load(found.x, place, new, f)
-        error = np.abs(np.log(responses / goal)) * weight
+        plants = responses_with_load(found.x, place, new, every.ravel())
+        seen = sampler.shown(plants.reshape(-1, *every.shape) * late, further)
+        error = np.abs(np.log(seen / view.g[lines])) * weight
         costs = np.sum(np.sqrt(1.0 + error**2 / 9.0) - 1.0, axis=1)
         for i in np.argsort(costs)[:150]:
             kept, inertia, stiffness, damping = (float(v) for v in new[i])
@@ -192,12 +246,13 @@ def _with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
                 )
             )  # fmt: skip
     ranked = sorted(trials, key=lambda t: t.cost)
-    edges = np.log(TURN * np.array([0.0, 0.3 * top, top, np.inf]) + 1e-12)
+    edges = np.log(TURN * np.array([0.0, 0.3 * top, 0.7 * top, np.inf]) + 1e-12)
     chosen = ranked[:1]
-    for low, high in itertools.pairwise(edges):
+    for (low, high), count in zip(itertools.pairwise(edges), (1, 1, _FOLDED), strict=True):
         here = [t for t in ranked if low <= t.frequency < high]
-        chosen += _different(here, chosen)[:1]
-    return [t.x for t in chosen + _different(ranked, chosen)[:1]]
+        apart = _APART if count == 1 else _APART_FOLDED
+        chosen += _different(here, chosen, count, apart)
+    return [t.x for t in chosen + _different(ranked, chosen, 1)]
 
 
 def _with_one_more_mode(problem: Problem, found: Found) -> list[FloatArray]:
@@ -257,11 +312,11 @@ class _Trial:
     ratio: float
     x: FloatArray
 
-    def like(self, other: _Trial) -> bool:
-        """Whether both lead to the same place."""
+    def like(self, other: _Trial, apart: float) -> bool:
+        """Whether both lead to the same place: frequencies less ``apart`` (logarithm)."""
         return (
             self.place == other.place
-            and abs(self.frequency - other.frequency) < 0.5
+            and abs(self.frequency - other.frequency) < apart
             and abs(self.ratio - other.ratio) < 1.5
         )
 
@@ -297,11 +352,13 @@ def _new_loads(x: FloatArray, place: int, grid_hz: FloatArray, worst_hz: FloatAr
     return np.concatenate(rows)
 
 
-def _different(trials: list[_Trial], known: list[_Trial], count: int = 5) -> list[_Trial]:
+def _different(
+    trials: list[_Trial], known: list[_Trial], count: int, apart: float = _APART
+) -> list[_Trial]:
     """The best few that are neighbours neither of the known ones nor of each other."""
     kept: list[_Trial] = []
     for trial in trials:
-        if not any(trial.like(k) for k in [*known, *kept]):
+        if not any(trial.like(k, apart) for k in [*known, *kept]):
             kept.append(trial)
         if len(kept) == count:
             break

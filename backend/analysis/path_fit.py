@@ -40,6 +40,10 @@ _OWN_SHARE = 0.15
 _ALIKE = 3.0
 #: A delay so near to whole cycles is one of whole cycles.
 _WHOLE = 0.06
+#: Deviations of delays (cycles) and of corners (logarithm) where nothing but habit tells them.
+_STEADY, _UNSTEADY, _TOLD, _UNTOLD = 0.02, 0.1, 0.03, 0.7
+#: A torque of which more than this share (power) is not made of the reference does not follow it.
+_UNRELATED = 0.5
 #: So much stays unexplained by rounding alone.
 _ROUNDING = 1.5e-7
 
@@ -65,8 +69,68 @@ def find_paths(
     """
     if any(r.torque is None for r in records):
         return (path,)
-    fit = _Fit.of(records, path, loop_closed, motion)
     holds: tuple[Hold, ...] = (path.hold,) if hold_known else ("zero", "linear")
+    return _ranked(_Fit.of(records, path, loop_closed, motion), holds)
+
+
+def reference_gain(
+    records: tuple[Record, ...], path: SignalPath, integral_rad_s: float, *, hold_known: bool
+) -> float:
+    """Torque that a speed loop makes of one unit of its reference, which is the excitation.
+
+    ``records`` have the reference and ``integral_rad_s`` times its integral as what was sent. The
+    loop makes its torque of the reference less the speed, both by the same gain, so that the
+    gain is the only number that all lines share.
+
+    Raises:
+        ValueError: every period has a gap, or the torque does not follow the reference.
+    """
+    fit = _Fit.of(records, path, True, None)
+    size = float(np.linalg.norm(fit.torque * fit.weight))
+    fit = replace(fit, torque=fit.torque / size, integral_rad_s=integral_rad_s)
+    holds: tuple[Hold, ...] = (path.hold,) if hold_known else ("zero", "linear")
+    best = _ranked(fit, holds)[0]
+    gain, rest = fit.gain(best), fit.rest(best)
+    if gain <= 0 or float(rest @ rest) > _UNRELATED:
+        raise ValueError("the torque does not follow the reference: its gain cannot be read")
+    return gain * size
+
+
+def path_covariance(
+    records: tuple[Record, ...], path: SignalPath, *, loop_closed: bool, corner_known: bool,
+    motion: SampledFit | None = None,
+) -> FloatArray:  # fmt: skip
+    """How exactly the torque tells a path that it was found with: cycles and log of the corner.
+
+    Covariance [2, 2], or [1, 1] without a corner. What the torque leaves open is as unusual as
+    drives are: those in step with the bus take set-points at its cycles, and a corner that a
+    drive tells is meant to be one of first order.
+    """
+    usual = [_STEADY if _at_whole_cycles(path) else _UNSTEADY]
+    if path.current_bandwidth_hz is not None:
+        usual.append(_TOLD if corner_known else _UNTOLD)
+    information = np.diag(np.array(usual) ** -2.0)
+    if any(r.torque is None for r in records):
+        return np.asarray(np.linalg.inv(information))
+    fit = _Fit.of(records, path, loop_closed, motion)
+    rest = fit.rest(path)
+    steps = [moved_path(path, 0.02 * (n == 0), 0.02 * (n == 1)) for n in range(len(usual))]
+    slopes = np.column_stack([(fit.rest(step) - rest) / 0.02 for step in steps])
+    noise = max(float(rest @ rest), _ROUNDING) / rest.size
+    return np.asarray(np.linalg.inv(information + slopes.T @ slopes / noise))
+
+
+def moved_path(path: SignalPath, cycles: float, log_corner: float) -> SignalPath:
+    """A path with another delay, and with another corner where there is one."""
+    corner = path.current_bandwidth_hz
+    late_s = path.command_delay_s + cycles / path.sample_rate_hz
+    if corner is not None:
+        corner *= float(np.exp(log_corner))
+    return replace(path, command_delay_s=max(late_s, 0.0), current_bandwidth_hz=corner)
+
+
+def _ranked(fit: _Fit, holds: tuple[Hold, ...]) -> tuple[SignalPath, ...]:
+    """The best path of each hold as far as they explain alike, those of whole cycles first."""
     found = sorted((fit.best(hold) for hold in holds), key=lambda t: t[1])
     least = max(found[0][1], _ROUNDING)
     alike = tuple(p for p, cost in found if cost < _ALIKE * least)
@@ -90,6 +154,8 @@ class _Fit:
     weight: FloatArray
     path: SignalPath
     loop_closed: bool
+    integral_rad_s: float | None = None
+    """Corner of the loop's integral where the loop's reference is what was sent."""
 
     @staticmethod
     def of(
@@ -144,19 +210,40 @@ class _Fit:
         usual = [_WHOLE_CYCLES * np.sin(np.pi * x[0]) / np.pi]
         if x.size == 2:
             usual.append(_ORDINARY * (x[1] - _USUAL_CORNER))
-        return np.concatenate([self._rest(self._path_of(x, hold)), usual])
+        return np.concatenate([self.rest(self._path_of(x, hold)), usual])
 
-    def _rest(self, path: SignalPath) -> FloatArray:
+    def rest(self, path: SignalPath) -> FloatArray:
         """What the path leaves unexplained, real and imaginary parts."""
+        if self.integral_rad_s is not None:
+            column, target = self._by_reference(path)
+            return np.asarray(target - column * (column @ target / (column @ column)))
         error = (self.torque - sampled_command_response(self.f, path)) * self.weight
         target = np.concatenate([error.real, error.imag])
         if not self.loop_closed:
             return target
         s = 2j * np.pi * self.f
-        own = self.velocity * lag_response(self.f, path.current_bandwidth_hz)
-        own = own * delay_response(self.f, path.loop_delay_s) * self.weight
+        own = self._answered(path) * self.weight
         columns = np.column_stack([own, own / s, own / s**2])
         matrix = np.concatenate([columns.real, columns.imag])
         matrix = matrix / np.linalg.norm(matrix, axis=0)
         q, _ = np.linalg.qr(matrix)
         return np.asarray(target - q @ (q.T @ target))
+
+    def _answered(self, path: SignalPath) -> ComplexArray:
+        """The speed as it comes back as torque, per unit of gain."""
+        own = self.velocity * lag_response(self.f, path.current_bandwidth_hz)
+        return np.asarray(own * delay_response(self.f, path.loop_delay_s))
+
+    def _by_reference(self, path: SignalPath) -> tuple[FloatArray, FloatArray]:
+        """Torque per unit of gain, and the torque; real and imaginary parts."""
+        s = 2j * np.pi * self.f
+        error = sampled_command_response(self.f, path)
+        error = error - self._answered(path) * (1.0 + (self.integral_rad_s or 0.0) / s)
+        both = error * self.weight, self.torque * self.weight
+        column, target = (np.concatenate([x.real, x.imag]) for x in both)
+        return column, target
+
+    def gain(self, path: SignalPath) -> float:
+        """Torque per unit of what was sent."""
+        column, target = self._by_reference(path)
+        return float(column @ target / (column @ column))

@@ -96,6 +96,23 @@ class Sampler:
             self.command[lines], self.told[lines],
         )  # fmt: skip
 
+    def nearest(self, images: int) -> Sampler:
+        """Only so many images to either side: what comes from further off is weak."""
+        rows = slice(max(self.true - images, 0), self.true + images + 1)
+        return Sampler(
+            self.frequency_hz[rows], min(self.true, images), self.torque[rows],
+            self.reported[rows], self.controller[rows], self.seen_as[rows], self.command,
+            self.told,
+        )  # fmt: skip
+
+    def shown(self, plants: ComplexArray, further: ComplexArray | None = None) -> ComplexArray:
+        """As `seen`, for many plants [n, images, lines] at once and without slopes: [n, lines]."""
+        seen_as = self.seen_as if further is None else self.seen_as * further
+        driven = self.torque / (1.0 + self.controller * plants)
+        measured = np.sum(seen_as * plants * driven, axis=-2)
+        own = -np.sum(self.controller * plants * driven, axis=-2)
+        return np.asarray(measured / ((self.command + own) * self.told))
+
     def seen(
         self, plant: ComplexArray, further: ComplexArray | None = None
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:

@@ -27,6 +27,9 @@ _BASE_OVER_RMS = 8.0
 _BASE_LEAST_RAD_S = 12.0
 #: Share of the envelope's speed for the base motion; its way in overshoots.
 _BASE_SHARE = 0.4
+#: Share of the speed that it takes where torque affords it: a load that swings moves the motor
+#: more than a rigid one, by how much nobody knows before.
+_BASE_GLADLY = 0.25
 #: Without a loop, lines rise from this frequency on, up to this factor.
 _RISE_HZ, _RISE_MOST = 120.0, 2.5
 
@@ -112,10 +115,12 @@ def torque_mode(
     own_rms, own_peak = float(np.std(unit_speed)), float(np.max(np.abs(unit_speed)))
     peak_nm = min(share * room.torque_nm, 0.25 * room.speed_rad_s / own_peak)
     wanted = max(_BASE_OVER_RMS * own_rms * peak_nm, _BASE_LEAST_RAD_S)
+    affordable = share * room.torque_nm / (rigid.inertia_kgm2 * slow)
+    gladly = max(wanted, min(affordable, _BASE_GLADLY * room.speed_rad_s))
     # The way in overshoots the steady base motion by about its amplitude.
     travelled = 2.2 / slow
     base_speed = (
-        min(wanted, _BASE_SHARE * room.speed_rad_s, room.travel_rad / travelled) if base else 0.0
+        min(gladly, _BASE_SHARE * room.speed_rad_s, room.travel_rad / travelled) if base else 0.0
     )
     if base and base_speed < 1.0:
         raise ValueError(

@@ -7,7 +7,6 @@ recording is evaluated as if the torque had been injected.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +14,8 @@ import numpy.typing as npt
 
 from backend.analysis.arrays import ComplexArray, FloatArray
 from backend.analysis.frf import Record
-from backend.analysis.sampling import Hold, SignalPath, sampled_command
+from backend.analysis.path_fit import reference_gain
+from backend.analysis.sampling import SignalPath
 from backend.tools import excite
 from backend.tools.recording import Recording
 from backend.tools.speed_integral import integral_hz as found_integral_hz
@@ -55,17 +55,21 @@ def fitting_amplitude(
 
 def as_torque(
     records: tuple[tuple[excite.Sequence, Recording], ...], path: SignalPath,
-    integral_hz: float | None,
+    integral_hz: float | None, *, hold_known: bool,
 ) -> tuple[tuple[excite.Sequence, Recording], ...]:  # fmt: skip
     """The same recordings with the torque in Nm that the reference made in the excitation's place.
 
     ``integral_hz`` is the corner of the loop's integral; None: the recording tells.
+
+    Raises:
+        ValueError: nothing of the torque follows the reference.
     """
     if integral_hz is None:
         integral_hz = found_integral_hz(tuple(_record(s, r) for s, r in records), path)
     whole = [_with_integral(s, integral_hz) for s, _ in records]
     played = [(s, r) for s, (_, r) in zip(whole, records, strict=True)]
-    gain = float(np.mean([_gain(_record(s, r), path) for s, r in played]))
+    taken = tuple(_record(s, r) for s, r in played)
+    gain = reference_gain(taken, path, _TURN * (integral_hz or 0.0), hold_known=hold_known)
     return tuple((_scaled(s, gain), r) for s, r in played)
 
 
@@ -123,25 +127,3 @@ def _rough_gain(record: Record) -> float:
     lines = _Upper.of(record)
     sent, torque = lines.spectrum(record.excitation.samples), lines.spectrum(record.torque)
     return float(np.linalg.norm(torque) / max(float(np.linalg.norm(sent)), 1e-12))
-
-
-def _gain(record: Record, path: SignalPath) -> float:
-    """Nm per rad/s: the sampled torque is gain·(1 + a/s) times the sampled, held reference."""
-    assert record.torque is not None
-    lines = _Upper.of(record)
-    torque = lines.spectrum(record.torque)
-    best: tuple[float, float] | None = None
-    holds: tuple[Hold, ...] = ("zero", "linear")
-    for hold, cycles in itertools.product(holds, np.arange(0.0, 3.01, 0.25)):
-        late = replace(path, hold=hold, command_delay_s=float(cycles) / path.sample_rate_hz)
-        column = lines.spectrum(sampled_command(record.excitation.samples, late))
-        table = np.column_stack([column, column / (1j * lines.f)])
-        table = np.concatenate([table.real, table.imag])
-        goal = np.concatenate([torque.real, torque.imag])
-        found, *_ = np.linalg.lstsq(table, goal, rcond=None)
-        rest = float(np.sum((table @ found - goal) ** 2))
-        if found[0] > 0 and (best is None or rest < best[0]):
-            best = rest, float(found[0])
-    if best is None:
-        raise ValueError("the torque does not follow the reference: its gain cannot be read")
-    return best[1]

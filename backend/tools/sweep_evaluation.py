@@ -113,14 +113,14 @@ def evaluate(
     )
     if settings.kind != "mechanics":
         return _evaluate_loop(records, path, settings, loop)
+    known = settings.hold is not None or facts.interpolates
     if by_speed:
-        records = as_torque(records, path, integral_hz)
+        records = as_torque(records, path, integral_hz, hold_known=known)
     taken = tuple(
         Record(s.excitation, r.velocity_rad_s, r.torque_nm, r.valid, r.position_rad)
         for s, r in records
     )
     quantity: Quantity = "torque_mode" if loop == "none" else "torque_injection"
-    known = settings.hold is not None or facts.interpolates
     found = identify_with_path(taken, path, quantity, hold_known=known)
     path = found.fit.path
     limit = settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm

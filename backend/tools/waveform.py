@@ -13,17 +13,10 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.excitation import (
-    BaseMotion,
-    Excitation,
-    band_limited,
-    chirp_period,
-    choose_lines,
-    multisine,
-    prbs_period,
-    repeated,
-    stepped_sine,
-)
+from backend.analysis.chirp import band_limited, chirp_period
+from backend.analysis.excitation import BaseMotion, Excitation, choose_lines, multisine, repeated
+from backend.analysis.prbs import prbs_period
+from backend.analysis.stepped_sine import stepped_sine
 
 Waveform = Literal["multisine", "chirp", "prbs", "stepped"]
 FloatArray = npt.NDArray[np.float64]

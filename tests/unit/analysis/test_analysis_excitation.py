@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
+from backend.analysis.chirp import chirp
 from backend.analysis.excitation import (
     BaseMotion,
-    chirp,
     choose_lines,
     crest_factor,
     falling_amplitude,
     multisine,
-    prbs,
     scaled,
-    stepped_sine,
 )
+from backend.analysis.prbs import prbs
+from backend.analysis.stepped_sine import stepped_sine
 
 LINES = choose_lines(5.0, 400.0, 1.0, count=150)
 

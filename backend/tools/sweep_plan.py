@@ -1,0 +1,188 @@
+"""What a sweep is to play: whether its settings make sense, which loop is closed, how much fits."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from backend.axis import Axis
+from backend.cyclic import CyclicSession
+from backend.tools import excite, speed_injection
+from backend.tools.axis_facts import AxisFacts
+from backend.tools.gains import read_gains
+from backend.tools.probe import Probed
+from backend.tools.recording import cycle_s
+from backend.tools.sweep_evaluation import Loop, SweepSettings
+from drivers.errors import NotAllowed, OutOfRange
+
+_TURN = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything that was found out before the excitation is made."""
+
+    rate: float
+    facts: AxisFacts
+    loop: Literal["none", "speed", "position"]
+    room: excite.Room
+    rigid: excite.Rigid
+    torque_step_nm: float
+    by_speed: bool = False
+    """Mechanics by the speed loop's reference, where no torque can be added beside the loop."""
+    integral_hz: float | None = None
+
+
+def check(settings: SweepSettings) -> None:
+    """Refuse settings that make no sense.
+
+    Raises:
+        OutOfRange: naming the value and its limit.
+    """
+    if not 0.01 <= settings.share <= 0.9:
+        raise OutOfRange("the excitation takes 1 to 90 % of the permitted torque",
+                         value=settings.share, limit="0.01…0.9")  # fmt: skip
+    if not 1 <= settings.realisations <= 8:
+        raise OutOfRange("1 to 8 realisations are possible", value=settings.realisations,
+                         limit="1…8")  # fmt: skip
+    if settings.excitation == "stepped" and settings.loop == "none":
+        raise OutOfRange("a stepped sine lasts too long for an axis that no loop holds",
+                         remedy="measure it with the speed loop closed")  # fmt: skip
+    if settings.f_min_hz < 3.0:
+        raise OutOfRange("the lowest line must lie above the base motion, at 3 Hz or more",
+                         value=settings.f_min_hz, limit="3 Hz")  # fmt: skip
+    if settings.f_max_hz is not None and settings.f_max_hz < 4 * settings.f_min_hz:
+        raise OutOfRange("the band must span at least two octaves", value=settings.f_max_hz,
+                         limit=f"{4 * settings.f_min_hz:g} Hz or more")  # fmt: skip
+
+
+def chosen_loop(axis: Axis, settings: SweepSettings, probed: Probed) -> Literal["none", "speed"]:
+    """No loop on an axis that stays where it is and whose inertia rules, else the speed loop.
+
+    Where friction takes more of the base motion's torque than inertia, a torque that is off by
+    little makes a speed that is off by much.
+    """
+    drifts = abs(probed.gravity_nm) > max(0.5 * probed.coulomb_nm, 0.01 * probed.rated_nm)
+    if drifts:
+        return held_by_loop(axis, settings.loop, probed.gravity_nm)
+    momentum_nm = excite.base_torque_nm(probed.inertia_kgm2, settings.envelope.speed_rpm)
+    light = 4 / np.pi * probed.coulomb_nm > momentum_nm
+    return "speed" if light and settings.loop == "auto" else "none"
+
+
+def _can_offset(axis: Axis, session: CyclicSession) -> bool:
+    """Whether torque can be injected beside a closed loop."""
+    key = axis.drive.key("torque_offset")
+    return key is not None and session.carries(axis.drive, key)
+
+
+def held_by_loop(axis: Axis, wanted: Loop, pull_nm: float) -> Literal["speed"]:
+    """The loop that holds an axis which a load pulls.
+
+    Raises:
+        NotAllowed: the user wants none.
+    """
+    if wanted == "none":
+        raise NotAllowed(
+            f"{axis.drive.name}: a load of {pull_nm:.3g} Nm pulls the axis, so it cannot be "
+            "measured without a closed loop",
+            drive=axis.drive.name,
+            value=round(pull_nm, 4),
+            remedy="measure with the speed or position loop closed",
+        )
+    return "speed"
+
+
+async def setup_of(
+    axis: Axis, session: CyclicSession, settings: SweepSettings, facts: AxisFacts, loop: str,
+    probed: Probed | None,
+) -> Setup:  # fmt: skip
+    """Everything the excitation needs, from the envelope and what the drive tells.
+
+    Raises:
+        DriveError: a parameter cannot be read.
+    """
+    units, envelope = await axis.units(), settings.envelope
+    rated = facts.rated_torque_nm
+    step = units.torque(1.0) / 100.0 * rated
+    torque_percent = min(envelope.torque_percent, await drive_limit_percent(axis))
+    room = excite.Room(
+        torque_nm=torque_percent / 100.0 * rated,
+        speed_rad_s=envelope.speed_rpm * _TURN / 60.0,
+        travel_rad=envelope.travel_rev * _TURN,
+    )
+    inertia = settings.inertia_kgm2 or (probed.inertia_kgm2 if probed else None)
+    rigid = excite.Rigid(
+        inertia or facts.drive_inertia_kgm2 or 1e-4,
+        probed.coulomb_nm if probed else 0.0,
+        probed.gravity_nm if probed else 0.0,
+    )
+    kind: Literal["none", "speed", "position"] = (
+        "none" if loop == "none" else "position" if loop == "position" else "speed"
+    )
+    by_speed = settings.kind == "mechanics" and kind == "speed" and not _can_offset(axis, session)
+    integral_hz = None
+    if by_speed:
+        with contextlib.suppress(NotAllowed):
+            integral_hz = (await read_gains(axis, facts)).integral_hz
+    return Setup(1.0 / cycle_s(session), facts, kind, room, rigid, step, by_speed, integral_hz)
+
+
+async def drive_limit_percent(axis: Axis) -> float:
+    """The drive's own torque limit: what is asked beyond it does not come."""
+    drive, units = axis.drive, await axis.units()
+    limits = [np.inf]
+    for role in ("torque_limit_positive", "torque_limit_negative", "max_torque"):
+        key = drive.key(role)
+        if key is not None and not drive.unreachable_why(drive.parameter(key)):
+            limits.append(abs(units.torque(await drive.raw(key))))
+    return float(min(limits))
+
+
+def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence, ...]:
+    """The excitation; too little room becomes the user's error."""
+    band = excite.band_for(setup.rate, settings.f_min_hz, settings.f_max_hz)
+    try:
+        if settings.kind != "mechanics":
+            position = settings.kind == "position_loop"
+            amplitude, step = _reference_size(setup, position)
+            return excite.loop_reference(
+                setup.rate, band, setup.room, step, amplitude=amplitude,
+                realisations=settings.realisations, position=position, base=settings.base_motion,
+                waveform=settings.excitation,
+            )  # fmt: skip
+        if setup.loop == "none":
+            return excite.torque_mode(
+                setup.rate, band, setup.room, setup.rigid, setup.torque_step_nm,
+                share=settings.share, realisations=settings.realisations,
+                base=settings.base_motion, waveform=settings.excitation,
+            )  # fmt: skip
+        if setup.by_speed:
+            return speed_injection.sequences(
+                setup.rate, band, setup.room, speed_injection.FIRST_RAD_S, settings.realisations,
+                settings.excitation, base=settings.base_motion,
+            )  # fmt: skip
+        return excite.beside_loop(
+            setup.rate, band, setup.room, setup.torque_step_nm, share=settings.share,
+            realisations=settings.realisations, position=setup.loop == "position",
+            base=settings.base_motion, waveform=settings.excitation,
+        )  # fmt: skip
+    except ValueError as error:
+        raise OutOfRange(
+            f"the envelope does not allow this measurement: {error}",
+            remedy="widen travel, speed or torque of the envelope",
+        ) from error
+
+
+def _reference_size(setup: Setup, position: bool) -> tuple[float, float]:
+    """Amplitude of a loop's reference (rad/s or rad), and 1e-4 of it as its rounding."""
+    speed = 0.15 * setup.room.speed_rad_s
+    # Torque to follow the fall-off corner's acceleration must stay far from the limit, since
+    # lines and resonances add up.
+    corner = _TURN * (20.0 if position else 40.0)
+    speed = min(speed, setup.room.torque_nm / 8.0 / setup.rigid.inertia_kgm2 / corner, 8.0)
+    size = speed / corner if position else speed
+    return size, 0.0

@@ -1,0 +1,133 @@
+"""Playing the sequences of a sweep on an axis, made weaker where its loop takes too much torque."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from backend.analysis.excitation import scaled
+from backend.axis import Axis
+from backend.cyclic import CyclicSession
+from backend.jobs import Progress
+from backend.tools import excite, speed_injection
+from backend.tools.go_back import go_back
+from backend.tools.recording import Play, Recording, bus_limits, enabled, play, quiet, share
+from backend.tools.sweep_evaluation import SweepSettings
+from backend.tools.sweep_plan import Setup
+from drivers.cia402 import Mode
+from drivers.errors import NotAllowed
+
+_TURN = 2 * np.pi
+MODE_OF = {"none": Mode.CST, "speed": Mode.CSV, "position": Mode.CSP}
+#: A loop's reference that took too much torque is played again, this much smaller.
+_ATTEMPTS, _WEAKER = 4, 0.4
+
+
+async def scaled_by_speed(
+    axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
+    sequences: tuple[excite.Sequence, ...], home: int, progress: Progress,
+) -> tuple[excite.Sequence, ...]:  # fmt: skip
+    """The excitation made so large that its torque has the wanted share."""
+    trial = Progress(lambda: progress(0.09, "feeling how much torque the speed loop makes"))
+    ((sent, recording),) = await play_fitting(
+        axis, session, settings, setup, sequences[:1], home, trial
+    )
+    share_nm = settings.share * setup.room.torque_nm
+    peak = speed_injection.fitting_amplitude(sent, recording, setup.room, share_nm)
+    factor = peak / speed_injection.FIRST_RAD_S
+    return tuple(replace(s, excitation=scaled(s.excitation, factor)) for s in sequences)
+
+
+async def _play_all(
+    axis: Axis,
+    session: CyclicSession,
+    settings: SweepSettings,
+    setup: Setup,
+    sequences: tuple[excite.Sequence, ...],
+    home_raw: int,
+    progress: Progress,
+) -> tuple[tuple[excite.Sequence, Recording], ...]:
+    """Every realisation, from the same place as far as the travel asks for it."""
+    units = await axis.units()
+    records: list[tuple[excite.Sequence, Recording]] = []
+    limits = await bus_limits(axis, settings.envelope, home_raw)
+    for number, sequence in enumerate(sequences):
+        away = abs(units.position(await axis.position_raw() - home_raw))
+        if number and away > 0.15 * settings.envelope.travel_rev:
+            await go_back(axis, session, home_raw, settings.envelope, setup.facts)
+        low = 0.1 + 0.85 * number / len(sequences)
+        told = share(progress, low, low + 0.85 / len(sequences),
+                     f"measuring, realisation {number + 1} of {len(sequences)}")  # fmt: skip
+        async with enabled(axis, session, MODE_OF[setup.loop]) as start:
+            if setup.loop != "none":
+                await quiet(axis)
+            sent = await _to_raw(axis, sequence, setup, settings, start)
+            recording = await play(axis, session, sent, limits, setup.facts.rated_torque_nm, told)
+        records.append((await _as_sent(axis, sequence, settings, setup, sent, start), recording))
+    return tuple(records)
+
+
+async def play_fitting(
+    axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
+    sequences: tuple[excite.Sequence, ...], home_raw: int, progress: Progress,
+) -> tuple[tuple[excite.Sequence, Recording], ...]:  # fmt: skip
+    """As `_play_all`; where a loop answers with too much torque the excitation becomes smaller.
+
+    How much torque that takes depends on the loop's gains, which are what is measured.
+    """
+    attempts = _ATTEMPTS if setup.loop != "none" else 1
+    for attempt in range(attempts):
+        try:
+            return await _play_all(axis, session, settings, setup, sequences, home_raw, progress)
+        except NotAllowed as error:
+            if attempt == attempts - 1 or "torque" not in error.message:
+                raise
+        await quiet(axis)
+        await go_back(axis, session, home_raw, settings.envelope, setup.facts)
+        sequences = tuple(replace(s, excitation=scaled(s.excitation, _WEAKER)) for s in sequences)
+    raise AssertionError
+
+
+async def _to_raw(
+    axis: Axis, sequence: excite.Sequence, setup: Setup, settings: SweepSettings, start: int
+) -> Play:
+    units = await axis.units()
+    torque = 1.0 / setup.torque_step_nm
+    speed = units.velocity_raw(1e6) / 1e6 * 60.0 / _TURN
+    place = units.position_raw(1e6) / 1e6 / _TURN
+    samples = sequence.excitation.samples
+    base = np.zeros(samples.size) if sequence.base is None else sequence.base
+    if setup.loop == "none":
+        return Play(Mode.CST, np.round(samples * torque).astype(np.int64))
+    mode = MODE_OF[setup.loop]
+    scale, shift = (place, start) if mode is Mode.CSP else (speed, 0)
+    if settings.kind != "mechanics" or setup.by_speed:
+        return Play(mode, shift + np.round((base + samples) * scale).astype(np.int64))
+    return Play(
+        mode,
+        shift + np.round(base * scale).astype(np.int64),
+        "torque_offset",
+        np.round(samples * torque).astype(np.int64),
+    )
+
+
+async def _as_sent(
+    axis: Axis,
+    sequence: excite.Sequence,
+    settings: SweepSettings,
+    setup: Setup,
+    sent: Play,
+    start: int,
+) -> excite.Sequence:  # fmt: skip
+    """The excitation as the rounded set-points say; estimators must know what really went out."""
+    if settings.kind == "mechanics" and not setup.by_speed:
+        return sequence
+    units = await axis.units()
+    if sent.mode is Mode.CSP:
+        values = (sent.values - start) * (units.position(1.0) * _TURN)
+    else:
+        values = sent.values * (units.velocity(1.0) * _TURN / 60.0)
+    return replace(
+        sequence, excitation=replace(sequence.excitation, samples=np.asarray(values, np.float64))
+    )
