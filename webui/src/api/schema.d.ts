@@ -2749,6 +2749,12 @@ export interface components {
              */
             apply: boolean;
             /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
              * Cycle Ms
              * @description cycle of the exchange that is started where none runs, and ended afterwards
              * @default 1
@@ -4426,6 +4432,12 @@ export interface components {
          * @description Inertia and friction.
          */
         InertiaRequest: {
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
             /**
              * Cycle Ms
              * @description cycle of the exchange that is started where none runs, and ended afterwards
@@ -7032,6 +7044,12 @@ export interface components {
              */
             acceleration: number;
             /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
              * Cycle Ms
              * @description cycle of the exchange that is started where none runs, and ended afterwards
              * @default 1
@@ -7169,6 +7187,12 @@ export interface components {
              * @default true
              */
             base_motion: boolean;
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
             /**
              * Cycle Ms
              * @description cycle of the exchange that is started where none runs, and ended afterwards

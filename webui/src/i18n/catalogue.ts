@@ -11,6 +11,7 @@ import { scene } from './texts/scene'
 import { scope } from './texts/scope'
 import { segment } from './texts/segment'
 import { tuning } from './texts/tuning'
+import { unwatched } from './texts/unwatched'
 
 /** Every text of the page, in every language. A key that is not here does not compile. */
 export const catalogue = {
@@ -27,5 +28,6 @@ export const catalogue = {
   ...scope,
   ...segment,
   ...tuning,
+  ...unwatched,
 }
 export type Key = keyof typeof catalogue

@@ -5,8 +5,8 @@ import { useAxisState, useDrive } from '../../live/store'
 import { dateTime } from '../../widgets/format'
 import { JobNote, useJobEnd } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
-import { useCyclic } from '../motion/SignalPanel'
 import { TRACE_COLORS } from '../scope/channels'
+import { useMeasurable } from './useMeasurable'
 import { MeasuredPanel } from './MeasuredPanel'
 import { MeasurementList } from './MeasurementList'
 import { NotchEditor } from './NotchEditor'
@@ -26,7 +26,7 @@ export function ResponsePage({ drive }: { drive: string }) {
   const summary = useDrive(drive)
   const state = useAxisState(drive)
   const dark = useComputedColorScheme('light') === 'dark'
-  const cyclic = useCyclic(summary, state)
+  const way = useMeasurable(summary, state)
   const { job, note, dismiss } = useToolJob(drive, 'sweep')
   const measured = useMeasurements()
   const [shown, setShown] = useState<string | null>(null)
@@ -50,10 +50,10 @@ export function ResponsePage({ drive }: { drive: string }) {
       <h1>
         {t('page.response')} <small className="dim">{summary.name}</small>
       </h1>
-      {state && !cyclic && <p className="note info">{t('tune.needsCyclic')}</p>}
+      {state && !way.possible && <p className="note info">{t('tune.needsCyclic')}</p>}
       <div className="response-columns">
         <div className="stack">
-          {cyclic && <SweepForm drive={drive} state={state} />}
+          {way.possible && <SweepForm drive={drive} state={state} way={way} />}
           <JobNote id={note} onClose={dismiss} />
           <MeasurementList
             list={measured.list}

@@ -11,13 +11,22 @@ import { useAction } from '../../widgets/useAction'
 import { useRemembered } from '../motion/remembered'
 import { ExcitationPreview } from './ExcitationPreview'
 import { LimitFields, useLimits } from './limits'
+import type { Measurable } from './measurable'
 
 const KINDS = ['mechanics', 'speed_loop', 'position_loop'] as const
 const LOOPS = ['auto', 'none', 'speed', 'position'] as const
 const SIGNALS = ['multisine', 'chirp', 'prbs', 'stepped'] as const
 
 /** What to measure, within which limits, and what will move. */
-export function SweepForm({ drive, state }: { drive: string; state: AxisState | null }) {
+export function SweepForm({
+  drive,
+  state,
+  way,
+}: {
+  drive: string
+  state: AxisState | null
+  way: Measurable
+}) {
   const t = useT()
   const [kind, setKind] = useState<SweepRequest['kind']>('mechanics')
   const [loop, setLoop] = useState<SweepRequest['loop']>('auto')
@@ -45,7 +54,7 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
           share: share / 100,
           realisations: count,
           base_motion: base,
-          cycle_ms: 1,
+          cycle_ms: way.cycleMs,
         }
   const go = () =>
     start.run(async () => {
@@ -65,9 +74,21 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
         label={t('sweep.what')}
         value={kind}
         onChange={(event) => setKind(event.currentTarget.value as SweepRequest['kind'])}
-        data={KINDS.map((each) => ({ value: each, label: t(`sweep.kind.${each}`) }))}
+        data={KINDS.filter((each) => each !== 'position_loop' || !way.bySpeed).map((each) => ({
+          value: each,
+          label: t(`sweep.kind.${each}`),
+        }))}
       />
       <p className="dim">{t(`sweep.help.${kind}`)}</p>
+      {way.bySpeed && (
+        <p className="note info">
+          {t('unwatched.bySpeed', {
+            ms: way.cycleMs,
+            direct: 250 / way.cycleMs,
+            model: 400 / way.cycleMs,
+          })}
+        </p>
+      )}
       <LimitFields of={limits} />
       <details>
         <summary>{t('sweep.more')}</summary>
@@ -84,7 +105,7 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
         />
         <p className="dim">{t(`sweep.excitation.help.${signal}`)}</p>
         <div className="fields">
-          {kind === 'mechanics' && (
+          {kind === 'mechanics' && !way.bySpeed && (
             <NativeSelect
               label={t('sweep.loop')}
               value={loop}
@@ -157,7 +178,7 @@ export function SweepForm({ drive, state }: { drive: string; state: AxisState | 
       )}
       <Button
         variant="filled"
-        disabled={!request || state?.moving_job != null || !state?.fresh}
+        disabled={!request || !limits.agreed || state?.moving_job != null || !state?.fresh}
         loading={start.busy}
         onClick={() => void go()}
       >

@@ -2,12 +2,12 @@ import { useT } from '../../i18n'
 import { useAxisState, useDrive } from '../../live/store'
 import { useJobEnd } from '../../widgets/JobNote'
 import { useBuses } from '../connect/useBuses'
-import { useCyclic } from '../motion/SignalPanel'
 import { useLimits } from '../response/limits'
 import '../response/response.css'
 import { asAutotune, asInertia } from '../response/results'
 import { useChanges } from '../response/undo'
 import { useGains } from '../response/useGains'
+import { useMeasurable } from '../response/useMeasurable'
 import { useMeasurements } from '../response/useMeasurements'
 import { useToolJob } from '../response/useToolJob'
 import { AutotunePanel } from './AutotunePanel'
@@ -27,7 +27,7 @@ export function TunePage({ drive }: { drive: string }) {
   const summary = useDrive(drive)
   const state = useAxisState(drive)
   const { buses, refresh } = useBuses()
-  const possible = useCyclic(summary, state)
+  const { possible } = useMeasurable(summary, state)
   const limits = useLimits(drive)
   const gains = useGains(drive)
   const measured = useMeasurements('')
@@ -89,7 +89,12 @@ export function TunePage({ drive }: { drive: string }) {
           </div>
           {possible && (
             <div id="step-inertia">
-              <InertiaPanel drive={drive} state={state} limits={limits.limits} able={able} />
+              <InertiaPanel
+                drive={drive}
+                state={state}
+                limits={limits.agreed ? limits.limits : null}
+                able={able}
+              />
             </div>
           )}
           <div id="step-gains">
@@ -101,7 +106,7 @@ export function TunePage({ drive }: { drive: string }) {
             <AutotunePanel
               drive={drive}
               state={state}
-              limits={limits.limits}
+              limits={limits.agreed ? limits.limits : null}
               able={able}
               onChanged={() => void gains.read()}
             />
@@ -109,7 +114,7 @@ export function TunePage({ drive }: { drive: string }) {
           {possible && (
             <StepPanel
               drive={drive}
-              limits={limits.limits}
+              limits={limits.agreed ? limits.limits : null}
               able={able}
               stored={ours.filter((each) => each.kind === 'step')}
             />
