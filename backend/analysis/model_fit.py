@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.arrays import BoolArray, FloatArray
+from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray
 from backend.analysis.chain_model import (
     LOAD_PARAMETERS,
     chain_of_modes,
@@ -44,7 +44,7 @@ _WORTHWHILE, _MODES_GAIN = 10.0, 60.0
 #: Antiresonances that are tried, from this multiple of the lowest line.
 _LOWEST_TRIED = 1.3
 #: A first look takes about twice so many lines and so many steps; so many starts get further.
-_COARSE_LINES, _COARSE_STEPS, _FINISHED = 40, 12, 3
+_COARSE_LINES, _COARSE_STEPS, _FINISHED = 40, 12, 4
 #: Lines with less coherence take no part, and none is believed to be more accurate than this.
 _LEAST_COHERENCE, _FLOOR = 0.6, 0.01
 #: Starts nearer to each other than this (logarithm of their frequencies) lead to the same place,
@@ -52,6 +52,8 @@ _LEAST_COHERENCE, _FLOOR = 0.6, 0.01
 _APART, _APART_FOLDED, _FOLDED = 0.5, 0.12, 4
 #: Below this misfit mechanics are there, and delays and filter are free.
 _FREED = 0.1
+#: A start is moved by this much (cycles) to where its delay fits.
+_LATE = 0.1
 #: Images to either side of a line that are looked at in a search.
 _IMAGES = 2
 #: Inertia of one more load, relative to the one that it hangs on.
@@ -234,7 +236,10 @@ def _with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
         new = _new_loads(found.x, place, grid_hz, worst_hz)
         plants = responses_with_load(found.x, place, new, every.ravel())
         seen = sampler.shown(plants.reshape(-1, *every.shape) * late, further)
-        error = np.abs(np.log(seen / view.g[lines])) * weight
+        rest, gain, cycles = _without_gain_and_delay(
+            np.log(seen / view.g[lines]), f * problem.period_s, weight
+        )
+        error = np.abs(rest) * weight
         costs = np.sum(np.sqrt(1.0 + error**2 / 9.0) - 1.0, axis=1)
         for i in np.argsort(costs)[:150]:
             kept, inertia, stiffness, damping = (float(v) for v in new[i])
@@ -242,7 +247,10 @@ def _with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
                 _Trial(
                     float(costs[i]), place, np.log(stiffness / inertia) / 2,
                     np.log(inertia / kept),
-                    with_load(found.x, place, (kept, inertia, stiffness, damping)),
+                    _adjusted(
+                        with_load(found.x, place, (kept, inertia, stiffness, damping)),
+                        float(gain[i]), float(cycles[i]),
+                    ),
                 )
             )  # fmt: skip
     ranked = sorted(trials, key=lambda t: t.cost)
@@ -253,6 +261,29 @@ def _with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
         apart = _APART if count == 1 else _APART_FOLDED
         chosen += _different(here, chosen, count, apart)
     return [t.x for t in chosen + _different(ranked, chosen, 1)]
+
+
+def _without_gain_and_delay(
+    logs: ComplexArray, cycles: FloatArray, weight: FloatArray
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """What is left of logarithms [n, lines] without a common gain and delay, and these two [n].
+
+    ``cycles`` are the lines' frequencies times the sampling period, in which the delay is counted.
+    """
+    squared = weight**2
+    gain = logs.real @ squared / np.sum(squared)
+    turn = TURN * cycles
+    late = -(logs.imag @ (squared * turn)) / np.sum(squared * turn**2)
+    late = np.clip(late, -_LATE, _LATE)
+    return np.asarray(logs - gain[:, None] + 1j * late[:, None] * turn), gain, late
+
+
+def _adjusted(x: FloatArray, gain: float, cycles: float) -> FloatArray:
+    """A chain whose response is smaller by the logarithm ``gain`` and comes earlier by cycles."""
+    out = x.copy()
+    out[[0, 1, *range(RIGID_PARAMETERS, x.size)]] += gain
+    out[2:4] -= cycles
+    return out
 
 
 def _with_one_more_mode(problem: Problem, found: Found) -> list[FloatArray]:
