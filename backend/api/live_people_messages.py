@@ -73,13 +73,16 @@ class Pointer(Message):
 class PlotCursor(Message):
     """Where on a plot this person points, in what its axis shows; null when they do not.
 
-    On the scope that is the time of the samples (``t0_s``), which is the same on every page
-    whatever each of them counts as zero; elsewhere the frequency in Hz or the time in s.
+    On the scope, its spectrogram and its X-Y plot that is the time of the samples (``t0_s``),
+    which is the same on every page whatever each of them shows and counts as zero; elsewhere the
+    frequency in Hz or the time in s. ``y`` is the frequency in Hz where the spectrogram is pointed
+    at, else null.
     """
 
     type: Literal["plot_cursor"] = "plot_cursor"
     plot: PlotName
     x: float | None = Field(allow_inf_nan=False)
+    y: float | None = Field(default=None, allow_inf_nan=False)
 
 
 class Chat(Message):
@@ -203,6 +206,7 @@ class CursorMoved(Message):
     person: str
     plot: PlotName
     x: float | None
+    y: float | None = None
 
 
 class ChatLine(Message):

@@ -82,16 +82,40 @@ def _axis(axis: dict[str, Any]) -> str:
         f"<td>{_e(r['error'] or when(r['time']) if r['time'] else r['error'])}"
         for r in axis["parameters"]
     )
-    identity = {k: v for k, v in axis.items() if k not in ("parameters", "state")}
+    apart = ("parameters", "state", "past_faults")
+    identity = {k: v for k, v in axis.items() if k not in apart}
     shown = {k: v for k, v in state.items() if k != "faults"}
     name = f"parameters/{axis['drive']}.csv"
     return (
         f"<h2>{_e(axis['name'])}</h2>{faults or '<p>No fault.</p>'}{_pairs(identity)}"
+        f"{_remembered(axis['past_faults'])}"
         f"<details><summary>State</summary>{_pairs(shown)}</details>"
         f"<details><summary>{len(axis['parameters'])} parameters</summary>"
         f'<p><a href="{_e(name)}">{_e(name)}</a></p><table><tr><th>Key<th>Name<th>Value<th>Read'
         f"{rows}</table></details>"
     )
+
+
+def _remembered(past: dict[str, Any]) -> str:
+    """The drive's own record of faults, with what it froze at each."""
+    if past["why"]:
+        return f"<p>Faults that the drive remembers: {_e(past['why'])}.</p>"
+    rows = "".join(
+        f"<tr><td>{_e(r['name'])}<td>{_e(r['code'])} {_e(r['title'])}<td>"
+        + (_e(r["error"]) or "; ".join(_e(_frozen(v)) for v in r["values"]))
+        for r in past["records"]
+    )
+    if not rows:
+        return "<p>The drive remembers no fault.</p>"
+    return (
+        "<h3>Faults that the drive remembers</h3>"
+        f"<table><tr><th>Record<th>Fault<th>Frozen with it{rows}</table>"
+    )
+
+
+def _frozen(value: dict[str, Any]) -> str:
+    shown = f"no answer ({value['error']})" if value["error"] else f"{value['value']}"
+    return f"{value['name']} {shown} {value['unit'] or ''}".strip()
 
 
 def _pairs(content: dict[str, Any]) -> str:

@@ -241,8 +241,11 @@ class FaultCapture:
         members = list(self._bench.members.values())
         states = [facts.state(member) for member in members]
         clock = {"sample_s": time.monotonic(), "epoch_s": time.time()}
-        rows = await asyncio.gather(
-            *(facts.parameters(m, fresh=True, timeout_s=READ_TIMEOUT_S) for m in members)
+        rows, pasts = await asyncio.gather(
+            asyncio.gather(
+                *(facts.parameters(m, fresh=True, timeout_s=READ_TIMEOUT_S) for m in members)
+            ),
+            asyncio.gather(*(facts.past_faults(m, timeout_s=READ_TIMEOUT_S) for m in members)),
         )
         taps = [t for t in dict.fromkeys(tap for tap, _ in blocks) if self._known(t)]
         return Evidence(
@@ -250,8 +253,11 @@ class FaultCapture:
             time=when,
             version=__version__,
             axes=[
-                facts.identity(self._bench, member) | {"state": state, "parameters": parameters}
-                for member, state, parameters in zip(members, states, rows, strict=True)
+                facts.identity(self._bench, member)
+                | {"state": state, "parameters": parameters, "past_faults": past}
+                for member, state, parameters, past in zip(
+                    members, states, rows, pasts, strict=True
+                )
             ],
             links=facts.links(self._bench, members),
             log=self._bench.journal.entries()[:LOG_ENTRIES],

@@ -10,7 +10,8 @@ from typing import Any
 
 from backend import parameter_set
 from backend.bench import Bench, Member
-from backend.drive import Reading
+from backend.drive import Drive, Reading
+from backend.fault_history import PastFault, history_of, read_history
 from drivers.errors import DriveError
 
 
@@ -56,6 +57,39 @@ def _row(member: Member, reading: Reading | None, key: str) -> dict[str, Any]:
         return row | {"raw": None, "value": None, "time": None, "error": "not read"}
     raw, value = _plain(reading.raw), _plain(reading.value)
     return row | {"raw": raw, "value": value, "time": reading.time, "error": reading.error}
+
+
+async def past_faults(member: Member, *, timeout_s: float) -> dict[str, Any]:
+    """The drive's own fault record as far as reading is enough: ``records``, or ``why`` not.
+
+    A record that is chosen by a write is left alone: nobody asked for a write.
+    """
+    drive, history = member.drive, history_of(member.drive)
+    if history is None or history.kind == "unreadable":
+        return {"records": [], "why": "the drive has no record that can be read"}
+    if history.kind == "selected":
+        why = f"a record is chosen by writing {history.select_key}: read it on the Alarms page"
+        return {"records": [], "why": why}
+    try:
+        async with asyncio.timeout(timeout_s):
+            found = await read_history(member.axis)
+    except (DriveError, TimeoutError) as error:
+        return {"records": [], "why": str(error) or f"no answer within {timeout_s:g} s"}
+    return {"records": [_past(drive, each) for each in found], "why": ""}
+
+
+def _past(drive: Drive, past: PastFault) -> dict[str, Any]:
+    return {
+        "name": past.name,
+        "code": past.code_text,
+        "title": past.fault.name if past.fault else "",
+        "error": past.error,
+        "values": [
+            {"key": r.key, "name": drive.parameter(r.key).name,
+             "unit": drive.parameter(r.key).unit, "value": _plain(r.value), "error": r.error}
+            for r in past.values
+        ],
+    }  # fmt: skip
 
 
 def _plain(value: object) -> object:

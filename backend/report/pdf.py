@@ -1,8 +1,8 @@
 """A report as a PDF on A4.
 
-Latin text is set in Bitstream Vera, which the library carries and embeds. What that has no
-glyphs for, Chinese above all, is set in STSong-Light, one of the fonts that PDF readers bring
-themselves (PDF 32000-1, 9.7.5.2: predefined CMap UniGB-UCS2-H).
+Text is set in DejaVu Sans, and what that has no glyphs for, Chinese above all, in Droid Sans
+Fallback (fonts/README.md). The characters that occur are embedded, so that a report looks the same
+everywhere and in many years.
 """
 
 from __future__ import annotations
@@ -14,14 +14,12 @@ from pathlib import Path as FilePath
 from typing import Any
 from xml.sax.saxutils import escape
 
-import reportlab
 from reportlab.lib.colors import HexColor
 from reportlab.lib.enums import TA_LEFT, TA_RIGHT
 from reportlab.lib.pagesizes import A4
 from reportlab.lib.styles import ParagraphStyle
 from reportlab.lib.units import mm
 from reportlab.pdfbase import pdfmetrics
-from reportlab.pdfbase.cidfonts import UnicodeCIDFont
 from reportlab.pdfbase.ttfonts import TTFont
 from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import (
@@ -49,7 +47,8 @@ from backend.report.document import (
 from backend.report.plot import Area, Drawing, Label, Line, Path, Shape, draw
 from backend.report.texts import Words
 
-_PLAIN, _BOLD, _WIDE = "Vera", "VeraBd", "STSong-Light"
+_PLAIN, _BOLD, _WIDE = "DejaVuSans", "DejaVuSans-Bold", "DroidSansFallbackFull"
+_FONTS = FilePath(__file__).parent / "fonts"
 _MARGIN, _FOOT = 18 * mm, 16 * mm
 _INNER = A4[0] - 2 * _MARGIN
 _TONES = {"good": ("#1d7a45", "#e9f6ee"), "warn": ("#b36b00", "#fdf3e1"),
@@ -58,17 +57,15 @@ _TONES = {"good": ("#1d7a45", "#e9f6ee"), "warn": ("#b36b00", "#fdf3e1"),
 
 @cache
 def _fonts() -> frozenset[int]:
-    """Register the fonts once; returns the characters that Vera has."""
-    folder = FilePath(reportlab.__file__).parent / "fonts"
-    plain = TTFont(_PLAIN, folder / "Vera.ttf")
-    pdfmetrics.registerFont(plain)
-    pdfmetrics.registerFont(TTFont(_BOLD, folder / "VeraBd.ttf"))
-    pdfmetrics.registerFont(UnicodeCIDFont(_WIDE))
-    return frozenset(plain.face.charToGlyph)
+    """Register the fonts once; returns the characters that the plain one has."""
+    fonts = {name: TTFont(name, _FONTS / f"{name}.ttf") for name in (_PLAIN, _BOLD, _WIDE)}
+    for font in fonts.values():
+        pdfmetrics.registerFont(font)
+    return frozenset(fonts[_PLAIN].face.charToGlyph)
 
 
 def _runs(text: str) -> list[tuple[bool, str]]:
-    """Stretches that Vera can set (True) and those that it cannot."""
+    """Stretches that the plain font can set (True) and those that it cannot."""
     known = _fonts()
     return [(has, "".join(part)) for has, part in groupby(text, key=lambda c: ord(c) in known)]
 

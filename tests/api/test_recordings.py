@@ -247,6 +247,7 @@ def test_fault_freezes_the_last_seconds(station: Station, x: str) -> None:
     assert sum(1 for row in settings if row["raw"]) > 50
     assert "connected X" in log
     assert facts["axes"][0]["state"]["faults"][0]["code"] in page
+    assert "the drive has no record that can be read" in page, "004:1648 prints no object"
 
 
 def test_bundle_by_hand(station: Station, x: str) -> None:

@@ -37,7 +37,7 @@ def test_killed_server_leaves_a_recording_up_to_the_last_second(
     until(lambda: listed(server)["samples"] > 500, 30, "samples are recorded")
     time.sleep(1)  # the second that must be on the disk when the next one is lost
     seen = listed(server)
-    time.sleep(1)
+    time.sleep(1)  # the last one, of which nothing is asked
     server.kill()
 
     again = ServerProcess(tmp_path / "state")

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-import pytest
-from playwright.sync_api import Page, expect
+import socket
+from collections.abc import Iterator
+from pathlib import Path
 
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.conftest import LAPTOP, _open
 from tests.browser.driving import Bench
+from tests.store.test_sharing import NAME, measurement
+from tests.support.postgres import Postgres, binaries
 from tests.support.station import Station
 
 GAIN = "2005:03"
@@ -127,3 +134,51 @@ def test_the_audit_says_who_wrote_what(laptop: Page, bench: Bench) -> None:
     laptop.get_by_role("main").get_by_label("Axis").select_option("X")
     laptop.get_by_label("Search").fill("no such words")
     expect(laptop.get_by_text("No entry fits.")).to_be_visible()
+
+
+# --- stations that share one library -----------------------------------------------------
+
+
+@pytest.fixture
+def halls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Station, Station]]:
+    """Two stations without drives on one database server; the first has a measurement."""
+    found = binaries()
+    if found is None:
+        pytest.skip("PostgreSQL is not installed: a library cannot be shared")
+    server = Postgres(found)
+    database, running = server.new_database(), []
+    try:
+        for name in ("hall-1", "hall-2"):
+            monkeypatch.setattr(socket, "gethostname", lambda name=name: name)
+            station = Station(tmp_path / name, database=database, blobs=str(tmp_path / "blobs"))
+            station.start_server()
+            running.append(station)
+        folder = tmp_path / "hall-1" / "state" / "measurements"
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / NAME).write_bytes(measurement(samples=1000))
+        yield running[0], running[1]
+    finally:
+        for station in running:
+            station.stop_server()
+        server.remove()
+
+
+def test_a_measurement_is_shared_and_copied_by_the_buttons(
+    browser: Browser, halls: tuple[Station, Station], tmp_path: Path
+) -> None:
+    one, two = halls
+    for page in _open(browser, one.url, **LAPTOP):
+        open_files(page)
+        page.get_by_role("button", name=f"Copy {NAME} into the shared library").click()
+        # The copy is an entry of its own, beside the file of this station.
+        expect(page.get_by_role("article").filter(has_text=NAME)).to_have_count(2)
+        expect(page.get_by_role("alert")).to_have_count(0)
+    for page in _open(browser, two.url, **LAPTOP):
+        open_files(page)
+        page.get_by_role("button", name=f"{NAME} to this station, to open it").click()
+        expect(page.get_by_role("button", name="into the shared library")).to_be_visible()
+        expect(page.get_by_role("alert")).to_have_count(0)
+    (copied,) = (tmp_path / "hall-2" / "state" / "measurements").glob("*.sdmeas")
+    assert (
+        copied.read_bytes() == (tmp_path / "hall-1" / "state" / "measurements" / NAME).read_bytes()
+    )

@@ -88,7 +88,7 @@ def person(opened: Open, bench: Bench, role: Role, page: str = "motion") -> Page
     return shown
 
 
-def button(page: Page, name: str) -> Locator:
+def button(page: Page | Locator, name: str) -> Locator:
     return page.get_by_role("button", name=name, exact=True)
 
 
@@ -247,6 +247,10 @@ def invited(host: Page, opened: Open, bench: Bench, *allowed: str) -> Page:
     told = host.locator(".note.info")
     link = told.locator(".mono").first.inner_text()
     code = told.locator("strong.mono").inner_text()
+    host.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    button(told, "Copy").click()
+    expect(button(told, "Copied")).to_be_visible()
+    assert host.evaluate("navigator.clipboard.readText()") == link
     guest = opened(link.split("/", 3)[3])
     guest.get_by_label("Code").fill(code.lower().replace("-", " "))
     button(guest, "Come in").click()
@@ -298,6 +302,16 @@ def test_a_guest_looks_and_is_seen_and_nothing_more(opened: Open, bench: Bench) 
     expect(cursor).to_have_count(0)
     over.hover()
     expect(cursor).to_be_visible()
+    # At the same moment of an X–Y plot, and on a spectrogram at the same frequency as well.
+    button(guest, "Follow").click()
+    for page in (olaf, guest):
+        page.get_by_label("Time shown").select_option("60")
+    for tab, plot in (("X–Y", ".xy-plot"), ("Spectrogram", ".heat-map")):
+        for page in (olaf, guest):
+            page.get_by_text(tab, exact=True).click()
+        guest.locator(f"{plot} .over").hover()
+        expect(olaf.locator(f"{plot} .shared-cursor.point")).to_be_visible()
+        expect(olaf.locator(".time-plot .shared-cursor")).to_be_visible()
     # Chat stays text, whatever is in it.
     olaf.evaluate("location.hash = '#/people'")
     guest.evaluate("location.hash = '#/people'")

@@ -37,6 +37,20 @@ viscous_nms = 2e-4
 coulomb_nm = 0.03
 """
 LIMITS = {"travel_limit": 20, "speed_limit": 1500, "torque_limit": 250}
+#: Resolves when smooth scrolling has ended: for five pictures nothing has moved.
+AT_REST = """() => new Promise((done) => {
+    let [last, same] = ['', 0]
+    const look = () => {
+        const parts = [...document.querySelectorAll('main, .scope-tabs')]
+        const now = [scrollY, ...parts.flatMap((e) => [e.scrollTop, e.scrollLeft])].join()
+        same = now === last ? same + 1 : 0
+        last = now
+        if (same >= 5) done(null)
+        else requestAnimationFrame(look)
+    }
+    look()
+})"""
+SCROLLED = "() => scrollY + document.querySelector('main').scrollTop"
 #: A run of one second of the axis' time may take many of a busy computer's.
 LONG_MS = 90_000
 VELOCITY, POSITION, TORQUE, TARGET = "c1", "c2", "c3", "c4"
@@ -283,13 +297,118 @@ def test_a_text_that_is_no_expression_is_said_to_be_none(page: Page) -> None:
     expect(page.get_by_role("button", name="Channels (3)")).to_be_visible()
 
 
+class Fingers:
+    """Touches of a page, as its screen tells of them."""
+
+    def __init__(self, page: Page) -> None:
+        self._session = page.context.new_cdp_session(page)
+
+    def touch(self, kind: str, *places: tuple[float, float]) -> None:
+        points = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(places)]
+        self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    def move(self, *ways: tuple[tuple[float, float], tuple[float, float]], steps: int = 4) -> None:
+        """Put fingers down, move each along its way, and lift them."""
+        self.touch("touchStart", *(begin for begin, _ in ways))
+        for step in range(1, steps + 1):
+            part = step / steps
+            self.touch(
+                "touchMove",
+                *((a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])) for a, b in ways),
+            )
+        self.touch("touchEnd")
+
+
+def cursor_times(page: Page) -> tuple[float, float]:
+    first, second = (
+        float(page.get_by_label(f"Cursor {name}").input_value()) for name in ("A", "B")
+    )
+    return first, second
+
+
+def stretch_in_sight(page: Page) -> tuple[float, float]:
+    """Begin and end: new cursors stand at one and at two thirds of it."""
+    page.get_by_role("button", name="Cursors").click()
+    a, b = cursor_times(page)
+    page.get_by_role("button", name="Cursors").click()
+    return a - (b - a), b + (b - a)
+
+
+def two_fingers_zoom(page: Page) -> None:
+    """Beside each other they zoom and move time, one above the other the scales."""
+    page.get_by_label("Time shown").select_option("5")
+    page.get_by_role("button", name="Pause").click()
+    plot = page.locator(".time-plot .u-over")
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    assert box is not None
+    across, up = (
+        (lambda part: box["x"] + part * box["width"]),
+        (lambda part: box["y"] + (1 - part) * box["height"]),
+    )
+    fingers = Fingers(page)
+    begin, end = stretch_in_sight(page)
+    assert end - begin == pytest.approx(5, rel=0.02)
+    middle = up(0.5)
+    fingers.move(((across(0.4), middle), (across(0.3), middle)),
+                 ((across(0.6), middle), (across(0.7), middle)))  # fmt: skip
+    nearer = stretch_in_sight(page)
+    assert nearer[1] - nearer[0] == pytest.approx((end - begin) / 2, rel=0.03)
+    assert sum(nearer) / 2 == pytest.approx((begin + end) / 2, abs=0.05)
+    fingers.move(((across(0.2), middle), (across(0.4), middle)),
+                 ((across(0.6), middle), (across(0.8), middle)))  # fmt: skip
+    moved = stretch_in_sight(page)
+    wide = nearer[1] - nearer[0]
+    assert moved[0] == pytest.approx(nearer[0] - 0.2 * wide, abs=0.03 * wide)
+    assert moved[1] - moved[0] == pytest.approx(wide, rel=0.03)
+    assert page.evaluate("visualViewport.scale") == 1, "the page itself is not zoomed"
+    scales = page.locator(".scales summary")
+    assert scales.inner_text().count("follows the traces") == 3
+    fingers.move(((across(0.5), up(0.4)), (across(0.5), up(0.3))),
+                 ((across(0.5), up(0.6)), (across(0.5), up(0.7))))  # fmt: skip
+    expect(scales).not_to_contain_text("follows the traces")
+    assert stretch_in_sight(page) == pytest.approx(moved, abs=0.02 * wide), "time is as it was"
+    page.get_by_role("button", name="Autoscale").click()
+    expect(scales).to_contain_text("follows the traces")
+
+
+def one_finger_moves_cursors(page: Page) -> None:
+    """It drags and taps them; scrolling and zooming over them leaves them where they are."""
+    page.get_by_role("button", name="Cursors").click()
+    plot = page.locator(".time-plot .u-over")
+    box = plot.bounding_box()
+    assert box is not None
+    (x, y), wide, high = (box["x"], box["y"]), box["width"], box["height"]
+    a, b = cursor_times(page)
+    third = b - a
+    fingers = Fingers(page)
+    fingers.move(((x + wide / 3, y + high / 2), (x + wide / 6, y + high / 2)))
+    assert cursor_times(page) == pytest.approx((a - third / 2, b), abs=third / 10), "A is dragged"
+    page.touchscreen.tap(x + 0.9 * wide, y + high / 2)
+    tapped = cursor_times(page)
+    assert tapped == pytest.approx((a - third / 2, b + 0.7 * third), abs=third / 10), "B is tapped"
+    fingers.move(((x + wide / 2, y + high / 2), (x + 0.45 * wide, y + high / 2)),
+                 ((x + 0.7 * wide, y + high / 2), (x + 0.75 * wide, y + high / 2)))  # fmt: skip
+    assert cursor_times(page) == tapped, "two fingers zoom"
+    before = page.evaluate(SCROLLED)
+    fingers.move(((x + wide / 2, y + 0.8 * high), (x + wide / 2, y + 0.3 * high)), steps=8)
+    page.evaluate(AT_REST)
+    assert page.evaluate(SCROLLED) > before + 50, "the page scrolls"
+    assert cursor_times(page) == tapped
+    page.get_by_role("button", name="Cursors").click()
+
+
 def test_on_a_phone(browser: Browser, cable: Cable, axis: str) -> None:
     for page in _open(browser, cable.url, **PHONE):
         page.evaluate("location.hash = '#/scope'")
         figure(page, VELOCITY, "min").wait_for()
+        # As much as is to be looked at must have come.
+        expect(figure(page, POSITION, "rms")).not_to_have_text("—")
+        two_fingers_zoom(page)
+        one_finger_moves_cursors(page)
         page.get_by_label("Trigger", exact=True).select_option("normal")
         for tab in ("Spectrum", "Spectrogram", "X–Y", "Maths", "Keep", "Measurements"):
             page.get_by_text(tab, exact=True).click()
-            page.wait_for_timeout(400)  # smooth scrolling
+            page.evaluate(AT_REST)
             assert page.evaluate(TOO_SMALL) == [], tab
             assert page.evaluate(SIDEWAYS) == 0, tab

@@ -45,10 +45,13 @@ class Station:
         people: People | None = None,
         *,
         steady: bool = False,
+        database: str | None = None,
+        blobs: str | None = None,
     ) -> None:
         """With ``steady`` replies on EtherCAT are awaited, as in the demo: a busy machine is then
-        no trouble for the drives.
+        no trouble for the drives. ``database`` and ``blobs`` are those of `backend.bench.Bench`.
         """
+        self._records = {"database": database, "blobs": blobs}
         self.people = people
         self.loop: asyncio.AbstractEventLoop | None = None
         self.folder = folder
@@ -73,7 +76,7 @@ class Station:
         def run() -> None:
             async def main() -> None:
                 self.loop = asyncio.get_running_loop()
-                bench = Bench(self.folder / "state", self.drives.wires)
+                bench = Bench(self.folder / "state", self.drives.wires, **self._records)
                 config = uvicorn.Config(
                     make_app(bench, hosts=LOOPBACK, people=self.people),
                     log_level="warning",

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from backend.axis import Axis
+from backend.bench import Member
 from backend.drive import Drive, Port
 from backend.fault_history import named_fault, read_history
+from backend.recording.facts import past_faults
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address
 from profiles import load_profile
@@ -14,6 +18,9 @@ from profiles.functions import FaultHistory, Functions, HistorySlot
 from profiles.schema import Fault, Parameter, Profile
 from tests.support.memory_link import MemoryLink
 from tests.unit.backend.conftest import SPEC, changed
+
+#: A support bundle asks the drive, not what the monitor last saw of it.
+NO_MONITOR: Any = None
 
 
 def _with(profile: Profile, history: FaultHistory | None) -> Profile:
@@ -122,6 +129,23 @@ async def test_nothing_is_pretended(
 ) -> None:
     with pytest.raises(NotAllowed, match="no fault history"):
         await read_history(_axis(profile, link, history))
+
+
+async def test_a_support_bundle_takes_what_reading_alone_brings(
+    profile: Profile, link: MemoryLink
+) -> None:
+    link.objects |= {(0x200A, 0x13): b"\2\0", (0x200A, 0x14): b"\0\0", (0x200A, 0x16): b"\x37\1"}
+    axis = _axis(profile, link, _slots())
+    found = await past_faults(Member(axis.drive, axis, NO_MONITOR), timeout_s=5)
+    (record,) = found["records"]
+    assert (record["code"], record["title"], record["values"][0]["value"]) == (
+        "Er.002", "Overvoltage", 0x137,
+    )  # fmt: skip
+    axis = _axis(profile, link, _selected())
+    found = await past_faults(Member(axis.drive, axis, NO_MONITOR), timeout_s=5)
+    assert found["records"] == []
+    assert "writing 200D:24" in found["why"]
+    assert link.written == [], "nobody asked for a write"
 
 
 def test_codes_of_the_families() -> None:

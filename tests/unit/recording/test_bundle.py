@@ -65,6 +65,13 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
         "drive": "x0",
         "name": "X0",
         "state": {"state": "Fault", "faults": []},
+        "past_faults": {"why": "", "records": [
+            {"name": "last fault", "code": "Er.002", "title": "Overvoltage", "error": "",
+             "values": [{"key": "200A:16", "name": "DC voltage", "unit": "V", "value": 411.2,
+                         "error": None}]},
+            {"name": "second fault", "code": "", "title": "", "values": [],
+             "error": "no answer"},
+        ]},
         "parameters": [
             {"key": "2002:01", "name": "Gain", "unit": "rad/s", "raw": 20, "value": 20,
              "time": 1_700_000_000.0, "error": ""}
@@ -101,6 +108,8 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
     # Two channels of every cycle, and of what was read one by one that which changed.
     assert page.count("<polyline") == 3
     assert "<h3>X0 DC voltage [V]</h3>" in page
+    assert "<td>last fault<td>Er.002 Overvoltage<td>DC voltage 411.2 V" in page
+    assert "<td>second fault<td> <td>no answer" in page
     assert "310 … 312, 2.000 s" in page
     assert len(table) == 31
     with RecordingReader(tmp_path / "samples.sdrec") as reader:

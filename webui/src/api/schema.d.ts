@@ -3243,6 +3243,11 @@ export interface components {
             type: "cursor_moved";
             /** X */
             x: number | null;
+            /**
+             * Y
+             * @default null
+             */
+            y: number | null;
         };
         /**
          * CyclicInfo
@@ -5669,8 +5674,10 @@ export interface components {
          * PlotCursor
          * @description Where on a plot this person points, in what its axis shows; null when they do not.
          *
-         *     On the scope that is the time of the samples (``t0_s``), which is the same on every page
-         *     whatever each of them counts as zero; elsewhere the frequency in Hz or the time in s.
+         *     On the scope, its spectrogram and its X-Y plot that is the time of the samples (``t0_s``),
+         *     which is the same on every page whatever each of them shows and counts as zero; elsewhere the
+         *     frequency in Hz or the time in s. ``y`` is the frequency in Hz where the spectrogram is pointed
+         *     at, else null.
          */
         PlotCursor: {
             /**
@@ -5686,6 +5693,11 @@ export interface components {
             type: "plot_cursor";
             /** X */
             x: number | null;
+            /**
+             * Y
+             * @default null
+             */
+            y: number | null;
         };
         /**
          * Pointer

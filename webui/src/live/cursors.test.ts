@@ -14,16 +14,34 @@ function here(state: InvitationView['state'], pages: Record<string, string>): Pe
   }
 }
 
-const cursor = (connection: string, x: number | null, plot: CursorMoved['plot'] = 'response') =>
-  ({ type: 'cursor_moved', connection, person: `P ${connection}`, plot, x }) satisfies CursorMoved
+const cursor = (
+  connection: string,
+  x: number | null,
+  plot: CursorMoved['plot'] = 'response',
+  y: number | null = null,
+) =>
+  ({
+    type: 'cursor_moved',
+    connection,
+    person: `P ${connection}`,
+    plot,
+    x,
+    y,
+  }) satisfies CursorMoved
 
 describe('cursors of others', () => {
   const pages = { c1: '/axis/x/response', c2: '/axis/y/response' }
   const all = [cursor('c1', 120), cursor('c2', 90), cursor('gone', 80)]
   it('are those of the same plot on the same page', () => {
     const found = cursorsOn('response', '/axis/x/response', here('joined', pages), all)
-    expect(found).toEqual([{ connection: 'c1', person: 'P c1', x: 120 }])
+    expect(found).toEqual([{ connection: 'c1', person: 'P c1', x: 120, y: null }])
     expect(cursorsOn('step', '/axis/x/response', here('joined', pages), all)).toEqual([])
+  })
+  it('have the frequency as well where a spectrogram was pointed at', () => {
+    const [found] = cursorsOn('scope', '/axis/x/response', here('joined', pages), [
+      cursor('c1', 1.5, 'scope', 120),
+    ])
+    expect(found).toMatchObject({ x: 1.5, y: 120 })
   })
   it('are not there without a guest', () => {
     for (const state of ['open', 'ended'] as const) {
@@ -44,21 +62,37 @@ describe('pointing', () => {
     const sent: PlotCursor[] = []
     return { sent, pointing: new Pointing((message) => sent.push(message)) }
   }
-  const told = (plot: PlotCursor['plot'], x: number | null) => ({ type: 'plot_cursor', plot, x })
+  const told = (plot: PlotCursor['plot'], x: number | null, y: number | null = null) => ({
+    type: 'plot_cursor',
+    plot,
+    x,
+    y,
+  })
+  const at = (x: number, y: number | null = null) => ({ x, y })
 
   it('tells a place once, and again when the picture has moved beneath the pointer', () => {
     const { sent, pointing } = make()
     let x = 1.5
-    pointing.enter('scope', () => x)
+    pointing.enter('scope', () => at(x))
     pointing.tick(true)
     pointing.tick(true)
     x = 1.6
     pointing.tick(true)
     expect(sent).toEqual([told('scope', 1.5), told('scope', 1.6)])
   })
+  it('tells of another frequency at the same time', () => {
+    const { sent, pointing } = make()
+    let y = 50
+    pointing.enter('scope', () => at(1.5, y))
+    pointing.tick(true)
+    pointing.tick(true)
+    y = 60
+    pointing.tick(true)
+    expect(sent).toEqual([told('scope', 1.5, 50), told('scope', 1.5, 60)])
+  })
   it('says nothing while nobody is told, and takes back what it said', () => {
     const { sent, pointing } = make()
-    pointing.enter('scope', () => 1)
+    pointing.enter('scope', () => at(1))
     pointing.tick(false)
     expect(sent).toEqual([])
     pointing.tick(true)
@@ -68,10 +102,10 @@ describe('pointing', () => {
   })
   it('takes back the old plot before it tells of the new one', () => {
     const { sent, pointing } = make()
-    const first = () => 5
+    const first = () => at(5)
     pointing.enter('response', first)
     pointing.tick(true)
-    pointing.enter('step', () => 0.2)
+    pointing.enter('step', () => at(0.2))
     pointing.leave(first) // the leave of the first may come after the enter of the second
     pointing.tick(true)
     expect(sent).toEqual([told('response', 5), told('response', null), told('step', 0.2)])
@@ -79,7 +113,7 @@ describe('pointing', () => {
   it('is over when the pointer leaves, or when the plot has no place for it', () => {
     const { sent, pointing } = make()
     let x: number | null = 7
-    const read = () => x
+    const read = () => (x === null ? null : at(x))
     pointing.enter('response', read)
     pointing.tick(true)
     x = null

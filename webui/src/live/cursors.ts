@@ -2,6 +2,12 @@ import type { CursorMoved, PeopleHere, PlotCursor } from '../api/schema'
 
 export type PlotName = PlotCursor['plot']
 
+/** A place in a plot's data; `y` only where two coordinates are shared. */
+export interface Pointed {
+  x: number
+  y: number | null
+}
+
 /** A guest is here, so that pointing has somebody to point for. */
 export const isShared = (here: PeopleHere | null): boolean =>
   here?.invitations.some((each) => each.state === 'joined') ?? false
@@ -12,13 +18,15 @@ export function cursorsOn(
   page: string,
   here: PeopleHere | null,
   cursors: Iterable<CursorMoved>,
-): { connection: string; person: string; x: number }[] {
+): ({ connection: string; person: string } & Pointed)[] {
   if (!isShared(here)) return []
   const together = new Set(
     here?.people.filter((each) => each.page === page).map((each) => each.connection),
   )
-  return [...cursors].flatMap(({ connection, person, plot: on, x }) =>
-    on === plot && x !== null && together.has(connection) ? [{ connection, person, x }] : [],
+  return [...cursors].flatMap(({ connection, person, plot: on, x, y }) =>
+    on === plot && x !== null && together.has(connection)
+      ? [{ connection, person, x, y: y ?? null }]
+      : [],
   )
 }
 
@@ -34,31 +42,32 @@ export function heldInside(place: number, width: number): { left: number; beyond
  * that it entered counts; a picture that runs on beneath a resting pointer moves it as well.
  */
 export class Pointing {
-  private now: { plot: PlotName; read: () => number | null } | null = null
-  private told: { plot: PlotName; x: number | null } | null = null
+  private now: { plot: PlotName; read: () => Pointed | null } | null = null
+  private told: ({ plot: PlotName } & Pointed) | null = null
 
   constructor(private readonly send: (message: PlotCursor) => void) {}
 
   /** `read` gives the place in the plot's data, or null where there is none. */
-  enter(plot: PlotName, read: () => number | null): void {
+  enter(plot: PlotName, read: () => Pointed | null): void {
     this.now = { plot, read }
   }
 
   /** Leaving what another plot has taken over already changes nothing. */
-  leave(read: () => number | null): void {
+  leave(read: () => Pointed | null): void {
     if (this.now?.read === read) this.now = null
   }
 
   /** Called at the rate at which the others are told; `shared` is whether they are told at all. */
   tick(shared: boolean): void {
-    const x = shared ? (this.now?.read() ?? null) : null
-    const plot = x === null ? null : (this.now?.plot ?? null)
+    const at = shared ? (this.now?.read() ?? null) : null
+    const plot = at === null ? null : (this.now?.plot ?? null)
     if (this.told !== null && this.told.plot !== plot) {
-      this.send({ type: 'plot_cursor', plot: this.told.plot, x: null })
+      this.send({ type: 'plot_cursor', plot: this.told.plot, x: null, y: null })
       this.told = null
     }
-    if (plot === null || x === this.told?.x) return
-    this.told = { plot, x }
-    this.send({ type: 'plot_cursor', plot, x })
+    if (plot === null || at === null) return
+    if (at.x === this.told?.x && at.y === this.told.y) return
+    this.told = { plot, ...at }
+    this.send({ type: 'plot_cursor', plot, ...at })
   }
 }

@@ -411,12 +411,13 @@ export class ScopeStore {
       ...thinned(of.times, of.values, most / 2).times,
       ...thinned(of.times, across, most / 2).times,
     ])
-    const points: { x: number[]; y: number[] } = { x: [], y: [] }
+    const points: Questions['xy']['get'] = { x: [], y: [], times: [] }
     for (let i = 0; i < of.times.length; i++) {
       const [px, py] = [across[i] as number, of.values[i] as number]
       if (!kept.has(of.times[i] as number) || !Number.isFinite(px)) continue
       points.x.push(px)
       points.y.push(py)
+      points.times.push(of.times[i] as number)
     }
     return points
   }

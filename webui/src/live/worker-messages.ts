@@ -103,7 +103,11 @@ export interface Questions {
     ask: Stretch & { id: string; columns: number; synchronous: boolean }
     get: Spectrogram | null
   }
-  xy: { ask: Stretch & { x: string; y: string; most: number }; get: { x: number[]; y: number[] } }
+  xy: {
+    ask: Stretch & { x: string; y: string; most: number }
+    /** Points of the curve, and when each of them was. */
+    get: { x: number[]; y: number[]; times: number[] }
+  }
 }
 export type QuestionKind = keyof Questions
 

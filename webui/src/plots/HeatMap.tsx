@@ -1,5 +1,6 @@
 import { useEffect, useRef } from 'react'
 import { figure } from '../widgets/format'
+import { useSharedCursor } from './shared-cursor'
 import { ticks } from './XyPlot'
 
 const LEFT = 62
@@ -21,6 +22,7 @@ const SCALE = [
 /** Loudness over time and frequency, in decibels below the loudest. */
 export function HeatMap({
   times,
+  origin,
   rows,
   values,
   highest,
@@ -32,6 +34,8 @@ export function HeatMap({
 }: {
   /** Middle of each column, seconds as they are to be shown. */
   times: number[]
+  /** Time of the samples that is shown as zero. */
+  origin: number
   rows: number
   /** Column after column, amplitudes. */
   values: Float64Array
@@ -44,6 +48,7 @@ export function HeatMap({
   dark: boolean
 }) {
   const canvas = useRef<HTMLCanvasElement>(null)
+  const over = useRef<HTMLDivElement>(null)
   useEffect(() => {
     const element = canvas.current
     if (!element) return
@@ -54,7 +59,34 @@ export function HeatMap({
     observer.observe(element)
     return () => observer.disconnect()
   }, [times, rows, values, highest, unit, timeLabel, valueLabel, dark])
-  return <canvas ref={canvas} className="heat-map" role="img" aria-label={label} />
+  const first = times[0] ?? 0
+  const long = (times.at(-1) ?? 0) - first || 1
+  const wide = () => over.current?.clientWidth ?? 0
+  const high = () => over.current?.clientHeight ?? 0
+  useSharedCursor(over, 'scope', {
+    read: (left, top) =>
+      times.length === 0 || wide() === 0 || high() === 0
+        ? null
+        : {
+            x: origin + first + (left / wide()) * long,
+            y: Math.max(0, highest * (1 - top / high())),
+          },
+    place: ({ x, y }) => ({
+      left: ((x - origin - first) / long) * wide(),
+      // Others may point at the traces, which have no frequency, or see higher ones.
+      top: y === null || y > highest ? null : (1 - y / highest) * high(),
+    }),
+  })
+  return (
+    <div className="heat-map">
+      <canvas ref={canvas} role="img" aria-label={label} />
+      <div
+        ref={over}
+        className="over"
+        style={{ inset: `${TOP}px ${RIGHT}px ${BOTTOM}px ${LEFT}px` }}
+      />
+    </div>
+  )
 }
 
 interface Drawing {

@@ -52,7 +52,7 @@ const NO_UNIT = '–'
 const LEFT = 3
 const RIGHT = 1
 const SHORTEST_S = 1e-5
-/** Narrower than this the y axes make room for the traces. */
+/** Narrower than this the y axes make room for the traces: the unit takes the highest number's place. */
 const NARROW_PX = 500
 /** Mark of a trace that leaves a fixed scale. */
 const BEYOND_PX = 7
@@ -185,6 +185,16 @@ function options(
     ...extra,
   })
   const names = units(series)
+  const narrow = size.width < NARROW_PX
+  const named = (name: string): Partial<uPlot.Axis> =>
+    name === NO_UNIT
+      ? {}
+      : narrow
+        ? {
+            values: (_plot, splits) =>
+              splits.map((value, i) => (i === splits.length - 1 ? name : figure(value, 4))),
+          }
+        : { label: name, labelSize: 18 }
   return {
     ...size,
     legend: { show: false },
@@ -199,8 +209,8 @@ function options(
       ...names.map((name, i) =>
         axis({
           scale: name,
-          ...(name === NO_UNIT ? {} : { label: name, labelSize: 18 }),
-          size: size.width < NARROW_PX ? 44 : 60,
+          ...named(name),
+          size: narrow ? 42 : 60,
           // eslint-disable-next-line @typescript-eslint/no-unsafe-enum-assignment -- see LEFT
           side: i % 2 === 0 ? LEFT : RIGHT,
           grid: { show: i === 0, stroke: grid, width: 1 },

@@ -1,15 +1,21 @@
-import { useEffect, useRef } from 'react'
+import { useEffect, useMemo, useRef } from 'react'
 import { figure } from '../widgets/format'
+import { useSharedCursor } from './shared-cursor'
+import { nearestPoint, pointAt, type Range } from './xy-points'
 
 const LEFT = 62
 const BOTTOM = 40
 const TOP = 10
 const RIGHT = 12
 
-/** One quantity over another, both with a scale of their own. */
+/**
+ * One quantity over another, both with a scale of their own. What is pointed at is a moment: others
+ * see it at the same time, whatever they have put across and up.
+ */
 export function XyPlot({
   x,
   y,
+  times,
   xLabel,
   yLabel,
   label,
@@ -18,6 +24,8 @@ export function XyPlot({
 }: {
   x: number[]
   y: number[]
+  /** When each point was, in ascending order. */
+  times: number[]
   xLabel: string
   yLabel: string
   label: string
@@ -25,21 +33,45 @@ export function XyPlot({
   dark: boolean
 }) {
   const canvas = useRef<HTMLCanvasElement>(null)
+  const over = useRef<HTMLDivElement>(null)
+  const curve = useMemo(() => ({ x, y, times, xs: range(x), ys: range(y) }), [x, y, times])
   useEffect(() => {
     const element = canvas.current
     if (!element) return
-    const draw = () => drawXy(element, { x, y, xLabel, yLabel, color })
+    const draw = () => drawXy(element, { ...curve, xLabel, yLabel, color })
     draw()
     const observer = new ResizeObserver(draw)
     observer.observe(element)
     return () => observer.disconnect()
-  }, [x, y, xLabel, yLabel, color, dark])
-  return <canvas ref={canvas} className="xy-plot" role="img" aria-label={label} />
+  }, [curve, xLabel, yLabel, color, dark])
+  const size = () => ({
+    width: over.current?.clientWidth ?? 0,
+    height: over.current?.clientHeight ?? 0,
+  })
+  useSharedCursor(over, 'scope', {
+    read: (left, top) => {
+      const nearest = nearestPoint(curve, size(), left, top)
+      return nearest === null ? null : { x: times[nearest] as number, y: null }
+    },
+    place: (at) => pointAt(curve, size(), at.x),
+  })
+  return (
+    <div className="xy-plot">
+      <canvas ref={canvas} role="img" aria-label={label} />
+      <div
+        ref={over}
+        className="over"
+        style={{ inset: `${TOP}px ${RIGHT}px ${BOTTOM}px ${LEFT}px` }}
+      />
+    </div>
+  )
 }
 
 interface Drawing {
   x: number[]
   y: number[]
+  xs: Range
+  ys: Range
   xLabel: string
   yLabel: string
   color: string
@@ -54,8 +86,8 @@ function drawXy(canvas: HTMLCanvasElement, drawing: Drawing): void {
   const style = getComputedStyle(document.documentElement)
   ctx.scale(devicePixelRatio, devicePixelRatio)
   ctx.font = `12px ${getComputedStyle(document.body).fontFamily}`
-  const [x0, x1] = range(drawing.x)
-  const [y0, y1] = range(drawing.y)
+  const [x0, x1] = drawing.xs
+  const [y0, y1] = drawing.ys
   const px = (value: number) => LEFT + ((value - x0) / (x1 - x0)) * (width - LEFT - RIGHT)
   const py = (value: number) =>
     height - BOTTOM - ((value - y0) / (y1 - y0)) * (height - BOTTOM - TOP)
@@ -96,7 +128,7 @@ function rule(ctx: CanvasRenderingContext2D, x0: number, y0: number, x1: number,
 }
 
 /** Range with some air, never of no size. */
-function range(values: number[]): [number, number] {
+function range(values: number[]): Range {
   let min = Number.POSITIVE_INFINITY
   let max = Number.NEGATIVE_INFINITY
   for (const value of values) {

@@ -1,5 +1,5 @@
 import type uPlot from 'uplot'
-import { moved, type Span, wheelFactor, zoomed } from './yscale'
+import { moved, type Pinch, pinched, type Span, sound, wheelFactor, zoomed } from './yscale'
 
 /** What a hand on the plot asks for. Times are of the traces, not of the shown zero. */
 export interface PlotEvents {
@@ -19,16 +19,21 @@ interface Picture {
 
 type Events = { current: PlotEvents }
 type Stop = () => void
+/** What the fingers do, for all that listens to them. */
+type Hand = { pinching: boolean }
 
 const GRAB_PX = 14
+/** A fingertip is broader than a pointer. */
+const TOUCH_PX = 24
 /** Fingers nearer to each other than this in one direction do not zoom in it. */
-const PINCH_PX = 40
+const PINCH_PX = 20
 
 /** Wheel, cursors and fingers on the plot, wheel and drag on its y axes. */
 export function listen(plot: uPlot, picture: () => Picture | null, events: Events): Stop {
+  const hand = { pinching: false }
   const stops = [
-    wheelAndCursors(plot, picture, events),
-    pinch(plot, picture, events),
+    wheelAndCursors(plot, picture, events, hand),
+    pinch(plot, picture, events, hand),
     ...yAxes(plot).map(({ unit, element }) => onAxis(plot, unit, element, events)),
   ]
   return () => {
@@ -70,8 +75,15 @@ function zoomY(plot: uPlot, unit: string, y: number, factor: number, events: Eve
   if (span) events.current.onRange(unit, zoomed(span, plot.posToVal(y, unit), factor))
 }
 
-function wheelAndCursors(plot: uPlot, picture: () => Picture | null, events: Events): Stop {
+function wheelAndCursors(
+  plot: uPlot,
+  picture: () => Picture | null,
+  events: Events,
+  hand: Hand,
+): Stop {
   let dragged: number | null = null
+  /** A finger away from the cursors: it may tap, and it may begin to scroll or to zoom. */
+  let tapped: { x: number; y: number; nearest: number } | null = null
   const place = (event: MouseEvent) => {
     const box = plot.over.getBoundingClientRect()
     return { x: event.clientX - box.left, y: event.clientY - box.top }
@@ -96,82 +108,105 @@ function wheelAndCursors(plot: uPlot, picture: () => Picture | null, events: Eve
   const down = (event: PointerEvent) => {
     const now = picture()
     if (!now || now.cursors.length === 0 || !event.isPrimary) return
-    const { x } = place(event)
+    const { x, y } = place(event)
     const distances = now.cursors.map((time) => Math.abs(plot.valToPos(time - now.origin, 'x') - x))
     const nearest = distances.indexOf(Math.min(...distances))
+    const touch = event.pointerType === 'touch'
+    const near = (distances[nearest] ?? 0) <= (touch ? TOUCH_PX : GRAB_PX)
+    if (touch && !near) {
+      tapped = { x, y, nearest }
+      return
+    }
     dragged = nearest
     plot.over.setPointerCapture(event.pointerId)
-    if ((distances[nearest] ?? 0) > GRAB_PX) events.current.onCursor(nearest, timeAt(x))
+    if (!near) events.current.onCursor(nearest, timeAt(x))
   }
   const move = (event: PointerEvent) => {
+    if (hand.pinching) drop()
     if (dragged !== null && event.isPrimary)
       events.current.onCursor(dragged, timeAt(place(event).x))
   }
-  const up = () => {
-    dragged = null
+  const drop = () => {
+    dragged = tapped = null
+  }
+  const up = (event: PointerEvent) => {
+    const { x, y } = place(event)
+    if (tapped && !hand.pinching && Math.hypot(x - tapped.x, y - tapped.y) < GRAB_PX)
+      events.current.onCursor(tapped.nearest, timeAt(x))
+    drop()
   }
   return all(
     heard(plot.over, 'wheel', wheel),
     heard(plot.over, 'pointerdown', down),
     heard(plot.over, 'pointermove', move),
     heard(plot.over, 'pointerup', up),
-    heard(plot.over, 'pointercancel', up),
+    heard(plot.over, 'pointercancel', drop),
     heard(plot.over, 'dblclick', () => events.current.onFollow()),
   )
 }
 
-/** Two fingers: apart sideways zooms time, apart up and down zooms every y scale. */
-function pinch(plot: uPlot, picture: () => Picture | null, events: Events): Stop {
-  let began: { width: number; height: number; from: number; to: number; spans: Map<string, Span> }
-  let pinching = false
-  const fingers = (event: TouchEvent) => {
-    const box = plot.over.getBoundingClientRect()
-    const [a, b] = [event.touches[0], event.touches[1]]
-    if (event.touches.length !== 2 || !a || !b) return null
-    return {
-      width: Math.abs(a.clientX - b.clientX),
-      height: Math.abs(a.clientY - b.clientY),
-      x: (a.clientX + b.clientX) / 2 - box.left,
-      y: (a.clientY + b.clientY) / 2 - box.top,
-    }
-  }
+/** Two fingers beside each other zoom and move time, one above the other every y scale. */
+function pinch(plot: uPlot, picture: () => Picture | null, events: Events, hand: Hand): Stop {
+  let began: { fingers: Fingers; time: Span; spans: Map<string, Span> } | null = null
   const start = (event: TouchEvent) => {
     const now = picture()
-    const held = fingers(event)
-    pinching = false
-    if (!now || !held) return
+    const fingers = fingersOn(plot, event)
+    began = null
+    hand.pinching = event.touches.length > 1
+    if (!now || !fingers) return
     event.preventDefault() // else the page scrolls or zooms beneath the fingers
     const spans = yAxes(plot).flatMap(({ unit }): [string, Span][] => {
       const span = spanOf(plot, unit)
       return span ? [[unit, span]] : []
     })
-    const { width, height } = held
-    began = { width, height, from: now.from, to: now.to, spans: new Map(spans) }
-    pinching = true
+    began = { fingers, time: { min: now.from, max: now.to }, spans: new Map(spans) }
   }
   const move = (event: TouchEvent) => {
-    const held = fingers(event)
-    if (!pinching || !held) return
+    const fingers = fingersOn(plot, event)
+    if (!began || !fingers) return
     event.preventDefault()
-    const sideways = began.width >= began.height
-    if (sideways && began.width >= PINCH_PX) {
-      const factor = began.width / Math.max(held.width, 1)
-      const part = held.x / Math.max(plot.over.clientWidth, 1)
-      const centre = began.from + (began.to - began.from) * part
-      events.current.onStretch(
-        centre - (centre - began.from) * factor,
-        centre + (began.to - centre) * factor,
-      )
-    } else if (!sideways && began.height >= PINCH_PX) {
-      const factor = began.height / Math.max(held.height, 1)
-      const part = held.y / Math.max(plot.over.clientHeight, 1)
-      for (const [unit, span] of began.spans) {
-        const centre = span.max - (span.max - span.min) * part
-        events.current.onRange(unit, zoomed(span, centre, factor))
-      }
+    const { across, up } = began.fingers
+    if (across.apart >= up.apart && across.apart >= PINCH_PX) {
+      const { min, max } = pinched(began.time, across, fingers.across)
+      events.current.onStretch(min, max)
+    } else if (across.apart < up.apart && up.apart >= PINCH_PX) {
+      for (const [unit, span] of began.spans)
+        events.current.onRange(unit, sound(pinched(span, up, fingers.up)))
     }
   }
-  return all(heard(plot.over, 'touchstart', start), heard(plot.over, 'touchmove', move))
+  const end = (event: TouchEvent) => {
+    // A finger that stays goes on as part of the gesture that it began, not as a new one.
+    if (event.touches.length === 0) hand.pinching = false
+    began = null
+  }
+  return all(
+    heard(plot.over, 'touchstart', start),
+    heard(plot.over, 'touchmove', move),
+    heard(plot.over, 'touchend', end),
+    heard(plot.over, 'touchcancel', end),
+  )
+}
+
+interface Fingers {
+  across: Pinch
+  up: Pinch
+}
+
+/** Where the two fingers are that touch, if it is two. */
+function fingersOn(plot: uPlot, event: TouchEvent): Fingers | null {
+  const box = plot.over.getBoundingClientRect()
+  const [a, b] = [event.touches[0], event.touches[1]]
+  if (event.touches.length !== 2 || !a || !b || box.width === 0 || box.height === 0) return null
+  return {
+    across: {
+      apart: Math.abs(a.clientX - b.clientX),
+      part: ((a.clientX + b.clientX) / 2 - box.left) / box.width,
+    },
+    up: {
+      apart: Math.abs(a.clientY - b.clientY),
+      part: 1 - ((a.clientY + b.clientY) / 2 - box.top) / box.height,
+    },
+  }
 }
 
 /** On a y axis: the wheel zooms its scale, dragging moves it, two clicks let it follow again. */

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest'
-import { Extent, moved, sound, wheelFactor, withAir, zoomed } from './yscale'
+import { Extent, moved, pinched, sound, wheelFactor, withAir, zoomed } from './yscale'
 
 describe('y scales', () => {
   it('show all that was seen with air, and are never of no height', () => {
@@ -17,6 +17,22 @@ describe('y scales', () => {
     expect(zoomed({ min: 0, max: 100 }, 25, 0.5)).toEqual({ min: 12.5, max: 62.5 })
     const near = zoomed({ min: -1, max: 1 }, 0.5, wheelFactor({ deltaX: 0, deltaY: -3 }))
     expect((0.5 - near.min) / (near.max - near.min)).toBeCloseTo(0.75, 3)
+  })
+
+  it('keep between two fingers what was between them', () => {
+    // Fingers at 20 and 60 of 0…100, moved to where 40 and 80 were, and then to twice that far.
+    const began = { apart: 40, part: 0.4 }
+    expect(pinched({ min: 0, max: 100 }, began, { apart: 40, part: 0.6 })).toEqual({
+      min: -20,
+      max: 80,
+    })
+    expect(pinched({ min: 0, max: 100 }, began, { apart: 80, part: 0.4 })).toEqual({
+      min: 20,
+      max: 70,
+    })
+    // Fingers that meet show a great deal, and no more than numbers can tell.
+    const met = pinched({ min: 0, max: 100 }, began, { apart: 0, part: 0.5 })
+    expect(met.max - met.min).toBe(4000)
   })
 
   it('turn the same way with Shift, where the wheel goes sideways', () => {

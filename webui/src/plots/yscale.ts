@@ -40,6 +40,20 @@ export const wheelFactor = (event: { deltaX: number; deltaY: number }) =>
   // With Shift some browsers turn the wheel sideways.
   (event.deltaY || event.deltaX) > 0 ? WHEEL_ZOOM : 1 / WHEEL_ZOOM
 
+/** Two fingers in one direction: how far apart, and where between the ends their middle lies. */
+export interface Pinch {
+  apart: number
+  /** 0 at the lower end of the span, 1 at its upper one. */
+  part: number
+}
+
+/** What is between the fingers stays between them: they move the span and stretch it. */
+export function pinched({ min, max }: Span, began: Pinch, now: Pinch): Span {
+  const held = min + (max - min) * began.part
+  const size = (max - min) * (began.apart / Math.max(now.apart, 1))
+  return { min: held - size * now.part, max: held + size * (1 - now.part) }
+}
+
 export const moved = ({ min, max }: Span, by: number): Span => ({ min: min + by, max: max + by })
 
 /**

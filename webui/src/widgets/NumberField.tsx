@@ -11,6 +11,7 @@ export function NumberField({
   min,
   max,
   above,
+  below,
   integer = false,
   optional = false,
   help,
@@ -24,6 +25,8 @@ export function NumberField({
   max?: number
   /** Exclusive lower limit. */
   above?: number
+  /** Exclusive upper limit. */
+  below?: number
   integer?: boolean
   optional?: boolean
   help?: string
@@ -43,12 +46,14 @@ export function NumberField({
   else if (number === null) problem = t('number.bad')
   else if (integer && !Number.isInteger(number)) problem = t('number.whole')
   else if (above !== undefined && number <= above) problem = t('number.above', { limit: above })
+  else if (below !== undefined && number >= below) problem = t('number.below', { limit: below })
   else if (min !== undefined && number < min) problem = t('number.low', { limit: min })
   else if (max !== undefined && number > max) problem = t('number.high', { limit: max })
   const valid = (candidate: number | null) =>
     candidate !== null &&
     (!integer || Number.isInteger(candidate)) &&
     (above === undefined || candidate > above) &&
+    (below === undefined || candidate < below) &&
     (min === undefined || candidate >= min) &&
     (max === undefined || candidate <= max)
   return (

@@ -135,6 +135,7 @@ export const frame = {
   'number.bad': ['not a number', '不是数值'],
   'number.whole': ['a whole number is needed', '需要整数'],
   'number.above': ['must be above {limit}', '必须大于 {limit}'],
+  'number.below': ['must be below {limit}', '必须小于 {limit}'],
   'number.low': ['at least {limit}', '至少 {limit}'],
   'number.high': ['at most {limit}', '至多 {limit}'],
   'typed.number': ['not a number', '不是数值'],

@@ -1,6 +1,7 @@
 import '../../widgets/functions.css'
 import type { GainBlock } from '../../api/schema'
 import { useT } from '../../i18n'
+import { ArrowTip, DrawnButton } from '../../widgets/drawn'
 
 type Block = GainBlock['block']
 
@@ -61,19 +62,7 @@ export function LoopPicture({
     <div className="loop-picture">
       <svg viewBox="0 0 1120 330" role="group" aria-label={t('gains.picture')}>
         <title>{t('gains.picture')}</title>
-        <defs>
-          <marker
-            id="loop-tip"
-            viewBox="0 0 8 8"
-            refX="7"
-            refY="4"
-            markerWidth="7"
-            markerHeight="7"
-            orient="auto"
-          >
-            <path d="M0 0 8 4 0 8z" className="tip" />
-          </marker>
-        </defs>
+        <ArrowTip id="loop-tip" />
         {wires.map((path) => (
           <path key={path} d={path} className="wire" markerEnd="url(#loop-tip)" />
         ))}
@@ -139,18 +128,8 @@ function Box({
   )
   if (!present) return <g className="box absent">{drawing}</g>
   return (
-    <g
-      className="box"
-      role="button"
-      tabIndex={0}
-      onClick={() => onBlock(block)}
-      onKeyDown={(event) => {
-        if (event.key !== 'Enter' && event.key !== ' ') return
-        event.preventDefault()
-        onBlock(block)
-      }}
-    >
+    <DrawnButton className="box" onPress={() => onBlock(block)}>
       {drawing}
-    </g>
+    </DrawnButton>
   )
 }

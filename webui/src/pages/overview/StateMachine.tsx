@@ -1,4 +1,5 @@
 import { known, useT } from '../../i18n'
+import { ArrowTip, DrawnButton } from '../../widgets/drawn'
 
 /** Boxes of the picture: centre, in the units of the drawing. After CiA 402-2 figure 6. */
 const BOXES: { state: string; x: number; y: number }[] = [
@@ -42,19 +43,7 @@ export function StateMachine({
   return (
     <svg className="state-machine" viewBox="0 -3 436 323" aria-label={t('overview.machine')}>
       <title>{t('overview.machine')}</title>
-      <defs>
-        <marker
-          id="tip"
-          viewBox="0 0 8 8"
-          refX="7"
-          refY="4"
-          markerWidth="7"
-          markerHeight="7"
-          orient="auto"
-        >
-          <path d="M0 0 8 4 0 8z" className="tip" />
-        </marker>
-      </defs>
+      <ArrowTip id="tip" />
       {ARROWS.flatMap((path) => path.split(/(?=M)/)).map((path) => (
         <path key={path} d={path} className="arrow" markerEnd="url(#tip)" />
       ))}
@@ -92,22 +81,15 @@ export function StateMachine({
           )
         }
         return (
-          <g
+          <DrawnButton
             key={box.state}
             className={look}
-            role="button"
-            tabIndex={busy ? -1 : 0}
-            aria-disabled={busy}
-            aria-label={t('overview.goTo', { state: name })}
-            onClick={() => !busy && onGoal(box.state)}
-            onKeyDown={(event) => {
-              if (busy || event.repeat || (event.key !== 'Enter' && event.key !== ' ')) return
-              event.preventDefault()
-              onGoal(box.state)
-            }}
+            label={t('overview.goTo', { state: name })}
+            busy={busy}
+            onPress={() => onGoal(box.state)}
           >
             {drawing}
-          </g>
+          </DrawnButton>
         )
       })}
     </svg>

@@ -106,18 +106,21 @@ function Told({ made }: { made: MadeInvitation }) {
   const t = useT()
   const [copied, setCopied] = useState(false)
   const link = `${window.location.origin}${window.location.pathname}#${made.link}`
-  const copy = () =>
-    void navigator.clipboard?.writeText(link).then(() => {
-      setCopied(true)
-    })
+  // A browser gives none to a page that came over a plain line.
+  const clipboard = navigator.clipboard as Clipboard | undefined
   return (
     <div className="note info">
       <p>{t('support.send')}</p>
       <p className="row wrap middle">
         <span className="mono grow">{link}</span>
-        <Button variant="default" onClick={copy}>
-          {t(copied ? 'support.copied' : 'support.copy')}
-        </Button>
+        {clipboard && (
+          <Button
+            variant="default"
+            onClick={() => void clipboard.writeText(link).then(() => setCopied(true))}
+          >
+            {t(copied ? 'support.copied' : 'support.copy')}
+          </Button>
+        )}
       </p>
       <p>
         {t('support.tellCode')} <strong className="big mono">{made.invitation.code}</strong>

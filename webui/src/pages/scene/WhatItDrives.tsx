@@ -1,16 +1,15 @@
 import { Button, NativeSelect } from '@mantine/core'
 import { useEffect, useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { DriveSummary, Mechanics } from '../../api/schema'
+import type { DriveSummary } from '../../api/schema'
 import { href } from '../../app/router'
 import { useT } from '../../i18n'
 import { HOME_OFFSET, SOFTWARE_LIMITS } from '../../widgets/objects'
 import { ParameterFields, useReachable } from '../../widgets/ParameterFields'
 import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
-import { setRecord, useRecord } from '../../widgets/useFunctions'
-import { complete, type Form, formOf, KINDS, START, toMechanics } from '../setup/mechanics'
+import { useRecord } from '../../widgets/useFunctions'
+import { type Form, KINDS } from '../setup/mechanics'
 import { MechanicsFields } from '../setup/MechanicsFields'
+import { useMechanics } from '../setup/useMechanics'
 
 const LIMITS = [...SOFTWARE_LIMITS, HOME_OFFSET]
 
@@ -37,29 +36,11 @@ export function WhatItDrives({ drive }: { drive: DriveSummary }) {
 
 function MechanicsForm({ drive }: { drive: string }) {
   const t = useT()
-  const record = useRecord(drive)
-  const [form, setForm] = useState<Form>(START)
+  const { kept, form, change, mechanics, keep, act } = useMechanics(drive)
   const [shaft, setShaft] = useState(true)
-  const act = useAction()
-  const kept = JSON.stringify(record?.mechanics ?? null)
-  useEffect(() => {
-    const known = record?.mechanics ?? null
-    setShaft(known === null)
-    setForm(known ? formOf(known) : START)
-  }, [drive, kept])
-  const wanted: Mechanics | null = shaft || !complete(form) ? null : toMechanics(form)
-  const keep = () =>
-    act.run(async () =>
-      setRecord(
-        drive,
-        await ask(
-          api.PUT('/api/v1/drives/{drive_id}/mechanics', {
-            params: { path: { drive_id: drive } },
-            body: { mechanics: wanted },
-          }),
-        ),
-      ),
-    )
+  const known = JSON.stringify(kept)
+  useEffect(() => setShaft(kept === null), [drive, known])
+  const wanted = shaft ? null : mechanics
   return (
     <div>
       <NativeSelect
@@ -68,25 +49,19 @@ function MechanicsForm({ drive }: { drive: string }) {
         onChange={(event) => {
           const chosen = event.currentTarget.value
           setShaft(chosen === 'shaft')
-          if (chosen !== 'shaft') setForm({ ...form, kind: chosen as Form['kind'] })
+          if (chosen !== 'shaft') change({ kind: chosen as Form['kind'] })
         }}
         data={(['shaft', ...KINDS] as const).map((value) => ({
           value,
           label: t(`scene.${value}`),
         }))}
       />
-      {!shaft && (
-        <MechanicsFields
-          form={form}
-          change={(part) => setForm({ ...form, ...part })}
-          resolution={false}
-        />
-      )}
+      {!shaft && <MechanicsFields form={form} change={change} resolution={false} />}
       <div className="row wrap">
         <Button
           loading={act.busy}
-          disabled={(!shaft && wanted === null) || JSON.stringify(wanted) === kept}
-          onClick={() => void keep()}
+          disabled={(!shaft && wanted === null) || JSON.stringify(wanted) === known}
+          onClick={() => void keep(wanted)}
         >
           {t('scene.keep')}
         </Button>

@@ -59,17 +59,14 @@ export function RangePanel({
                   <NumberField
                     label={t('scale.low', { unit: name })}
                     value={range.min}
-                    onChange={(min) =>
-                      min !== null && min < range.max && onRange(unit, { ...range, min })
-                    }
+                    below={range.max}
+                    onChange={(min) => min !== null && onRange(unit, { ...range, min })}
                   />
                   <NumberField
                     label={t('scale.high', { unit: name })}
                     value={range.max}
                     above={range.min}
-                    onChange={(max) =>
-                      max !== null && max > range.min && onRange(unit, { ...range, max })
-                    }
+                    onChange={(max) => max !== null && onRange(unit, { ...range, max })}
                   />
                 </>
               )}

@@ -34,6 +34,7 @@ import { SpectrumPanel } from './SpectrumPanel'
 import { Toolbar } from './Toolbar'
 import { TriggerPanel } from './TriggerPanel'
 import {
+  type ChangeSetup,
   useFrames,
   useSampling,
   useScopeChannels,
@@ -80,7 +81,7 @@ export function ScopePage() {
   const tabs = useRef<HTMLDivElement>(null)
   const trigger = triggerOf(setup)
   const ranges = rangesOf(setup)
-  const rescale = (unit: string, span: Span | null) => change(withRange(setup, unit, span))
+  const rescale = (unit: string, span: Span | null) => change((now) => withRange(now, unit, span))
   const fit = () => change({ ...setup, ranges: [] })
   useSampling(setup, infos)
   useTrigger(setup, arming)
@@ -153,19 +154,19 @@ export function ScopePage() {
     setFrozen((old) => ({ from, to, origin: old?.origin ?? origin }))
   }, [])
   const move = (part: number, factor: number) => {
-    const frame = last.current
-    if (!frame) return
-    const width = frame.to - frame.from
-    const centre = (frame.from + frame.to) / 2 + width * part
+    const now = frozen ?? last.current
+    if (!now) return
+    const width = now.to - now.from
+    const centre = (now.from + now.to) / 2 + width * part
     toStretch(centre - (width * factor) / 2, centre + (width * factor) / 2)
   }
   const toggleCursors = () => {
     const frame = last.current
     if (cursors.length > 0 || !frame) return setCursors([])
     // Cursors stand on samples; a picture that runs on would slide away beneath them.
-    freeze(frame)
-    const width = frame.to - frame.from
-    setCursors([frame.from + width / 3, frame.from + (2 * width) / 3])
+    if (!frozen) freeze(frame)
+    const { from, to } = frozen ?? frame
+    setCursors([from + (to - from) / 3, from + (2 * (to - from)) / 3])
   }
   const csv = async () => {
     const frame = last.current
@@ -315,7 +316,7 @@ function levelOf(setup: ScopeSetup, shown: Shown[], colors: string[]) {
 }
 
 /** The stored set-up, or position, speed and torque of the axis where there is none yet. */
-function useFirstSetup(): [ScopeSetup, (setup: ScopeSetup) => void] {
+function useFirstSetup(): [ScopeSetup, ChangeSetup] {
   const [setup, change, fresh] = useSetup()
   const link = useLink()
   const drives = useDrives()

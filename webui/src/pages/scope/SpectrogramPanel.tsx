@@ -22,9 +22,10 @@ export function SpectrogramPanel({ shown, stretch, running, change, dark }: Pane
     running,
     JSON.stringify([trace?.id, trace?.unit, change]),
   )
-  const origin = stretch()?.origin ?? 0
-  const times = useMemo(
-    () => (found ? Array.from(found.times, (time) => time - origin) : []),
+  const now = stretch()?.origin ?? 0
+  // While the picture runs, what counts as zero runs on before the next answer is there.
+  const { times, origin } = useMemo(
+    () => ({ times: found ? Array.from(found.times, (time) => time - now) : [], origin: now }),
     [found],
   )
   if (!trace) return null
@@ -39,6 +40,7 @@ export function SpectrogramPanel({ shown, stretch, running, change, dark }: Pane
       ) : (
         <HeatMap
           times={times}
+          origin={origin}
           rows={found.frequency.length}
           values={found.amplitude}
           highest={found.frequency.at(-1) ?? 1}

@@ -34,6 +34,7 @@ export function XyPanel({ shown, colors, stretch, running, change, dark }: Panel
       <XyPlot
         x={found?.x ?? []}
         y={found?.y ?? []}
+        times={found?.times ?? []}
         xLabel={`${x.label} [${x.unit}]`}
         yLabel={`${y.label} [${y.unit}]`}
         label={t('scope.tab.xy')}

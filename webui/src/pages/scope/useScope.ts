@@ -6,14 +6,20 @@ import { contents, useLink, useStore } from '../../live/store'
 import type { ScopeFrame, ScopeView } from '../../live/worker-messages'
 import { configOf, EMPTY, type Infos, storedSetup, storeSetup, triggerOf } from './setup'
 
+/** Another set-up, or what becomes of the present one. */
+export type ChangeSetup = (next: ScopeSetup | ((now: ScopeSetup) => ScopeSetup)) => void
+
 /** The set-up of this browser, kept from visit to visit. */
-export function useSetup(): [ScopeSetup, (setup: ScopeSetup) => void, boolean] {
+export function useSetup(): [ScopeSetup, ChangeSetup, boolean] {
   const [setup, setSetup] = useState(() => storedSetup() ?? EMPTY)
   const [fresh, setFresh] = useState(() => storedSetup() === null)
-  const change = useCallback((next: ScopeSetup) => {
-    storeSetup(next)
+  const latest = useRef(setup)
+  const change = useCallback<ChangeSetup>((next) => {
+    // Several changes may come before the page is rendered anew: none takes another one back.
+    latest.current = typeof next === 'function' ? next(latest.current) : next
+    storeSetup(latest.current)
     setFresh(false)
-    setSetup(next)
+    setSetup(latest.current)
   }, [])
   return [setup, change, fresh]
 }

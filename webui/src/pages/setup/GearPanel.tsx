@@ -1,5 +1,5 @@
 import { Button, Modal, SegmentedControl } from '@mantine/core'
-import { useEffect, useState } from 'react'
+import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { GearPlanInfo, GearWritten } from '../../api/schema'
 import { known, useT } from '../../i18n'
@@ -8,29 +8,23 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProcedureButton } from '../../widgets/Procedures'
 import { useAction } from '../../widgets/useAction'
-import { setRecord, useRecord } from '../../widgets/useFunctions'
-import { complete, type Form, formOf, KINDS, START, toMechanics } from './mechanics'
+import { setRecord } from '../../widgets/useFunctions'
+import { type Form, KINDS } from './mechanics'
 import { MechanicsFields } from './MechanicsFields'
+import { useMechanics } from './useMechanics'
 
 /** From screw, belt, rack or table to the gear of the drive, shown before it is written. */
 export function GearPanel({ drive }: { drive: string }) {
   const t = useT()
-  const record = useRecord(drive)
-  const [form, setForm] = useState<Form>(START)
+  const { kept, form, change: retype, mechanics, keep, act } = useMechanics(drive)
   const [plan, setPlan] = useState<GearPlanInfo | null>(null)
   const [asked, setAsked] = useState(false)
   const [written, setWritten] = useState<GearWritten | null>(null)
-  const act = useAction()
-  const kept = JSON.stringify(record?.mechanics ?? null)
-  useEffect(() => {
-    if (record?.mechanics) setForm(formOf(record.mechanics))
-  }, [drive, kept])
   const change = (part: Partial<Form>) => {
-    setForm({ ...form, ...part })
+    retype(part)
     setPlan(null)
     setWritten(null)
   }
-  const mechanics = complete(form) ? toMechanics(form) : null
   const calculate = () =>
     act.run(async () => {
       if (!mechanics) return
@@ -60,18 +54,6 @@ export function GearPanel({ drive }: { drive: string }) {
         ),
       )
     })
-  const keep = (value: typeof mechanics) =>
-    act.run(async () =>
-      setRecord(
-        drive,
-        await ask(
-          api.PUT('/api/v1/drives/{drive_id}/mechanics', {
-            params: { path: { drive_id: drive } },
-            body: { mechanics: value },
-          }),
-        ),
-      ),
-    )
   return (
     <div className="columns">
       <Panel title={t('setup.gear')}>
@@ -95,7 +77,7 @@ export function GearPanel({ drive }: { drive: string }) {
           <Button disabled={!mechanics || act.busy} onClick={() => void keep(mechanics)}>
             {t('gear.keep')}
           </Button>
-          {record?.mechanics && (
+          {kept && (
             <Button disabled={act.busy} onClick={() => void keep(null)}>
               {t('gear.forget')}
             </Button>
