@@ -66,8 +66,12 @@ def scene_page(browser: Browser, bench: Bench) -> Iterator[Page]:
     context = browser.new_context(locale="en", color_scheme="dark", viewport=screen)
     page = context.new_page()
     page.set_default_timeout(15_000)
+    defects: list[str] = []
+    page.on("pageerror", lambda error: defects.append(str(error)))
+    page.on("console", lambda message: defects.append(message.text) if _policy(message.text) else 0)
     yield page
     context.close()
+    assert defects == []
 
 
 def _policy(text: str) -> bool:
