@@ -1,41 +1,77 @@
-"""The command line: ``servodeck …``."""
+"""The command line: ``servodeck …``.
+
+Only the command that is run is imported: server and analysis take seconds, and a list of the
+commands none of that.
+"""
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
+import importlib
 import io
-import json
 import os
-import signal
 import sys
-import tempfile
-from collections.abc import Awaitable, Callable
-from dataclasses import asdict
-from pathlib import Path
-from typing import Annotated
+from typing import Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
-from backend.commands import (
-    functions,
-    keep,
-    live,
-    measure,
-    params,
-    people,
-    profile,
-    remote_params,
-    report,
-)
-from backend.commands.remote import Server, server_for
-from backend.commands.session import opened, run, show_progress
-from backend.commands.state import state_folder
-from backend.demo import DemoBench
-from backend.matching import match_profiles
-from drivers.errors import NotAllowed
-from drivers.urls import parse_url
-from drivers.virtual.mechanics.spec import load_mechanics, standard_mechanics
+COMMANDS = {
+    "serve": ("start:serve", "Start the server and the web page."),
+    "demo": ("start:demo", "Start the server on a bench of virtual drives: no hardware, no root."),
+    "virtual": ("virtual:virtual", "Run one virtual drive on a real wire, for any client."),
+    "scan": ("scan:scan", "Look for drives on a bus."),
+    "params": ("params:app", "Read and write parameters on a bus, or by a running server."),
+    "jog": (
+        "live:jog",
+        "Turn an axis for as long as this command runs. It moves; Ctrl+C stops it.",
+    ),
+    "scope": (
+        "live:scope",
+        "Record signals of one drive or several into a CSV file. Nothing moves.",
+    ),
+    "io": (
+        "functions:io",
+        "Show the terminals: state, function, and functions that two of them have.",
+    ),
+    "faults": (
+        "functions:faults",
+        "Show active faults, and the drive's own record where it can be read.",
+    ),
+    "gear": (
+        "functions:gear_command",
+        "Electronic gear for a screw, belt, rack or rotary table; writes only with --write.",
+    ),
+    "braking": ("functions:braking", "Energy of braking, and the resistor that it takes."),
+    "sweep": (
+        "measure:sweep",
+        "Measure a frequency response and write it as JSON. The axis moves.",
+    ),
+    "inertia": (
+        "measure:inertia",
+        "Measure inertia and friction and write them as JSON. The axis moves.",
+    ),
+    "recompute": (
+        "report:recompute",
+        "Evaluate a stored measurement anew from its raw signals. Nothing moves.",
+    ),
+    "report": (
+        "report:report",
+        "Write the commissioning report of an axis, from measurement files or a running server.",
+    ),
+    "profile": ("profile:app", "Drive profiles: show, check, import."),
+    "audit": ("keep:audit", "Check and export the audit trail."),
+    "library": ("keep:library", "Search, export and import the library."),
+    "backup": (
+        "keep:backup",
+        "Save everything that the station keeps. The server may run meanwhile.",
+    ),
+    "restore": (
+        "keep:restore",
+        "Put a backup in place, after checking it as a whole. End the server first.",
+    ),
+    "people": ("people:app", "Accounts of this station."),
+}
+"""Name of a command to where it is, below `backend.commands`, and what the list says of it."""
 
 app = typer.Typer(
     help="Servo-drive commissioning in a browser.",
@@ -43,243 +79,43 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.add_typer(params.app, name="params")
-app.add_typer(profile.app, name="profile")
-app.add_typer(keep.audit, name="audit")
-app.add_typer(keep.library, name="library")
-app.command("backup")(keep.backup)
-app.command("restore")(keep.restore)
-app.add_typer(people.app, name="people")
-app.command("jog")(live.jog)
-app.command("scope")(live.scope)
-app.command("sweep")(measure.sweep)
-app.command("inertia")(measure.inertia)
-app.command("report")(report.report)
-app.command("recompute")(report.recompute)
-app.command("io")(functions.io)
-app.command("faults")(functions.faults)
-app.command("gear")(functions.gear_command)
-app.command("braking")(functions.braking)
-
-Host = Annotated[
-    str,
-    typer.Option(
-        "--host",
-        "--bind",
-        help="address to listen on; any but loopback needs accounts and uses HTTPS",
-    ),
-]
-Port = Annotated[int, typer.Option(help="port to listen on; 0 takes a free one", min=0, max=65535)]
-Config = Annotated[Path | None, typer.Option(help="folder of drives and parameter sets")]
-Open = Annotated[bool, typer.Option("--open", help="open the page in a browser")]
-
-Accounts = Annotated[
-    bool | None,
-    typer.Option(
-        "--accounts/--single-user",
-        help="log in, or be the one user of this machine; by default accounts are asked for "
-        "where there are some",
-        show_default=False,
-    ),
-]
-CertificateFile = Annotated[
-    Path | None, typer.Option("--certificate", help="own certificate with its chain (PEM)")
-]
-KeyFile = Annotated[Path | None, typer.Option("--key", help="key of that certificate (PEM)")]
-AllowHost = Annotated[
-    list[str] | None,
-    typer.Option("--allow-host", help="name of a proxy or tunnel in front; asks for accounts"),
-]
 
 
-@app.command()
-def serve(
-    host: Host = "127.0.0.1",
-    port: Port = 8420,
-    config: Config = None,
-    open_: Open = False,
-    database: keep.Database = None,
-    blobs: keep.BlobPlace = None,
-    accounts: Accounts = None,
-    certificate: CertificateFile = None,
-    key: KeyFile = None,
-    allow_host: AllowHost = None,
-) -> None:
-    """Start the server and the web page."""
-    # The server takes longer to import than every other command takes to run.
-    from backend.bench import Bench
-    from backend.commands.serve import Serving
-    from backend.commands.serve import serve as run_server
+def _later(name: str, where: str) -> type[TyperCommand]:
+    """A command that is imported when it is called."""
 
-    serving = Serving(
-        host, port, accounts, certificate, key, frozenset(allow_host or ()), open_page=open_
-    )
+    class Later(TyperCommand):
+        def make_context(
+            self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
+        ) -> Any:
+            return imported(name, where).make_context(info_name, args, parent, **extra)
 
-    async def work() -> None:
-        await run_server(Bench(state_folder(config), database=database, blobs=blobs), serving)
-
-    _until_interrupted(work)
+    return Later
 
 
-@app.command()
-def demo(
-    host: Host = "127.0.0.1",
-    port: Port = 8420,
-    bench: Annotated[Path | None, typer.Option(help="bench file (TOML)")] = None,
-    config: Config = None,
-    open_: Open = False,
-    database: keep.Database = None,
-    blobs: keep.BlobPlace = None,
-    accounts: Accounts = None,
-    certificate: CertificateFile = None,
-    key: KeyFile = None,
-    allow_host: AllowHost = None,
-) -> None:
-    """Start the server on a bench of virtual drives: no hardware, no root."""
-    from backend.bench import Bench
-    from backend.commands.serve import Serving
-    from backend.commands.serve import serve as run_server
-
-    serving = Serving(
-        host, port, accounts, certificate, key, frozenset(allow_host or ()), open_page=open_
-    )
-
-    async def work() -> None:
-        with tempfile.TemporaryDirectory(prefix="servodeck-") as folder:
-            state = config or Path(folder) / "state"
-            print("starting the virtual drives …", flush=True)
-            with DemoBench(bench, Path(folder) / "wires", state / "nvm", steady=True) as drives:
-                for url, real in drives.addresses.items():
-                    print(f"  {url}  is  {real}")
-                for problem in drives.problems:
-                    print(f"  note: {problem}")
-                server_bench = Bench(state, drives.wires, database=database, blobs=blobs)
-                await run_server(server_bench, serving)
-
-    _until_interrupted(work)
+def imported(name: str, where: str) -> TyperCommand | TyperGroup:
+    """The command itself."""
+    module, _, attribute = where.partition(":")
+    found = getattr(importlib.import_module(f"backend.commands.{module}"), attribute)
+    one = typer.Typer(add_completion=False)
+    if isinstance(found, typer.Typer):
+        one.add_typer(found, name=name)
+        group = typer.main.get_command(one)
+        assert isinstance(group, TyperGroup)
+        command = group.commands[name]
+    else:
+        one.command(name)(found)
+        command = typer.main.get_command(one)
+    assert isinstance(command, TyperCommand | TyperGroup)
+    return command
 
 
-def _until_interrupted(work: Callable[[], Awaitable[None]]) -> None:
-    def end(_number: int, _frame: object) -> None:
-        # A service manager's end is as orderly as Ctrl+C: virtual drives and folders are let go.
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, end)
-    # uvicorn has already shut down in order when the interrupt arrives here.
-    with contextlib.suppress(KeyboardInterrupt):
-        run(work)
+def _never() -> None:
+    """Stands for what `_later` imports."""
 
 
-def _one_drive(file: Path, folder: Path, nvm: Path | None) -> DemoBench:
-    """The bench of `virtual`; its errors are about the command line, not about a file."""
-    try:
-        return DemoBench(file, folder, nvm)
-    except NotAllowed as error:
-        error.message = error.message.removeprefix(f"bench file {file}: ")
-        raise
-
-
-async def _told_to_end() -> None:
-    """Wait for Ctrl+C or for the end that a service is given (SIGTERM)."""
-    over, loop = asyncio.Event(), asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, over.set)
-    await over.wait()
-
-
-@app.command()
-def virtual(
-    drive: str,
-    on: Annotated[str, typer.Option(help="bus URL; serial ones create the pty at that path")],
-    station: Annotated[int, typer.Option()] = 1,
-    mechanics: Annotated[Path | None, typer.Option(help="mechanics (TOML)")] = None,
-    nvm: Annotated[Path | None, typer.Option(help="folder of the drive's memory")] = None,
-) -> None:
-    """Run one virtual drive on a real wire, for any client."""
-
-    async def work() -> None:
-        bus = parse_url(on)
-        if bus.scheme == "ethercat" and not bus.is_virtual:
-            raise NotAllowed(
-                f"a virtual drive does not go on {on} by itself: it would answer on your network",
-                value=on,
-                limit="ethercat://virtual0",
-                remedy="write ethercat://virtual0, or see docs/virtual-drives.md for an interface",
-            )
-        try:
-            spec = load_mechanics(mechanics) if mechanics else standard_mechanics()
-        except (OSError, ValueError) as error:
-            raise NotAllowed(f"{mechanics}: {error}", remedy="correct the file") from error
-        with tempfile.TemporaryDirectory(prefix="servodeck-") as folder:
-            file = Path(folder) / "bench.json"
-            axis = {
-                "name": drive,
-                "drive": drive,
-                "on": on,
-                "station": station,
-                "mechanics": spec.model_dump(exclude_defaults=True),
-            }
-            file.write_text(json.dumps({"axis": [axis]}), "utf-8")
-            with _one_drive(file, Path(folder), nvm) as drives:
-                for real in drives.addresses.values():
-                    print(f"{drive} answers at {real} station {station}  (Ctrl+C ends it)")
-                sys.stdout.flush()
-                await _told_to_end()
-
-    _until_interrupted(work)
-
-
-@app.command()
-def scan(
-    url: Annotated[str, typer.Argument(metavar="BUS_URL")],
-    as_json: Annotated[bool, typer.Option("--json")] = False,
-    server: Server = None,
-) -> None:
-    """Look for drives on a bus."""
-
-    async def work() -> None:
-        rows = await _found(url, server)
-        if as_json:
-            print(json.dumps([row | {"profiles": list(fits)} for row, fits in rows], indent=1))
-            return
-        for row, fits in rows:
-            which = ", ".join(f"{name} ({sure})" for name, sure in fits.items())
-            name = row["name"] or "no name"
-            print(f"station {row['station']}: {name}  serial {row['serial']}  {which}")
-        if not rows:
-            print(f"no drive answers: check {_LOOK_AT[parse_url(url).scheme]}")
-
-    run(work)
-
-
-_SERIAL = "power, cable, baud rate, parity and address"
-_LOOK_AT = {
-    "mlink": _SERIAL,
-    "modbus": _SERIAL,
-    "canopen": "power, cable, both terminating resistors, bit rate and node number",
-    "ethercat": "power, cable (computer to IN of the first drive) and the interface's name",
-}
-_FOUND = {
-    "station", "vendor_id", "product_code", "revision", "serial", "name", "alias", "firmware",
-    "state", "notes",
-}  # fmt: skip
-
-
-async def _found(url: str, server: str | None) -> list[tuple[dict[str, object], dict[str, str]]]:
-    """What answers, and the profiles that fit with how sure that is."""
-    if at := server_for(url, server):
-        return [
-            (f.model_dump(include=_FOUND), {m.profile: m.confidence for m in f.matches})
-            for f in await remote_params.scan(at, url)
-        ]
-    async with opened(url) as link:
-        return [
-            (
-                {name: value for name, value in asdict(f).items() if name in _FOUND},
-                {m.profile.drive: m.confidence for m in match_profiles(link.kind, f)},
-            )
-            for f in await link.scan(show_progress, None)
-        ]
+for _name, (_where, _help) in COMMANDS.items():
+    app.command(_name, help=_help, cls=_later(_name, _where))(_never)
 
 
 def _speak_any_letter() -> None:

@@ -7,13 +7,14 @@ counts is the value that came back.
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from drivers import cia402
 from drivers.codec import decode, encode
-from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange, Rejected
+from drivers.errors import DriveError, LinkTimeout, NotAllowed, NotInUse, OutOfRange, Rejected
 from drivers.link import Address, Found, Link, LinkQuality
 from profiles.schema import LinkKind, LinkSpec, Parameter, Profile, Raw
 
@@ -22,6 +23,9 @@ BATCH = 16
 #: The same where the link itself lets a write go between two requests of a batch, and where
 #: neighbouring registers share a request: those of a long batch are split less often.
 REGISTER_BATCH = 64
+#: The same on EtherCAT, whose link parts a batch by itself and reads whole objects: one that is
+#: cut between two batches would be read entry by entry.
+OBJECT_BATCH = 128
 
 #: Roles that command motion; they are never "changed but not saved".
 _COMMAND_ROLES = frozenset({
@@ -46,6 +50,8 @@ class Reading:
     time: float | None
     """Seconds since the epoch, None when never read."""
     error: str = ""
+    unused: bool = False
+    """The drive's own count leaves it out, as ``error`` says: there is nothing to be read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,14 +92,29 @@ class Port:
     station: int
     spec: LinkSpec | None
 
-    @property
-    def batch(self) -> int:
-        """Values to ask for in one call."""
-        return REGISTER_BATCH if self.spec and self.spec.max_registers else BATCH
+    def batches(self, parameters: Sequence[Parameter]) -> list[list[Parameter]]:
+        """Parts to ask for in one call each; what is read together stays together."""
+        if self.link.kind == "ethercat":
+            return _whole_objects(parameters)
+        size, ordered = BATCH, list(parameters)
+        if self.spec and self.spec.max_registers:
+            size = REGISTER_BATCH
+            ordered.sort(key=lambda p: p.modbus_register or 0)
+        return [ordered[at : at + size] for at in range(0, len(ordered), size)]
 
     def carries(self, parameter: Parameter) -> bool:
         """Whether this port can transport the parameter."""
         return carries(self.link.kind, parameter)
+
+
+def _whole_objects(parameters: Sequence[Parameter]) -> list[list[Parameter]]:
+    parts: list[list[Parameter]] = []
+    ordered = sorted(parameters, key=lambda p: p.index or 0)
+    for _, members in itertools.groupby(ordered, key=lambda p: p.index):
+        if not parts or len(parts[-1]) >= OBJECT_BATCH:
+            parts.append([])
+        parts[-1].extend(members)
+    return parts
 
 
 def carries(kind: LinkKind, parameter: Parameter) -> bool:
@@ -345,10 +366,7 @@ class Drive:
         done = len(result)
         for position, group in groups.items():
             port = self.ports[position]
-            if port.batch > BATCH:
-                group.sort(key=lambda p: p.modbus_register or 0)
-            for start in range(0, len(group), port.batch):
-                chunk = group[start : start + port.batch]
+            for chunk in port.batches(group):
                 readings = await self._read_chunk(port, chunk)
                 result.update({reading.key: reading for reading in readings})
                 done += len(chunk)
@@ -371,7 +389,8 @@ class Drive:
         return readings
 
     def _failed(self, parameter: Parameter, error: DriveError) -> Reading:
-        return Reading(parameter.key, None, None, time.time(), error.message)
+        unused = isinstance(error, NotInUse)
+        return Reading(parameter.key, None, None, time.time(), error.message, unused)
 
     def _reading(self, parameter: Parameter, data: bytes) -> Reading:
         raw = decode(parameter.type, data)

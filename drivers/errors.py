@@ -9,6 +9,7 @@
     ├── Rejected         the drive understood and refused (abort or exception code)
     ├── OutOfRange       the value does not fit the parameter; nothing was sent
     ├── NotAllowed       access, state or permission forbids it; nothing was sent
+    │   └── NotInUse     the drive's own count leaves this entry out
     └── Busy             somebody or something else holds the axis or the bus
 
 Third-party exceptions are translated to these once, at the driver's edge.
@@ -101,6 +102,12 @@ class NotAllowed(DriveError):
     """Read-only, wrong state, missing permission or unmet precondition."""
 
     kind = "not-allowed"
+
+
+class NotInUse(NotAllowed):
+    """An entry of a list beyond the count that the drive tells: there is nothing to be read."""
+
+    kind = "not-in-use"
 
 
 class Busy(DriveError):

@@ -172,6 +172,7 @@ def reading(drive: Drive, key: str) -> models.ParameterValue:
         value=last.value,
         time=moment(last.time) if last.time else None,
         error=last.error,
+        unused=last.unused,
         unsaved=key in drive.unsaved,
         pending=drive.pending.get(key, ""),
     )
@@ -190,6 +191,7 @@ def readings(drive: Drive, keys: list[str]) -> list[models.ParameterValue]:
                 value=last.value,
                 time=moment(last.time) if last.time else None,
                 error=last.error,
+                unused=last.unused,
                 unsaved=key in unsaved,
                 pending=pending.get(key, ""),
             )

@@ -9,29 +9,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import struct
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
 from fastapi import WebSocketDisconnect
 from pydantic import BaseModel
 
 from backend.api.errors import problem_of
 from backend.api.live_messages import ScopeChannelInfo, ScopeInfo, ScopeStart, ScopeStop
+from backend.api.scope_blocks import encode_block
 from backend.bench import Bench
 from backend.scope import Subscription
 from backend.scope_units import axis_scale
 from backend.units import AxisUnits
 from drivers.errors import Busy, DriveError
-from drivers.link import ScopeBlock
 
-MAGIC = 0x424B4353
-_HEADER = struct.Struct("<IIIIHHIdd")
-TRUE_TIMES, BASES = 1, 2
-#: Integers beyond this have no exact float32.
-_EXACT = 2.0**24
 #: Subscriptions of one connection, and requests that may wait.
 MOST_SUBSCRIPTIONS = 32
 MOST_REQUESTS = 200
@@ -234,30 +226,3 @@ class ScopeStreams:
                     self._stuck = True
                     self.bench_changed()  # wakes `run`, which ends the connection
                     return
-
-
-def encode_block(
-    subscription: int, block: ScopeBlock, numbers: tuple[int, ...], count: int, place: int = 0
-) -> bytes:
-    """A block as a binary frame (see live_messages); columns of other streams are NaN."""
-    rows = len(block.samples)
-    values: npt.NDArray[np.float64] = np.full((rows, count), np.nan)
-    values[:, list(numbers)] = block.samples
-    if block.valid is not None:
-        values[~block.valid] = np.nan
-    flags, extra = place << 8, b""
-    if block.times_s is not None:
-        flags |= TRUE_TIMES
-        extra = block.times_s.astype("<f8").tobytes()
-    largest = np.abs(values, where=~np.isnan(values), out=np.zeros_like(values))
-    if rows and largest.max() > _EXACT:
-        # A multi-turn position: its change within a block has an exact float32, itself has not.
-        flags |= BASES
-        bases = np.nan_to_num(values[0]).astype("<f8")
-        values = values - bases
-        extra += bases.tobytes()
-    header = _HEADER.pack(
-        MAGIC, subscription, block.sequence, block.dropped, rows, count, flags, block.t0_s,
-        block.dt_s,
-    )  # fmt: skip
-    return header + extra + values.astype("<f4").tobytes()

@@ -322,6 +322,9 @@ class ParameterValue(Message):
     value: Raw | None = Field(description="in the parameter's unit")
     time: datetime | None
     error: str = ""
+    unused: bool = Field(
+        default=False, description="the drive's own count leaves it out: not asked for"
+    )
     unsaved: bool = False
     pending: str = Field(
         default="", description="what must happen before it acts: write_settings, reenable …"

@@ -1,101 +1,89 @@
-"""``servodeck io``, ``faults``, ``gear``, ``braking``: a drive's functions without the server."""
+"""``servodeck io``, ``faults``, ``gear``, ``braking``: a drive's functions, here or by a server."""
 
 from __future__ import annotations
 
 import json
 import math
 from dataclasses import asdict
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Protocol
 
 import typer
 from pydantic import ValidationError
 
-from backend import gear
-from backend.axis import Axis
-from backend.commands.session import drive_at, run, told
-from backend.fault_history import PastFault, history_of, read_history
-from backend.faults import active_faults, fault_keys
-from backend.io_functions import TerminalState, read_terminals
-from backend.mechanics_calc import GearPlan, Mechanics, plan_gear
+from backend.commands import local_functions, remote_functions
+from backend.commands.function_answers import Faults, Gear, Terminal, of_plan
+from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
+from backend.commands.session import run, told
+from backend.mechanics_calc import Mechanics, plan_gear
 from backend.regeneration import BrakingCycle, BrakingLimits, Resistor
 from backend.regeneration import braking as braking_of
 from drivers.errors import OutOfRange
 from profiles import load_profile
 
-Url = Annotated[str, typer.Argument(metavar="BUS_URL")]
-Station = Annotated[int, typer.Option(help="station address on the bus")]
-Profile = Annotated[str | None, typer.Option(help="drive family; recognised where possible")]
-Json = Annotated[bool, typer.Option("--json", help="for scripts")]
+_UNKNOWN = "not in the profile"
 
 
-def io(url: Url, station: Station = 1, profile: Profile = None, as_json: Json = False) -> None:
+class _Functions(Protocol):
+    """`local_functions` and `remote_functions`."""
+
+    async def terminals(self, place: Place) -> list[Terminal]: ...
+
+    async def faults(self, place: Place) -> Faults: ...
+
+    async def gear(self, place: Place, mechanics: Mechanics, *, write: bool) -> Gear: ...
+
+
+def _by(where: Place) -> _Functions:
+    """Who does it."""
+    return local_functions if where.server is None else remote_functions
+
+
+def io(
+    url: Url, station: Station = 1, profile: Profile = None, as_json: Json = False,
+    server: Server = None,
+) -> None:  # fmt: skip
     """Show the terminals: state, function, and functions that two of them have."""
 
     async def work() -> None:
-        async with drive_at(url, station, profile) as drive:
-            states = await read_terminals(drive)
-            if as_json:
-                print(json.dumps([_terminal(state) for state in states], indent=1))
-                return
-            for state in states:
-                on = "?" if state.on is None else "on" if state.on else "off"
-                twins = f"  SAME AS {', '.join(state.same_function)}" if state.same_function else ""
-                print(f"{state.terminal.name:6} {on:4} {state.function_name}{twins}")
+        where = place(url, station, profile, server)
+        states = await _by(where).terminals(where)
+        if as_json:
+            print(json.dumps([state._asdict() for state in states], indent=1))
+            return
+        for state in states:
+            on = "?" if state.on is None else "on" if state.on else "off"
+            twins = f"  SAME AS {', '.join(state.same_function)}" if state.same_function else ""
+            print(f"{state.name:6} {on:4} {state.function_name}{twins}")
 
     run(work)
 
 
-def _terminal(state: TerminalState) -> dict[str, object]:
-    return {
-        "name": state.terminal.name,
-        "direction": state.terminal.direction,
-        "on": state.on,
-        "function": state.function,
-        "function_name": state.function_name,
-        "inverted": state.inverted,
-        "same_function": list(state.same_function),
-    }
-
-
-def faults(url: Url, station: Station = 1, profile: Profile = None, as_json: Json = False) -> None:
+def faults(
+    url: Url, station: Station = 1, profile: Profile = None, as_json: Json = False,
+    server: Server = None,
+) -> None:  # fmt: skip
     """Show active faults, and the drive's own record where it can be read."""
 
     async def work() -> None:
-        async with drive_at(url, station, profile) as drive:
-            active = active_faults(drive, await drive.read_many(fault_keys(drive)))
-            history = history_of(drive)
-            readable = history is not None and history.kind != "unreadable"
-            past = await read_history(Axis(drive)) if readable else []
-            if as_json:
-                found = {
-                    "active": [fault.model_dump(mode="json") for fault in active],
-                    "past": [_past(entry) for entry in past],
-                }
-                print(json.dumps(found, indent=1))
-                return
-            for fault in active:
-                print(f"{fault.kind} {fault.code} {fault.name}")
-                for text in fault.remedies:
-                    print(f"    {text}")
-            if not active:
-                print("no fault is active")
-            for entry in past:
-                name = entry.fault.name if entry.fault else entry.error or "not in the profile"
-                print(f"{entry.name}: {entry.code_text} {name}")
-            if history is not None and not readable:
-                print(f"the drive keeps {history.size} past faults that only its maker can read")
+        where = place(url, station, profile, server)
+        found = await _by(where).faults(where)
+        if as_json:
+            active = [fault.model_dump(mode="json") for fault in found.active]
+            past = [entry._asdict() for entry in found.past]
+            print(json.dumps({"active": active, "past": past}, indent=1))
+            return
+        for fault in found.active:
+            print(f"{fault.kind} {fault.code} {fault.name}")
+            for text in fault.remedies:
+                print(f"    {text}")
+        if not found.active:
+            print("no fault is active")
+        for entry in found.past:
+            print(f"{entry.record}: {entry.code} {entry.name or entry.error or _UNKNOWN}")
+        if found.hidden:
+            print(f"the drive keeps {found.hidden} past faults that only its maker can read")
 
     run(work)
-
-
-def _past(entry: PastFault) -> dict[str, object]:
-    return {
-        "record": entry.name,
-        "code": entry.code_text,
-        "name": entry.fault.name if entry.fault else None,
-        "values": {reading.key: reading.value for reading in entry.values},
-        "error": entry.error,
-    }
 
 
 @told
@@ -113,6 +101,7 @@ def gear_command(
     load_turns: Annotated[int, typer.Option(help="… for so many of the load")] = 1,
     resolution: Annotated[float, typer.Option(help="mm or degrees of one increment")] = 0.001,
     write: Annotated[bool, typer.Option("--write", help="write it, read back")] = False,
+    server: Server = None,
 ) -> None:
     """Electronic gear for a screw, belt, rack or rotary table; writes only with --write."""
     try:
@@ -128,32 +117,29 @@ def gear_command(
             remedy="see servodeck gear --help",
         ) from error
     if station is None:
-        _show(plan_gear(load_profile(drive), mechanics, None))
+        _show(of_plan(plan_gear(load_profile(drive), mechanics, None)))
         if write:
             raise OutOfRange("--write needs a bus URL and --station", remedy="name the drive")
         return
 
     async def work() -> None:
-        async with drive_at(drive, station, profile) as found:
-            axis = Axis(found)
-            plan = await gear.plan(axis, mechanics)
-            _show(plan)
-            if write:
-                change = await gear.write_gear(axis, plan.values)
-                print(f"written; before: {change.before}")
-                for key, why in change.waits.items():
-                    print(f"  {key} waits for {why}")
+        where = place(drive, station, profile, server)
+        _show(await _by(where).gear(where, mechanics, write=write))
 
     run(work)
 
 
-def _show(plan: GearPlan) -> None:
-    for value in plan.values:
-        print(f"{value.parameter.key} {value.parameter.name}: {value.raw}")
+def _show(plan: Gear) -> None:
+    for key, name, raw in plan.values:
+        print(f"{key} {name}: {raw}")
     print(f"one motor revolution: {plan.travel_per_motor_turn:.9g} {plan.unit}")
     print(f"increments per motor revolution: {plan.reached:.12g} ({plan.error_ppm:.2g} ppm off)")
     for text in plan.warnings:
         print(f"note: {text}")
+    if plan.before is not None:
+        print(f"written; before: {plan.before}")
+        for key, why in (plan.waits or {}).items():
+            print(f"  {key} waits for {why}")
 
 
 @told

@@ -23,7 +23,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 
 from backend.api.live_messages import Hello, JogEnded, Refused, ScopeInfo
-from backend.commands.remote import Server, authorisation, remote, server_for
+from backend.commands.options import Profile, Server, Station, Url, server_for
+from backend.commands.remote import authorisation, remote
 from backend.commands.samples import Samples, decode
 from backend.commands.session import run
 from drivers.errors import DriveError, LinkLost, NotAllowed
@@ -31,8 +32,6 @@ from drivers.errors import DriveError, LinkLost, NotAllowed
 _RENEW_S, _END_S, _OPEN_S = 0.04, 20.0, 10.0
 _LONGEST_JOG_S, _MERGE_S = 60.0, 2.0
 
-Url = Annotated[str, typer.Argument(metavar="BUS_URL")]
-Profile = Annotated[str | None, typer.Option(help="drive family; recognised where possible")]
 Cycle = Annotated[
     int | None,
     typer.Option(help="exchange process data with this cycle in µs; as it is, where not given"),
@@ -45,7 +44,7 @@ def jog(
     url: Url,
     seconds: Annotated[float, typer.Option(help="how long the button is held")],
     speed: Annotated[float, typer.Option(help="in rpm")],
-    station: Annotated[int, typer.Option(help="station address on the bus")] = 1,
+    station: Station = 1,
     profile: Profile = None,
     server: Server = None,
     backwards: Annotated[bool, typer.Option("--backwards", help="the other direction")] = False,

@@ -5,31 +5,44 @@ from __future__ import annotations
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Protocol
 
 import typer
 
-from backend import parameter_set
-from backend.axis import Axis
-from backend.commands import remote_params
-from backend.commands.remote import Server, server_for
-from backend.commands.session import drive_at, progress, run, show_progress
-from backend.commands.typed import finite
-from backend.drive import Drive, Reading
+from backend.commands import local_params, remote_params
+from backend.commands.options import Place, Profile, Server, Station, Url, place
+from backend.commands.session import run
+from backend.commands.values import bytes_of
 from backend.files import write_atomically
-from backend.library import SetLibrary
 from backend.parameter_list import export_list, import_list
-from backend.parameter_set import SUFFIX, Difference
-from backend.tools import parameters, procedures
+from backend.parameter_set import SUFFIX, parse
 from drivers.errors import NotAllowed
 from profiles import load_profile
-from profiles.schema import Parameter, Raw
 
 app = typer.Typer(help="Read and write parameters on a bus, or by a running server.")
 
-Url = Annotated[str, typer.Argument(metavar="BUS_URL")]
-Station = Annotated[int, typer.Option(help="station address on the bus")]
-Profile = Annotated[str | None, typer.Option(help="drive family; recognised where possible")]
+
+class _Params(Protocol):
+    """`local_params` and `remote_params`."""
+
+    async def get(self, place: Place, keys: list[str]) -> None: ...
+
+    async def put(self, place: Place, assignments: list[str], *, raw: bool) -> None: ...
+
+    async def dump(
+        self, place: Place, out: Path | None, *, author: str, notes: str, motor_individual: bool
+    ) -> None: ...
+
+    async def save(self, place: Place) -> None: ...
+
+    async def diff(self, place: Place, file: Path) -> bool: ...
+
+    async def load(self, place: Place, file: Path, *, yes: bool, other_drive: bool) -> bool: ...
+
+
+def _by(where: Place) -> _Params:
+    """Who does it."""
+    return local_params if where.server is None else remote_params
 
 
 @app.command("get")
@@ -40,14 +53,8 @@ def get(
     """Read parameters and print them."""
 
     async def work() -> None:
-        if at := server_for(url, server):
-            await remote_params.get(at, url, keys, station, profile)
-            return
-        async with drive_at(url, station, profile) as drive:
-            readings = await drive.read_many(keys)
-            for key in keys:
-                parameter = drive.parameter(key)
-                print(_line(parameter, readings[parameter.key]))
+        where = place(url, station, profile, server)
+        await _by(where).get(where, keys)
 
     run(work)
 
@@ -64,18 +71,8 @@ def set_(
     """Write parameters; each is read back and printed."""
 
     async def work() -> None:
-        if at := server_for(url, server):
-            await remote_params.set_(at, url, assignments, station, profile, raw=raw)
-            return
-        async with drive_at(url, station, profile) as drive:
-            wanted = [_assignment(drive, text) for text in assignments]
-            for parameter, value in wanted:
-                # Everything is checked before the first byte is written.
-                known = value if raw or isinstance(value, str) else parameter.to_raw(value)
-                drive.check(parameter, known)
-            for parameter, value in wanted:
-                reading = await drive.write(parameter.key, value, raw=raw)
-                print(_line(parameter, reading))
+        where = place(url, station, profile, server)
+        await _by(where).put(where, assignments, raw=raw)
 
     run(work)
 
@@ -96,24 +93,10 @@ def dump(
     """Read all settings and write them as a parameter set."""
 
     async def work() -> None:
-        if at := server_for(url, server):
-            await remote_params.dump(
-                at, url, station, profile, out,
-                author=author, notes=notes, motor_individual=motor_individual,
-            )  # fmt: skip
-            return
-        async with drive_at(url, station, profile) as drive:
-            wanted = parameter_set.storable(drive.profile, motor_individual=motor_individual)
-            keys = [p.key for p in wanted if not drive.unreachable_why(p)]
-            readings = await drive.read_many(keys, show_progress)
-            data = parameter_set.dump(
-                drive, readings.values(), author=author, notes=notes, saved=datetime.now(UTC)
-            )
-            if out is None:
-                sys.stdout.write(data.decode())
-            else:
-                write_atomically(out, data)
-                print(f"{out}: {sum(r.raw is not None for r in readings.values())} parameters")
+        where = place(url, station, profile, server)
+        await _by(where).dump(
+            where, out, author=author, notes=notes, motor_individual=motor_individual
+        )
 
     run(work)
 
@@ -125,33 +108,21 @@ def save(
     """Store the drive's settings in its own memory, which wears with every storing."""
 
     async def work() -> None:
-        if at := server_for(url, server):
-            await remote_params.save(at, url, station, profile)
-            return
-        async with drive_at(url, station, profile) as drive:
-            known = drive.profile.procedure("save")
-            if known is None:
-                raise NotAllowed(
-                    f"{drive.name} has no procedure that saves: it keeps what is written",
-                    drive=drive.name,
-                    remedy="nothing needs to be done",
-                )
-            await procedures.run_procedure(Axis(drive), known, True, progress())
-            print(f"{drive.name}: saved in the drive's memory")
+        where = place(url, station, profile, server)
+        await _by(where).save(where)
 
     run(work)
 
 
 @app.command("diff")
-def diff(url: Url, file: Path, station: Station = 1, profile: Profile = None) -> None:
+def diff(
+    url: Url, file: Path, station: Station = 1, profile: Profile = None, server: Server = None
+) -> None:
     """Compare a parameter set with the drive; exit code 1 when they differ."""
 
     async def work() -> bool:
-        async with drive_at(url, station, profile) as drive:
-            rows = await _differences(drive, file)
-            for row in rows:
-                print(_difference_line(row))
-            return any(row.status == "differs" for row in rows)
+        where = place(url, station, profile, server)
+        return await _by(where).diff(where, file)
 
     if run(work):
         raise typer.Exit(1)
@@ -167,31 +138,13 @@ def load(
     other_drive: Annotated[
         bool, typer.Option(help="the file may be of a drive with another serial number")
     ] = False,
+    server: Server = None,
 ) -> None:
-    """Write what differs; each value is read back. The values before are kept beside the file."""
+    """Write what differs, each value read back. What was there before is kept as a set."""
 
     async def work() -> bool:
-        async with drive_at(url, station, profile) as drive:
-            rows = [row for row in await _differences(drive, file) if row.status != "not_in_file"]
-            for row in rows:
-                print(_difference_line(row))
-            chosen = [row.key for row in rows if row.selected]
-            if not chosen:
-                print("nothing to write")
-                return True
-            if not yes and not typer.confirm(f"Write these {len(chosen)} values?"):
-                raise NotAllowed("nothing was written", remedy="run it again to write")
-            result = await parameters.load_set(
-                drive,
-                parameter_set.parse(_bytes_of(file), file.name),
-                chosen,
-                show_progress,
-                library=SetLibrary(file.resolve().parent),
-                accept_other_identity=other_drive,
-            )
-            print(f"written {result['written']}, failed {result['failed']}")
-            print(f"the values before are in {result['backup']}")
-            return result["failed"] == 0
+        where = place(url, station, profile, server)
+        return await _by(where).load(where, file, yes=yes, other_drive=other_drive)
 
     if not run(work):
         raise typer.Exit(1)
@@ -209,7 +162,7 @@ def export(
             raise NotAllowed(
                 f"{out.name} is neither CSV nor DCF", remedy="name the file .csv or .dcf"
             )
-        content = parameter_set.parse(_bytes_of(file), file.name)
+        content = parse(bytes_of(file), file.name)
         data = export_list(content, load_profile(content.profile), out.name, datetime.now())
         write_atomically(out, data)
         print(f"{out}: {len(content.rows)} parameters")
@@ -227,7 +180,7 @@ def import_(
 
     async def work() -> None:
         data, found = import_list(
-            _bytes_of(file), load_profile(profile), file.name, datetime.now(UTC)
+            bytes_of(file), load_profile(profile), file.name, datetime.now(UTC)
         )
         for problem in found.problems:
             print(problem, file=sys.stderr)
@@ -235,61 +188,3 @@ def import_(
         print(f"{out}: {len(found.readings)} parameters, {len(found.problems)} lines not used")
 
     run(work)
-
-
-def _bytes_of(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise NotAllowed(
-            f"{file} cannot be read: {error.strerror}", remedy="name a file that can be read"
-        ) from error
-
-
-async def _differences(drive: Drive, file: Path) -> list[Difference]:
-    content = parameter_set.parse(_bytes_of(file), file.name)
-    if content.profile != drive.profile.drive:
-        raise NotAllowed(
-            f"{file.name} is of a {content.profile} drive, this is a {drive.profile.drive}",
-            drive=drive.name,
-            remedy="choose a file of the same drive family",
-        )
-    keys = [row.key for row in content.rows if row.key in drive.profile.by_key]
-    reachable = [k for k in keys if not drive.unreachable_why(drive.parameter(k))]
-    ours = await drive.read_many(reachable, show_progress)
-    compared = parameter_set.compare(drive, content.rows, ours)
-    return [row for row in compared if row.status != "same"]
-
-
-def _assignment(drive: Drive, text: str) -> tuple[Parameter, Raw]:
-    key, separator, value = text.partition("=")
-    if not separator:
-        raise NotAllowed(f"{text!r} is no assignment", remedy="write KEY=VALUE, as 6081:00=1000")
-    parameter = drive.parameter(key)
-    if not parameter.is_integer and parameter.type != "REAL32":
-        return parameter, value
-    try:
-        number: Raw = int(value, 0)
-    except ValueError:
-        number = finite(parameter.key, parameter.name, value)
-    return parameter, number
-
-
-def _line(parameter: Parameter, reading: Reading) -> str:
-    if reading.raw is None:
-        return f"{parameter.key}  {parameter.name}: {reading.error}"
-    label = parameter.enum.get(reading.raw, "") if isinstance(reading.raw, int) else ""
-    shown = f"{reading.value} {parameter.unit}".rstrip() + (f" ({label})" if label else "")
-    raw = f"  [raw {reading.raw}]" if reading.raw != reading.value else ""
-    return f"{parameter.key}  {parameter.name} = {shown}{raw}"
-
-
-def _difference_line(row: Difference) -> str:
-    name = row.parameter.name if row.parameter else "?"
-    match row.status:
-        case "differs":
-            return f"{row.key}  {name}: drive {row.ours} → file {row.theirs}"
-        case "not_in_file":
-            return f"{row.key}  {name}: only in the drive ({row.ours})"
-        case _:
-            return f"{row.key}  {name}: {row.status.replace('_', ' ')} {row.problem}".rstrip()

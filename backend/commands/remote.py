@@ -11,10 +11,9 @@ import asyncio
 import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Annotated, TypeVar
+from typing import TypeVar
 
 import httpx
-import typer
 from pydantic import TypeAdapter, ValidationError
 
 from backend.api.models import Bus, DriveSummary, FoundDrive, JobInfo, Problem
@@ -24,27 +23,7 @@ from drivers.urls import parse_url
 
 T = TypeVar("T")
 
-#: Where `servodeck demo` and `servodeck serve` listen unless told otherwise.
-DEFAULT_SERVER = "http://127.0.0.1:8420"
 _TIMEOUT_S, _LOOK_S = 60.0, 0.1
-
-Server = Annotated[
-    str | None,
-    typer.Option(
-        envvar="SERVODECK_SERVER",
-        help=f"ask this running server, as {DEFAULT_SERVER}, which is asked for virtual buses",
-    ),
-]
-
-
-def server_for(url: str, server: str | None) -> str | None:
-    """The server to ask about a bus; None where the bus is opened here.
-
-    Raises:
-        OutOfRange: no bus URL.
-    """
-    virtual = parse_url(url).is_virtual
-    return server or (DEFAULT_SERVER if virtual else None)
 
 
 class Remote:
@@ -56,14 +35,14 @@ class Remote:
 
     async def ask(
         self, method: str, path: str, kind: type[T], *, body: object = None,
-        query: dict[str, str] | None = None,
+        content: bytes | None = None, query: dict[str, str] | None = None,
     ) -> T:  # fmt: skip
         """One request and its answer.
 
         Raises:
             DriveError: what the server says, or that it cannot be reached.
         """
-        answer = await self.raw(method, path, body=body, query=query)
+        answer = await self.raw(method, path, body=body, content=content, query=query)
         try:
             return TypeAdapter(kind).validate_json(answer.content or b"null")
         except ValidationError as error:
@@ -73,11 +52,14 @@ class Remote:
             ) from error
 
     async def raw(
-        self, method: str, path: str, *, body: object = None, query: dict[str, str] | None = None
-    ) -> httpx.Response:
-        """One request; the answer as it came."""
+        self, method: str, path: str, *, body: object = None, content: bytes | None = None,
+        query: dict[str, str] | None = None,
+    ) -> httpx.Response:  # fmt: skip
+        """One request, with ``body`` as JSON or ``content`` as it is; the answer as it came."""
         try:
-            answer = await self._http.request(method, path, json=body, params=query)
+            answer = await self._http.request(
+                method, path, json=body, content=content, params=query
+            )
         except httpx.HTTPError as error:
             raise LinkLost(
                 f"no server answers at {self.address}: {error}",

@@ -3,59 +3,55 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import quote
 
-from backend.api.models import DriveSummary, FoundDrive, ParameterRow, ParameterValue
+from backend.api.models import Diff, DriveSummary, FoundDrive, ParameterRow, ParameterValue
 from backend.api.models_library import StoredSet
+from backend.commands import values
+from backend.commands.options import Place
 from backend.commands.remote import Remote, remote
-from backend.commands.typed import finite
+from backend.commands.values import Compared
 from backend.files import write_atomically
+from backend.parameter_set import parse
 from drivers.errors import NotAllowed
-from profiles.schema import Raw
 
 
-async def get(server: str, url: str, keys: list[str], station: int, profile: str | None) -> None:
+async def get(place: Place, keys: list[str]) -> None:
     """Read parameters and print them."""
-    async with remote(server) as at:
-        drive = await at.drive(url, station, profile)
+    async with remote_drive(place) as (at, drive):
         await at.result(f"/drives/{drive.id}/jobs/read_all", {"keys": keys})
-        rows = await _rows(at, drive)
+        find = await _rows(at, drive)
         for key in keys:
-            row = _named(rows, drive, key)
-            print(line(row, row.reading))
+            row = find(key)
+            print(values.line(row, row.reading))
 
 
-async def set_(
-    server: str, url: str, assignments: list[str], station: int, profile: str | None, *, raw: bool
-) -> None:
+async def put(place: Place, assignments: list[str], *, raw: bool) -> None:
     """Write parameters one after the other; each is read back and printed."""
-    async with remote(server) as at:
-        drive = await at.drive(url, station, profile)
-        rows = await _rows(at, drive)
-        wanted = [_assignment(rows, drive, text) for text in assignments]
-        for row, value in wanted:
+    async with remote_drive(place) as (at, drive):
+        find = await _rows(at, drive)
+        for row, value in [values.assignment(find, text) for text in assignments]:
             body = {"raw" if raw or isinstance(value, str) else "value": value}
             path = f"/drives/{drive.id}/parameters/{quote(row.key)}"
-            print(line(row, await at.ask("PUT", path, ParameterValue, body=body)))
+            print(values.line(row, await at.ask("PUT", path, ParameterValue, body=body)))
 
 
-async def save(server: str, url: str, station: int, profile: str | None) -> None:
+async def save(place: Place) -> None:
     """Store the drive's settings in its own memory."""
-    async with remote(server) as at:
-        drive = await at.drive(url, station, profile)
+    async with remote_drive(place) as (at, drive):
         await at.result(f"/drives/{drive.id}/procedures/save", {"confirmed": True})
         print(f"{drive.name}: saved in the drive's memory")
 
 
 async def dump(
-    server: str, url: str, station: int, profile: str | None, out: Path | None, *,
-    author: str, notes: str, motor_individual: bool,
-) -> None:  # fmt: skip
+    place: Place, out: Path | None, *, author: str, notes: str, motor_individual: bool
+) -> None:
     """Read all settings; the set is kept in the server's library as well."""
-    async with remote(server) as at:
-        drive = await at.drive(url, station, profile)
+    async with remote_drive(place) as (at, drive):
         name = f"{drive.id} {datetime.now(UTC):%Y-%m-%d %H.%M.%S}"
         body = {
             "file": name, "author": author, "notes": notes,
@@ -70,46 +66,77 @@ async def dump(
     print(f"{out}: also kept by the server as {kept.file}")
 
 
+async def diff(place: Place, file: Path) -> bool:
+    """Print what differs; whether anything does."""
+    async with remote_drive(place) as (at, drive):
+        _, rows = await _differences(at, drive, file)
+    values.show(rows)
+    return any(row.differs for row in rows)
+
+
+async def load(place: Place, file: Path, *, yes: bool, other_drive: bool) -> bool:
+    """Write what differs after it was shown; whether every value was kept."""
+    async with remote_drive(place) as (at, drive):
+        kept, rows = await _differences(at, drive, file)
+        keys = values.chosen(rows, yes=yes)
+        if not keys:
+            return True
+        body = {
+            "file": kept.file, "version": kept.version, "keys": keys,
+            "accept_other_identity": other_drive,
+        }  # fmt: skip
+        return values.loaded(await at.result(f"/drives/{drive.id}/jobs/load_set", body))
+
+
 async def scan(server: str, url: str) -> list[FoundDrive]:
     """What answers on a bus of the server."""
     async with remote(server) as at:
         return await at.scan(url)
 
 
-async def _rows(at: Remote, drive: DriveSummary) -> dict[str, ParameterRow]:
-    """By key and by the maker's number."""
+@asynccontextmanager
+async def remote_drive(place: Place) -> AsyncIterator[tuple[Remote, DriveSummary]]:
+    """The server, and its drive at this place."""
+    assert place.server is not None
+    async with remote(place.server) as at:
+        yield at, await at.drive(place.url, place.station, place.profile)
+
+
+async def _differences(
+    at: Remote, drive: DriveSummary, file: Path
+) -> tuple[StoredSet, list[Compared]]:
+    """The set as the server keeps it from now on, and what is in it and not in the drive."""
+    data = values.bytes_of(file)
+    content = parse(data, file.name)
+    if content.profile != drive.profile:
+        raise values.other_family(file.name, content.profile, drive.name, drive.profile)
+    kept = await at.ask(
+        "PUT", f"/sets/{quote(file.name)}", StoredSet, content=data, query={"overwrite": "true"}
+    )
+    query = {"file": kept.file, "version": str(kept.version)}
+    told = await at.ask("GET", f"/drives/{drive.id}/diff", Diff, query=query)
+    for warning in told.warnings:
+        print(f"note: {warning}", file=sys.stderr)
+    rows = [row for row in told.rows if row.status not in ("same", "not_in_file")]
+    return kept, [
+        Compared(
+            row.key, row.name or "?", row.drive_raw, row.file_raw, row.status, row.problem,
+            row.selected,
+        )
+        for row in rows
+    ]  # fmt: skip
+
+
+async def _rows(at: Remote, drive: DriveSummary) -> Callable[[str], ParameterRow]:
+    """Finds a parameter by key or by the maker's number."""
     rows = await at.ask("GET", f"/drives/{drive.id}/parameters", list[ParameterRow])
-    return {row.number: row for row in rows if row.number} | {row.key: row for row in rows}
+    known = {row.number: row for row in rows if row.number} | {row.key: row for row in rows}
 
+    def find(key: str) -> ParameterRow:
+        row = known.get(key) or known.get(key.upper())
+        if row is None:
+            raise NotAllowed(f"{drive.name} has no parameter {key}", parameter=key,
+                             remedy="keys look like 6040:00")  # fmt: skip
+        return row
 
-def _named(rows: dict[str, ParameterRow], drive: DriveSummary, key: str) -> ParameterRow:
-    row = rows.get(key) or rows.get(key.upper())
-    if row is None:
-        raise NotAllowed(f"{drive.name} has no parameter {key}", parameter=key,
-                         remedy="keys look like 6040:00")  # fmt: skip
-    return row
-
-
-def _assignment(
-    rows: dict[str, ParameterRow], drive: DriveSummary, text: str
-) -> tuple[ParameterRow, Raw]:
-    key, separator, value = text.partition("=")
-    if not separator:
-        raise NotAllowed(f"{text!r} is no assignment", remedy="write KEY=VALUE, as 6081:00=1000")
-    row = _named(rows, drive, key)
-    if row.type in ("STRING", "OCTETS"):
-        return row, value
-    try:
-        return row, int(value, 0)
-    except ValueError:
-        return row, finite(row.key, row.name, value)
-
-
-def line(row: ParameterRow, reading: ParameterValue) -> str:
-    """One parameter as `servodeck params get` prints it."""
-    if reading.raw is None:
-        return f"{row.key}  {row.name}: {reading.error}"
-    label = row.enum.get(reading.raw, "") if isinstance(reading.raw, int) else ""
-    shown = f"{reading.value} {row.unit}".rstrip() + (f" ({label})" if label else "")
-    raw = f"  [raw {reading.raw}]" if reading.raw != reading.value else ""
-    return f"{row.key}  {row.name} = {shown}{raw}"
+    return find

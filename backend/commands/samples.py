@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.api.live_scope import BASES, MAGIC, TRUE_TIMES
+from backend.api.scope_blocks import BASES, HEADER, MAGIC, TRUE_TIMES
 from drivers.errors import ProtocolError
-
-_HEADER = struct.Struct("<IIIIHHIdd")
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +28,8 @@ def decode(frame: bytes) -> Samples:
         ProtocolError: it is no scope block.
     """
     try:
-        magic, _sub, _seq, dropped, rows, columns, flags, t0_s, dt_s = _HEADER.unpack_from(frame)
-        at = _HEADER.size if magic == MAGIC else len(frame) + 1
+        magic, _sub, _seq, dropped, rows, columns, flags, t0_s, dt_s = HEADER.unpack_from(frame)
+        at = HEADER.size if magic == MAGIC else len(frame) + 1
         times = t0_s + dt_s * np.arange(rows, dtype=np.float64)
         if flags & TRUE_TIMES:
             times, at = np.frombuffer(frame, "<f8", rows, at), at + 8 * rows

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import functools
+import signal
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
@@ -52,6 +54,19 @@ def run(work: Callable[[], Awaitable[T]]) -> T:
 
     with reported():
         return asyncio.run(body())
+
+
+def until_interrupted(work: Callable[[], Awaitable[None]]) -> None:
+    """Run it; Ctrl+C and a service manager's end (SIGTERM) are both orderly."""
+
+    def end(_number: int, _frame: object) -> None:
+        # A service manager's end is as orderly as Ctrl+C: virtual drives and folders are let go.
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, end)
+    # uvicorn has already shut down in order when the interrupt arrives here.
+    with contextlib.suppress(KeyboardInterrupt):
+        run(work)
 
 
 def told(command: Callable[P, T]) -> Callable[P, T]:

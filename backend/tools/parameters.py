@@ -36,8 +36,9 @@ async def read_all(drive: Drive, keys: Sequence[str] | None, progress: Progress)
     """
     wanted = readable_keys(drive) if keys is None else list(keys)
     readings = await drive.read_many(wanted, progress)
-    failed = {key: r.error for key, r in readings.items() if r.error}
-    return {"read": len(readings) - len(failed), "failed": failed}
+    failed = {key: r.error for key, r in readings.items() if r.error and not r.unused}
+    read = sum(not r.error for r in readings.values())
+    return {"read": read, "failed": failed}
 
 
 async def save_set(

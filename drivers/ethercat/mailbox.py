@@ -80,6 +80,8 @@ _DEAD_READS, _DEAD_S, _DEAD_PAUSE_S = 5, 0.05, 0.002
 """A station is gone after so many reads and so long: the segment may only stand still."""
 _WORTH_WAITING_S = 0.0003
 _LONGEST_WAIT_S, _FIRST_USUAL_S = 0.01, 0.0002
+_LOOKS, _LOOK_AGAIN_S = 4, 40e-6
+_EARLIER, _LATER = 0.997, 0.25
 
 
 class Overtaken(LinkTimeout):
@@ -87,6 +89,19 @@ class Overtaken(LinkTimeout):
 
     What was read can be read again; a write is never repeated, its outcome is unknown.
     """
+
+
+class _Seen(NamedTuple):
+    """What came of looking into the mailbox without asking for its status.
+
+    ``repeat_at`` is set where a frame was lost: not at once, the slave may not have answered yet,
+    and would repeat an old mail.
+    """
+
+    mail: Mail | None
+    at_s: float
+    at_once: bool = False
+    repeat_at: float | None = None
 
 
 class Mail(NamedTuple):
@@ -143,7 +158,6 @@ class Mailbox:
     repeats: int = field(default=0, init=False)
     usual_s: float = field(default=0.0, init=False)
     """How long answers take as a rule: asking earlier only disturbs."""
-    _found_at_once: int = field(default=0, init=False)
     _last_counter: int = field(default=0, init=False)
     _asked_again: bool = field(default=False, init=False)
     epoch: int = field(default=0, init=False)
@@ -251,12 +265,11 @@ class Mailbox:
         resend_at = asked + _RESEND_S
         dead, dead_from = 0, asked
         pause_s = 0.0
-        early, repeat_at = yield from self._first_look(mail, delivered)
-        polls = 0
+        early, looked_at, at_once, repeat_at = yield from self._look(mail, delivered)
         while True:
             if early is None:
+                looked_at, at_once = self.clock(), False
                 status = yield Read(SM1_STATUS, 1)
-                polls += 1
                 if status is not None:
                     dead, dead_from = 0, self.clock()
                 else:
@@ -278,7 +291,7 @@ class Mailbox:
                 if answer.protocol == MAILBOX_ERROR:
                     self._raise_error(answer.payload)
                 if matches(answer):
-                    self._learn(self.clock() - asked, polls)
+                    self._learn(looked_at - asked, at_once=at_once)
                     return answer.payload
                 if keep:
                     self._aside.append(answer)
@@ -303,21 +316,30 @@ class Mailbox:
                 yield Pause(pause_s)
             pause_s = min(pause_s + 0.00002, 0.0005)
 
-    def _first_look(self, mail: bytes, delivered: bool) -> Steps[tuple[Mail | None, float | None]]:
+    def _look(self, mail: bytes, delivered: bool) -> Steps[_Seen]:
         """Read the mailbox without asking for its status, when the answer is usually there.
 
-        Two frames for a transaction instead of three and more. An empty mailbox does no harm
-        (working counter 0). Where the frame is lost, the second value says when to ask the slave
-        to repeat its mail: not at once, it may not have answered yet, and would repeat an old one.
+        Two frames for a transaction instead of three and more: an empty mailbox does no harm
+        (working counter 0), and looking again is one frame.
         """
+        at = self.clock()
         if not mail or not delivered or not self.usual_s:
-            return None, None
+            return _Seen(None, at)
+        epoch = self.epoch
         if self.usual_s > _WORTH_WAITING_S:
             yield Pause(min(self.usual_s, _LONGEST_WAIT_S))
-        data = yield Read(self.in_address, self.in_size, may_be_empty=True)
-        if data is None:
-            return None, self.clock() + max(3 * self.usual_s, _RESEND_S)
-        return (self._received(data) if data else None), None
+        for number in range(_LOOKS):
+            if number:
+                yield Pause(_LOOK_AGAIN_S)
+            if self.epoch != epoch:
+                break
+            at = self.clock()
+            data = yield Read(self.in_address, self.in_size, may_be_empty=True)
+            if data is None:
+                return _Seen(None, at, repeat_at=self.clock() + max(3 * self.usual_s, _RESEND_S))
+            if data:
+                return _Seen(self._received(data), at, at_once=number == 0)
+        return _Seen(None, at)
 
     def _received(self, data: bytes) -> Mail | None:
         """A mail; None for one that the slave has sent before (ETG.1000.4 clause 5.6)."""
@@ -335,18 +357,19 @@ class Mailbox:
                 return payload
         raise _overtaken()
 
-    def _learn(self, took_s: float, polls: int) -> None:
-        """How long to leave the slave alone next time.
+    def _learn(self, took_s: float, *, at_once: bool) -> None:
+        """How long to leave the slave alone next time: until the first look just finds the answer.
 
-        Long enough for the first look to find the answer, in two frames instead of five; shorter
-        again while it always does. One slow answer (a drive that writes its memory) is no rule.
+        A little shorter each time while it does, and longer by a part of what was missed. One slow
+        answer (a drive that writes its memory) is no rule.
         """
-        if polls:
-            self.usual_s = min(took_s * 1.05, self.usual_s * 1.5 + _FIRST_USUAL_S)
-            self._found_at_once = 0
-            return
-        self._found_at_once += 1
-        self.usual_s *= 0.995 if self._found_at_once < 10 else 0.97
+        if at_once:
+            self.usual_s *= _EARLIER
+        elif not self.usual_s:
+            self.usual_s = took_s
+        else:
+            longer_s = max(took_s - self.usual_s, 0.0) * _LATER
+            self.usual_s += min(longer_s, self.usual_s / 2 + _FIRST_USUAL_S)
 
     def _fetch(self) -> Steps[Mail | None]:
         """Read the full mailbox, asking for a repeat when the frame with it was lost."""

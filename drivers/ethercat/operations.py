@@ -175,7 +175,6 @@ class Operations:
         station = self._calm_station(message)
         self._require_parameters(station)
         index, subindex, data = message["index"], message["subindex"], message["data"]
-        station.forget_void(index)
         if self.roster.exchange.route_write(station.number, index, subindex, data):
             done(None, None)
             return

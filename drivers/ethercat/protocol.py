@@ -38,7 +38,7 @@ _KINDS: dict[str, type[DriveError]] = {
     kind.kind: kind
     for kind in (
         DriveError, errors.LinkTimeout, errors.LinkLost, errors.ProtocolError,
-        errors.OutOfRange, errors.NotAllowed, errors.Busy,
+        errors.OutOfRange, errors.NotAllowed, errors.NotInUse, errors.Busy,
     )
 }  # fmt: skip
 

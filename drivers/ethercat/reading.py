@@ -1,13 +1,14 @@
 """Reading many entries of one slave with as few questions as it allows.
 
-Transactions of steps; no I/O. Source: ETG.1000.6 clauses 5.6.2 (complete access) and 5.6.7.4.
+Transactions of steps; no I/O. Source: ETG.1000.6 clauses 5.6.2 (complete access) and 5.6.7.4
+(process-data lists: subindex 0 is the number of entries that there are).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from drivers.errors import DriveError, LinkLost, LinkTimeout, Rejected
+from drivers.errors import DriveError, LinkLost, LinkTimeout, NotInUse, Rejected
 from drivers.ethercat import coe, information
 from drivers.ethercat.mailbox import Gap, Steps
 from drivers.ethercat.station import Station
@@ -35,17 +36,19 @@ def read_items(
     dead: DriveError | None = None
     for index, members in groups.items():
         sizes = _sizes_of_whole(station, index, members) if dead is None else {}
-        whole: dict[int, bytes] = {}
         if sizes:
             yield Gap()
             whole = yield from _read_whole(station, index, sizes)
-            known = whole | _void_of(station, index, whole)
-            results.update({item: _sized(item, known) for item in members if item[1] in known})
-        for item in members:
+            results.update({item: _sized(item, whole) for item in members if item[1] in whole})
+        # The count first: entries beyond it are not asked for.
+        for item in sorted(members, key=lambda item: item[1]):
             if item in results:
                 continue
             if dead is not None:
                 results[item] = dead
+                continue
+            if (unused := _not_in_use(item, results, members)) is not None:
+                results[item] = unused
                 continue
             yield Gap()
             try:
@@ -54,14 +57,33 @@ def read_items(
                 results[item] = error
                 if isinstance(error, LinkLost | LinkTimeout):
                     dead = error
-        read = {item[1]: results[item] for item in members}
-        good = {sub: value for sub, value in read.items() if isinstance(value, bytes)}
         if index in station.to_prove:
+            read = {item[1]: results[item] for item in members}
+            good = {sub: value for sub, value in read.items() if isinstance(value, bytes)}
             _prove(station, index, sizes, good)
-        elif sizes and whole:
-            _remember_void(station, index, whole, good)
         on_progress(len(results))
     return [results[item] for item in items]
+
+
+def _not_in_use(
+    item: Item, results: dict[Item, bytes | DriveError], members: Sequence[Item]
+) -> NotInUse | None:
+    """Why an entry of a process-data list beyond its count is not asked for.
+
+    It is none of the list: many drives deny that it exists, others answer with what was left
+    there. Read by itself (`coe.upload`) the drive is asked all the same.
+    """
+    index, subindex, _ = item
+    if index not in _LISTS or not subindex:
+        return None
+    told = next((results.get(member) for member in members if member[1] == 0), None)
+    if not isinstance(told, bytes) or subindex <= (count := int.from_bytes(told, "little")):
+        return None
+    return NotInUse(
+        f"not in use: {index:04X}:00 counts {count} entries",
+        parameter=f"{index:04X}:{subindex:02X}",
+        remedy="set the count higher first, or read this entry by itself",
+    )
 
 
 def _sized(item: Item, known: dict[int, bytes]) -> bytes:
@@ -103,24 +125,6 @@ def _read_whole(station: Station, index: int, sizes: dict[int, int]) -> Steps[di
     else:
         station.to_prove[index] = data
     return {}
-
-
-def _void_of(station: Station, index: int, whole: dict[int, bytes]) -> dict[int, bytes]:
-    """Entries of a process-data list beyond its count, as told when it last read just the same.
-
-    They mean nothing (ETG.1000.6 clause 5.6.7.4) and can only be read one by one, so they are not
-    asked for every time. `Station.forget_void` where somebody writes the list.
-    """
-    before, void = station.void.get(index, ({}, {}))
-    return void if whole and whole == before else {}
-
-
-def _remember_void(
-    station: Station, index: int, whole: dict[int, bytes], read: dict[int, bytes]
-) -> None:
-    beyond = {sub: value for sub, value in read.items() if sub not in whole}
-    if index in _LISTS and beyond and not any(map(any, beyond.values())):
-        station.void[index] = (whole, beyond)
 
 
 def _is_all_there_is(station: Station, index: int, sizes: dict[int, int]) -> Steps[bool]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import gc
-import os
 import signal
 import sys
 from dataclasses import dataclass
 
+from drivers import scheduling
+
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
-_PR_SET_PDEATHSIG, _PR_SET_TIMERSLACK = 1, 29
+_PR_SET_PDEATHSIG = 1
 _PRIORITY = 40
 
 
@@ -33,12 +34,10 @@ def claim(*, wanted: bool = True) -> RealTime:
         return RealTime(0, memory_locked=False, notes=("real-time scheduling was not asked for",))
     notes = []
     libc = ctypes.CDLL(None, use_errno=True)
-    libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
-    priority = 0
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
-        priority = _PRIORITY
-    except OSError:
+    scheduling.fine_timers()
+    priority = _PRIORITY if scheduling.real_time(_PRIORITY) else 0
+    if not priority:
+        scheduling.short_slice()
         notes.append(
             "the system grants no real-time scheduling (SCHED_FIFO), so single cycles may be some"
             " milliseconds late on a busy computer; CAP_SYS_NICE or an rtprio limit grants it"

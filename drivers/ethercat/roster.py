@@ -19,6 +19,7 @@ from drivers.ethercat.setup import restore_mailbox
 from drivers.ethercat.station import Station
 
 _FIND_S, _WATCH_S, _REOPEN_S = 30.0, 0.25, 1.0
+_LET_END_S = 0.3
 _MIN_MAILBOX = 16
 _FIND_TRIES = 5
 
@@ -153,7 +154,6 @@ class Roster:
 
     def _returned(self, station: Station, *, restarted: bool) -> None:
         station.lost = False
-        station.forget_void()
         how = "was switched on again" if restarted else "answers again"
         self.event("back", station.number, f"station {station.number} {how}")
         if self.exchange.loop is not None and station.number in self.exchange.setups:
@@ -203,13 +203,21 @@ class Roster:
                 "the cyclic exchange runs on this segment",
                 remedy="stop it first: a search resets every drive",
             )
-        self.lanes.drop("the segment is being searched again")
         self._ring.host_lives_until(
             time.monotonic_ns() + int(_FIND_S * 1e9), "searching the segment"
         )
+        self._let_end()
+        self.lanes.drop("the segment is being searched again")
         self.segment.find()
         self.stations = [self._make_station(n + 1) for n in range(len(self.segment.slaves))]
         self.attached = True
+
+    def _let_end(self) -> None:
+        """What healthy drives were asked before is answered; a mute one is not waited for."""
+        deadline = time.monotonic() + _LET_END_S
+        while (due := self.lanes.wake_s()) is not None and time.monotonic() < deadline:
+            if not self.lanes.step():
+                time.sleep(max(min(due, deadline) - time.monotonic(), 0.0))
 
     def attach_and_identify(self) -> None:
         """Search the segment and begin to identify what is there."""

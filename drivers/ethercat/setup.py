@@ -58,7 +58,6 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
     Raises:
         NotAllowed: the drive refuses the mapping; the message says which object and why.
     """
-    station.forget_void()
     assign = yield from _assignments(station)
     for direction, pdo in (("rx", setup.rx), ("tx", setup.tx)):
         try:

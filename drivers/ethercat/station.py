@@ -49,9 +49,6 @@ class Station:
     to_prove: dict[int, bytes] = field(default_factory=dict)
     proven: dict[int, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     """Layouts of whole objects that were found equal to single reads, with their lengths."""
-    void: dict[int, tuple[dict[int, bytes], dict[int, bytes]]] = field(default_factory=dict)
-    """Process-data lists as they were read whole, with what was told of entries beyond their count:
-    nothing. See `drivers.ethercat.reading`."""
     describes: bool = True
     """It has the SDO information service, as far as is known."""
     notes: list[str] = field(default_factory=list)
@@ -82,13 +79,6 @@ class Station:
         if self.mailbox is None:
             raise NotAllowed(f"station {self.number} ({self.name}) has no mailbox: no parameters")
         return self.mailbox
-
-    def forget_void(self, index: int | None = None) -> None:
-        """A list was written, or, without ``index``, the drive may be another one now."""
-        if index is None:
-            self.void.clear()
-        else:
-            self.void.pop(index, None)
 
     def require_parameters(self) -> None:
         """Its state is one in which a drive answers for parameters.

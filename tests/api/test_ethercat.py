@@ -257,6 +257,48 @@ def test_command_line_finds_reads_writes_and_saves(station: Station, axes: tuple
     assert "try:" in refused
 
 
+def test_command_line_compares_and_loads(
+    station: Station, axes: tuple[str, str], tmp_path: Path
+) -> None:
+    at_b = ("--station", "2")
+    file = tmp_path / "b.sdset"
+    command(station, "params", "set", URL, "2005:03=170", *at_b)
+    command(station, "params", "dump", URL, "--out", str(file), *at_b)
+    assert command(station, "params", "diff", URL, str(file), *at_b) == ""
+    command(station, "params", "set", URL, "2005:03=180", *at_b)
+    shown = command(station, "params", "diff", URL, str(file), *at_b, code=1)
+    assert "2005:03" in shown
+    assert "drive 1800 → file 1700" in shown
+    done = command(station, "params", "load", URL, str(file), "--yes", *at_b)
+    assert "written 1, failed 0" in done
+    assert "the values before are in before load" in done
+    assert "[raw 1700]" in command(station, "params", "get", URL, "2005:03", *at_b)
+    assert "nothing to write" in command(station, "params", "load", URL, str(file), *at_b)
+    other = tmp_path / "other.sdset"
+    other.write_text(file.read_text().replace('profile = "mms7"', 'profile = "m6l"'))
+    refused = command(station, "params", "diff", URL, str(other), *at_b, code=1)
+    assert "is of a m6l drive, this is a mms7" in refused
+    refused = command(station, "params", "diff", URL, str(tmp_path / "none"), *at_b, code=1)
+    assert "cannot be read: No such file" in refused
+
+
+def test_command_line_tells_terminals_faults_and_gear(
+    station: Station, axes: tuple[str, str]
+) -> None:
+    at_b = ("--station", "2")
+    found = json.loads(command(station, "io", URL, "--json", *at_b))
+    assert [terminal["name"] for terminal in found] == ["DI1", "DI2", "DI3", "DI4", "DO1", "DO2"]
+    assert found[0]["function_name"] == "not used"
+    assert "20 past faults" in command(station, "faults", URL, *at_b)
+    screw = ("--kind", "screw", "--lead", "10", *at_b)
+    before = command(station, "params", "get", URL, "6092:01", *at_b)
+    assert "6092:01 Feed: 10000" in command(station, "gear", URL, *screw)
+    assert command(station, "params", "get", URL, "6092:01", *at_b) == before, "only planned"
+    assert "'6092:01': 65536" in command(station, "gear", URL, *screw, "--write")
+    assert "10000" in command(station, "params", "get", URL, "6092:01", *at_b)
+    command(station, "params", "set", URL, "6092:01=65536", "--raw", *at_b)
+
+
 def test_command_line_jogs_and_records(
     station: Station, axes: tuple[str, str], tmp_path: Path
 ) -> None:

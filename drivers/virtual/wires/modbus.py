@@ -24,7 +24,7 @@ from drivers.modbus.framing import (
     write_response,
 )
 from drivers.modbus.registers import Place, to_bytes, to_words
-from drivers.modbus.timing import fine_timers
+from drivers.scheduling import fine_timers
 from drivers.virtual.device import (
     ABORT_LENGTH,
     ABORT_NO_OBJECT,

@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 from backend import cli
 from backend.bench import Bench
 from backend.commands import session
-from backend.commands.params import _assignment
 from backend.commands.serve import _tell_problems
+from backend.commands.values import assignment
 from backend.drive import Drive
 from drivers.errors import NotAllowed
 from tests.support.memory_link import MemoryLink
@@ -76,7 +76,7 @@ async def test_a_state_folder_that_cannot_be_used_is_told_in_the_terminal(
 @pytest.mark.parametrize("text", ["nan", "inf", "-inf", "1e400", "five"])
 def test_what_is_no_number_is_refused_before_the_bus(drive: Drive, text: str) -> None:
     with pytest.raises(NotAllowed, match=f"2005:03 .*: '{text}' is not a number"):
-        _assignment(drive, f"2005:03={text}")
+        assignment(drive.parameter, f"2005:03={text}")
 
 
 def test_a_file_that_cannot_be_opened_is_named(
@@ -164,7 +164,7 @@ def test_a_service_managers_end_lets_go_of_everything() -> None:
 
     before = signal.getsignal(signal.SIGTERM)
     try:
-        cli._until_interrupted(work)
+        session.until_interrupted(work)
     finally:
         signal.signal(signal.SIGTERM, before)
     assert let_go == ["folder"]

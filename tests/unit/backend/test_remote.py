@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from backend.api.live_messages import ScopeChannelInfo, ScopeInfo
-from backend.api.live_scope import encode_block
+from backend.api.scope_blocks import encode_block
 from backend.commands.live import Recording
-from backend.commands.remote import DEFAULT_SERVER, server_for
+from backend.commands.options import DEFAULT_SERVER, server_for
 from backend.commands.samples import Samples, decode
 from drivers.errors import OutOfRange, ProtocolError
 from drivers.link import ScopeBlock

@@ -7,7 +7,7 @@ import struct
 import numpy as np
 import pytest
 
-from backend.api.live_scope import encode_block
+from backend.api.scope_blocks import encode_block
 from backend.scope_units import axis_scale
 from backend.units import AxisUnits
 from drivers.link import ScopeBlock

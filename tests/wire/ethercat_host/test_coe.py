@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from drivers.errors import LinkLost, LinkTimeout, ProtocolError, Rejected
+from drivers.errors import LinkLost, LinkTimeout, NotInUse, ProtocolError, Rejected
 from drivers.ethercat import coe as sdo
 from drivers.ethercat import information
 from drivers.ethercat.reading import read_items
@@ -315,29 +315,42 @@ def test_the_drives_own_dictionary_proves_the_layout_of_a_whole_object(
         assert asked == (1 if again else reads + (last == 4)), "the proof is kept"
 
 
-def test_entries_beyond_the_count_of_a_list_are_asked_for_once_until_it_changes() -> None:
-    """1600h with 2 of 4 entries in use: the others hold nothing, and only single reads tell."""
-    count = 2
+@pytest.mark.parametrize("complete", [True, False])
+def test_entries_beyond_the_count_of_a_list_are_not_asked_for(complete: bool) -> None:
+    """1600h with 2 of 4 entries in use (ETG.1000.6 clause 5.6.7.4: subindex 0 counts them).
+
+    A slave of the usual stack denies that the others exist; by itself each is asked all the same.
+    """
+    entries = {0: b"\x02", 1: b"\x10\x00\x40\x60", 2: b"\x20\x00\x7a\x60"}
 
     def react(request: bytes) -> list[bytes]:
-        mux = request[3:6]
+        mux, sub = request[3:6], request[5]
         if request[2] == 0x50:
-            whole = struct.pack("<BB", count, 0) + struct.pack("<2I", 0x60400010, 0x607A0020)
+            if not complete:
+                return [coe(2, b"\x80" + mux + struct.pack("<I", 0x06010000))]
+            whole = b"\x02\0" + entries[1] + entries[2]
             return [coe(3, b"\x51" + mux + struct.pack("<I", len(whole)) + whole)]
-        return [coe(3, b"\x43" + mux + bytes(4))]
+        if sub not in entries:
+            return [coe(2, b"\x80" + mux + struct.pack("<I", 0x06090011))]
+        value = entries[sub]
+        return [coe(3, bytes([0x43 | (4 - len(value)) << 2]) + mux + value.ljust(4, b"\0"))]
 
     slave = ScriptedSlave(react)
     station = Station(1, mailbox=slave.box())
-    items = [(0x1600, 0, 1), *((0x1600, sub, 4) for sub in range(1, 5))]
-    told = [b"\x02", b"\x10\x00\x40\x60", b"\x20\x00\x7a\x60", bytes(4), bytes(4)]
+    items = [*((0x1600, sub, 4) for sub in (4, 3, 2, 1)), (0x1600, 0, 1)]
     asked = []
-    for step in ("first", "again", "written", "again"):
-        if step == "written":
-            station.forget_void(0x1600)
+    for _ in range(2):
         before = len(slave.requests)
-        assert slave.run(read_items(station, items, lambda _n: None)) == told
+        told = slave.run(read_items(station, items, lambda _n: None))
+        assert told[2:] == [entries[2], entries[1], entries[0]]
+        for answer, sub in zip(told, (4, 3), strict=False):
+            assert isinstance(answer, NotInUse)
+            assert answer.message == "not in use: 1600:00 counts 2 entries"
+            assert answer.parameter == f"1600:0{sub}"
         asked.append(len(slave.requests) - before)
-    assert asked == [3, 1, 3, 1]
+    assert asked == ([1, 1] if complete else [4, 3])
+    with pytest.raises(Rejected):
+        slave.run(sdo.upload(station.box, 0x1600, 3))
 
 
 def test_a_count_that_is_printed_wider_comes_as_wide() -> None:

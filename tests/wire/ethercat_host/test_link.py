@@ -72,6 +72,17 @@ async def test_read_many_mixes_whole_objects_single_ones_and_refusals(rig: Rig) 
         assert rig.do("state")["frames"] - frames < 60  # type: ignore[index]
 
 
+@repeated
+async def test_a_search_does_not_end_what_healthy_drives_were_asked_before(rig: Rig) -> None:
+    async with rig.link() as bus:
+        rig.do("timing", sdo_s=0.01)
+        reading = [asyncio.create_task(bus.link.read_many(n, RECORD)) for n in (1, 2, 1, 2)]
+        await asyncio.sleep(0.005)
+        await bus.link.scan(quiet)
+        for answers in await asyncio.gather(*reading):
+            assert all(isinstance(answer, bytes) for answer in answers), answers
+
+
 async def test_write_long_and_short_and_refused(rig: Rig) -> None:
     async with rig.link() as bus:
         await bus.link.write(1, RECORD[1], b"\xcd\xab")

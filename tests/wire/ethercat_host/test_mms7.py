@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.cia402 import Mode, State
-from drivers.errors import DriveError
+from drivers.errors import DriveError, NotInUse
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
@@ -51,11 +51,16 @@ async def test_mms7_is_read_whole_and_moves(namespace: Namespace, mms7: VirtualS
         once = await link.read_many(1, addresses)
         again = await link.read_many(1, addresses)
         singles = [await link.read(1, address) for address in addresses[::7]]
-        assert not [a for a in (*once, *again) if isinstance(a, DriveError)]
+        unused = {str(a) for a, told in zip(addresses, once, strict=True)
+                  if isinstance(told, NotInUse)}  # fmt: skip
+        assert "1600:06" in unused, "five objects are mapped at first (004:5111)"
+        assert all(key[:2] in ("16", "1A") for key in unused)
+        others = [a for a in (*once, *again) if isinstance(a, DriveError)]
+        assert all(isinstance(a, NotInUse) for a in others)
         steady = [
             (a, b, c) for a, b, c in zip(once[::7], again[::7], singles, strict=True) if a == b
         ]
-        assert len(steady) > 0.9 * len(singles)
+        assert len(steady) > 0.8 * len(singles)
         assert all(b == c for _, b, c in steady), "whole objects and single reads agree"
         cyclic = link.process_data
         await cyclic.configure(

@@ -5538,6 +5538,12 @@ export interface components {
              */
             unsaved: boolean;
             /**
+             * Unused
+             * @description the drive's own count leaves it out: not asked for
+             * @default false
+             */
+            unused: boolean;
+            /**
              * Value
              * @description in the parameter's unit
              */

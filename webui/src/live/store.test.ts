@@ -23,6 +23,7 @@ const reading = (raw: number, time: string): ParameterValue => ({
   value: raw,
   time,
   error: '',
+  unused: false,
   unsaved: false,
   pending: '',
 })

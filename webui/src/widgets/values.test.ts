@@ -12,6 +12,7 @@ function row(part: Partial<ParameterRow>): ParameterRow {
     value: null,
     time: null,
     error: '',
+    unused: false,
     unsaved: false,
     pending: '',
   }

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import argparse
 import gc
-import os
 import sys
 from pathlib import Path
 
+from drivers import scheduling
 from drivers.errors import DriveError
 from drivers.virtual.device import Device
 from drivers.virtual.wires.ethercat.bench import axes_by_name, axes_of_bench, load_factory
@@ -45,11 +45,12 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _go_realtime(priority: int) -> None:
+    if priority and scheduling.real_time(priority):
+        return
+    # Drives answer at once whatever else this computer does.
+    scheduling.short_slice()
     if priority:
-        try:
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-        except PermissionError:
-            sys.stderr.write("SCHED_FIFO is not permitted here; running with normal priority\n")
+        sys.stderr.write("SCHED_FIFO is not permitted here; running with normal priority\n")
 
 
 def _warm_up(device: Device) -> None:

@@ -90,6 +90,7 @@ export const parameters = {
   'mark.differs': ['differs', '有差异'],
   'mark.refused': ['refused', '被拒绝'],
   'mark.unread': ['unread', '未读取'],
+  'mark.unused': ['not in use', '未使用'],
   'mark.stopped': ['set at stop', '停机设置'],
   'mark.readOnly': ['read only', '只读'],
   'mark.unreachable': ['not on this link', '此链路不可达'],

@@ -70,7 +70,7 @@ export function Detail({
           ? t('parameters.readAt', { time: dateTime(reading.time) })
           : t('parameters.notRead')}
       </p>
-      {reading.error && <p className="note fault">{reading.error}</p>}
+      {reading.error && <p className={reading.unused ? 'note' : 'note fault'}>{reading.error}</p>}
       {reading.pending && (
         <p className="note info">{t(`effective.${pendingKey(reading.pending)}`)}</p>
       )}

@@ -241,8 +241,8 @@ function Marks({ row, edit, problem, differs, reading }: Props & { reading: Para
         </span>
       )}
       {reading.error && (
-        <span className="mark refused" title={reading.error}>
-          {t('mark.unread')}
+        <span className={reading.unused ? 'mark quiet' : 'mark refused'} title={reading.error}>
+          {t(reading.unused ? 'mark.unused' : 'mark.unread')}
         </span>
       )}
       {row.settable === 'stopped' && <span className="mark quiet">{t('mark.stopped')}</span>}

@@ -47,7 +47,11 @@ function passes(row: ParameterRow, filter: Filter, marks: Marks): boolean {
     case 'favourites':
       return marks.favourites.has(row.key)
     case 'unread':
-      return row.reachable && row.access !== 'wo' && (!reading?.time || reading.error !== '')
+      return (
+        row.reachable &&
+        row.access !== 'wo' &&
+        (!reading?.time || (reading.error !== '' && !reading.unused))
+      )
     case 'stopped':
       return row.settable === 'stopped'
   }

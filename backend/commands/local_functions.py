@@ -1,0 +1,65 @@
+"""``servodeck io``, ``faults`` and ``gear`` on a bus that is opened for the command."""
+
+from __future__ import annotations
+
+from backend import gear as gears
+from backend.api.models import ActiveFault
+from backend.axis import Axis
+from backend.commands.function_answers import Faults, Gear, Past, Terminal, of_plan
+from backend.commands.options import Place
+from backend.commands.session import drive_at
+from backend.fault_history import history_of, read_history
+from backend.faults import active_faults, fault_keys
+from backend.io_functions import read_terminals
+from backend.mechanics_calc import Mechanics
+
+
+async def terminals(place: Place) -> list[Terminal]:
+    """All terminals, read now."""
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        states = await read_terminals(drive)
+    return [
+        Terminal(
+            state.terminal.name, state.terminal.direction, state.on, state.function,
+            state.function_name, state.inverted, list(state.same_function),
+        )
+        for state in states
+    ]  # fmt: skip
+
+
+async def faults(place: Place) -> Faults:
+    """Active faults and the drive's own record, read now."""
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        active = active_faults(drive, await drive.read_many(fault_keys(drive)))
+        history = history_of(drive)
+        readable = history is not None and history.kind != "unreadable"
+        past = await read_history(Axis(drive)) if readable else []
+    return Faults(
+        [
+            ActiveFault(
+                code=fault.code, name=fault.name, kind=fault.kind, causes=list(fault.causes),
+                remedies=list(fault.remedies), reset=fault.reset, source=fault.source,
+            )
+            for fault in active
+        ],
+        [
+            Past(
+                entry.name, entry.code_text, entry.fault.name if entry.fault else None,
+                {reading.key: reading.value for reading in entry.values}, entry.error,
+            )
+            for entry in past
+        ],
+        0 if history is None or readable else history.size,
+    )  # fmt: skip
+
+
+async def gear(place: Place, mechanics: Mechanics, *, write: bool) -> Gear:
+    """Plan the gear with the drive's encoder, and write it where that is wanted."""
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        axis = Axis(drive)
+        plan = await gears.plan(axis, mechanics)
+        told = of_plan(plan)
+        if not write:
+            return told
+        change = await gears.write_gear(axis, plan.values)
+    return told._replace(before=change.before, waits=change.waits)

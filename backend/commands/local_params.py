@@ -1,0 +1,120 @@
+"""``servodeck params`` on a bus that is opened for the length of the command."""
+
+from __future__ import annotations
+
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+from backend import parameter_set
+from backend.axis import Axis
+from backend.commands import values
+from backend.commands.options import Place
+from backend.commands.session import drive_at, progress, show_progress
+from backend.commands.values import Compared
+from backend.drive import Drive
+from backend.files import write_atomically
+from backend.library import SetLibrary
+from backend.parameter_set import ParameterSet
+from backend.tools import parameters, procedures
+from drivers.errors import NotAllowed
+
+
+async def get(place: Place, keys: list[str]) -> None:
+    """Read parameters and print them."""
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        readings = await drive.read_many(keys)
+        for key in keys:
+            parameter = drive.parameter(key)
+            print(values.line(parameter, readings[parameter.key]))
+
+
+async def put(place: Place, assignments: list[str], *, raw: bool) -> None:
+    """Write parameters; each is read back and printed."""
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        wanted = [values.assignment(drive.parameter, text) for text in assignments]
+        for parameter, value in wanted:
+            # Everything is checked before the first byte is written.
+            known = value if raw or isinstance(value, str) else parameter.to_raw(value)
+            drive.check(parameter, known)
+        for parameter, value in wanted:
+            print(values.line(parameter, await drive.write(parameter.key, value, raw=raw)))
+
+
+async def dump(
+    place: Place, out: Path | None, *, author: str, notes: str, motor_individual: bool
+) -> None:
+    """Read all settings and write them as a parameter set."""
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        wanted = parameter_set.storable(drive.profile, motor_individual=motor_individual)
+        keys = [p.key for p in wanted if not drive.unreachable_why(p)]
+        readings = await drive.read_many(keys, show_progress)
+        data = parameter_set.dump(
+            drive, readings.values(), author=author, notes=notes, saved=datetime.now(UTC)
+        )
+    if out is None:
+        sys.stdout.write(data.decode())
+    else:
+        write_atomically(out, data)
+        print(f"{out}: {sum(r.raw is not None for r in readings.values())} parameters")
+
+
+async def save(place: Place) -> None:
+    """Store the drive's settings in its own memory."""
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        known = drive.profile.procedure("save")
+        if known is None:
+            raise NotAllowed(
+                f"{drive.name} has no procedure that saves: it keeps what is written",
+                drive=drive.name,
+                remedy="nothing needs to be done",
+            )
+        await procedures.run_procedure(Axis(drive), known, True, progress())
+        print(f"{drive.name}: saved in the drive's memory")
+
+
+async def diff(place: Place, file: Path) -> bool:
+    """Print what differs; whether anything does."""
+    content = _content(file)
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        rows = await _differences(drive, content, file)
+    values.show(rows)
+    return any(row.differs for row in rows)
+
+
+async def load(place: Place, file: Path, *, yes: bool, other_drive: bool) -> bool:
+    """Write what differs after it was shown; whether every value was kept."""
+    content = _content(file)
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        keys = values.chosen(await _differences(drive, content, file), yes=yes)
+        if not keys:
+            return True
+        result = await parameters.load_set(
+            drive,
+            content,
+            keys,
+            show_progress,
+            library=SetLibrary(file.resolve().parent),
+            accept_other_identity=other_drive,
+        )
+        return values.loaded(result)
+
+
+def _content(file: Path) -> ParameterSet:
+    return parameter_set.parse(values.bytes_of(file), file.name)
+
+
+async def _differences(drive: Drive, content: ParameterSet, file: Path) -> list[Compared]:
+    if content.profile != drive.profile.drive:
+        raise values.other_family(file.name, content.profile, drive.name, drive.profile.drive)
+    keys = [row.key for row in content.rows if row.key in drive.profile.by_key]
+    reachable = [k for k in keys if not drive.unreachable_why(drive.parameter(k))]
+    ours = await drive.read_many(reachable, show_progress)
+    return [
+        Compared(
+            row.key, row.parameter.name if row.parameter else "?", row.ours, row.theirs,
+            row.status, row.problem, row.selected,
+        )
+        for row in parameter_set.compare(drive, content.rows, ours)
+        if row.status != "same"
+    ]  # fmt: skip

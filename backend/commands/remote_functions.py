@@ -1,0 +1,61 @@
+"""``servodeck io``, ``faults`` and ``gear`` of a running server's drive."""
+
+from __future__ import annotations
+
+from backend.api.models import ActiveFault
+from backend.api.models_functions import FaultHistoryInfo, GearPlanInfo, GearWritten, IoInfo
+from backend.commands.function_answers import Faults, Gear, Past, Terminal
+from backend.commands.options import Place
+from backend.commands.remote_params import remote_drive
+from backend.mechanics_calc import Mechanics
+
+
+async def terminals(place: Place) -> list[Terminal]:
+    """All terminals, read now."""
+    async with remote_drive(place) as (at, drive):
+        told = await at.ask("GET", f"/drives/{drive.id}/io", IoInfo)
+    return [
+        Terminal(
+            state.name, state.direction, state.on, state.function, state.function_name,
+            state.inverted, state.same_function,
+        )
+        for state in told.terminals
+    ]  # fmt: skip
+
+
+async def faults(place: Place) -> Faults:
+    """Active faults and the drive's own record, read now."""
+    async with remote_drive(place) as (at, drive):
+        here = f"/drives/{drive.id}"
+        active = await at.ask("GET", f"{here}/faults", list[ActiveFault])
+        history = await at.ask("GET", f"{here}/fault-history", FaultHistoryInfo)
+        if history.kind == "selected":
+            # Records behind a selector are only read when somebody asks: it is a write.
+            history = await at.ask("POST", f"{here}/fault-history/read", FaultHistoryInfo)
+    return Faults(
+        active,
+        [
+            Past(
+                entry.name, entry.code, entry.title if entry.known else None,
+                {reading.key: reading.value for reading in entry.values}, entry.error,
+            )
+            for entry in history.entries
+        ],
+        history.size if history.kind == "unreadable" else 0,
+    )  # fmt: skip
+
+
+async def gear(place: Place, mechanics: Mechanics, *, write: bool) -> Gear:
+    """Plan the gear with the drive's encoder, and write it where that is wanted."""
+    body = mechanics.model_dump(mode="json")
+    async with remote_drive(place) as (at, drive):
+        here = f"/drives/{drive.id}/gear"
+        plan = await at.ask("POST", f"{here}/plan", GearPlanInfo, body=body)
+        told = Gear(
+            [(value.key, value.name, value.raw) for value in plan.values],
+            plan.travel_per_motor_turn, plan.unit, plan.reached, plan.error_ppm, plan.warnings,
+        )  # fmt: skip
+        if not write:
+            return told
+        done = await at.ask("POST", f"{here}/write", GearWritten, body=body)
+    return told._replace(before=done.before, waits=done.waits)

@@ -1,0 +1,67 @@
+"""``servodeck scan``: what answers on a bus."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from backend.commands import remote_params
+from backend.commands.options import Server, Url, server_for
+from backend.commands.session import opened, run, show_progress
+from backend.matching import match_profiles
+from drivers.urls import parse_url
+
+
+def scan(
+    url: Url,
+    as_json: Annotated[bool, typer.Option("--json")] = False,
+    server: Server = None,
+) -> None:
+    """Look for drives on a bus."""
+
+    async def work() -> None:
+        rows = await _found(url, server)
+        if as_json:
+            print(json.dumps([row | {"profiles": list(fits)} for row, fits in rows], indent=1))
+            return
+        for row, fits in rows:
+            which = ", ".join(f"{name} ({sure})" for name, sure in fits.items())
+            name = row["name"] or "no name"
+            print(f"station {row['station']}: {name}  serial {row['serial']}  {which}")
+        if not rows:
+            print(f"no drive answers: check {_LOOK_AT[parse_url(url).scheme]}")
+
+    run(work)
+
+
+_SERIAL = "power, cable, baud rate, parity and address"
+_LOOK_AT = {
+    "mlink": _SERIAL,
+    "modbus": _SERIAL,
+    "canopen": "power, cable, both terminating resistors, bit rate and node number",
+    "ethercat": "power, cable (computer to IN of the first drive) and the interface's name",
+}
+_FOUND = {
+    "station", "vendor_id", "product_code", "revision", "serial", "name", "alias", "firmware",
+    "state", "notes",
+}  # fmt: skip
+
+
+async def _found(url: str, server: str | None) -> list[tuple[dict[str, object], dict[str, str]]]:
+    """What answers, and the profiles that fit with how sure that is."""
+    if at := server_for(url, server):
+        return [
+            (f.model_dump(include=_FOUND), {m.profile: m.confidence for m in f.matches})
+            for f in await remote_params.scan(at, url)
+        ]
+    async with opened(url) as link:
+        return [
+            (
+                {name: value for name, value in asdict(f).items() if name in _FOUND},
+                {m.profile.drive: m.confidence for m in match_profiles(link.kind, f)},
+            )
+            for f in await link.scan(show_progress, None)
+        ]

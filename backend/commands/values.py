@@ -1,0 +1,177 @@
+"""What `servodeck params` takes and prints, of a drive on a bus here or of a server's drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple, Protocol, TypeVar
+
+import typer
+
+from drivers.errors import NotAllowed
+from profiles.schema import Raw
+
+
+class Described(Protocol):
+    """What is known of a parameter."""
+
+    @property
+    def key(self) -> str:
+        """Key, as 6081:00."""
+
+    @property
+    def name(self) -> str:
+        """Name in words."""
+
+    @property
+    def type(self) -> str:
+        """Data type."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of its value, or empty."""
+
+    @property
+    def enum(self) -> Mapping[int, str]:
+        """Words of its values."""
+
+
+class Told(Protocol):
+    """What a drive said of it; ``raw`` is None where ``error`` says why."""
+
+    @property
+    def raw(self) -> Raw | None:
+        """As on the wire."""
+
+    @property
+    def value(self) -> Raw | None:
+        """In the parameter's unit."""
+
+    @property
+    def error(self) -> str:
+        """Why there is none, or empty."""
+
+
+class Compared(NamedTuple):
+    """One row of a set beside the drive; raw values."""
+
+    key: str
+    name: str
+    ours: Raw | None
+    theirs: Raw | None
+    status: str
+    problem: str
+    selected: bool
+
+    @property
+    def differs(self) -> bool:
+        """The drive has another value."""
+        return self.status == "differs"
+
+
+D = TypeVar("D", bound=Described)
+
+
+def finite(key: str, name: str, text: str) -> float:
+    """The number that is meant for a parameter.
+
+    Raises:
+        NotAllowed: it is none, or has no end.
+    """
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise NotAllowed(
+            f"{key} {name}: {text!r} is not a number",
+            parameter=key,
+            value=text,
+            remedy="give a number; hexadecimal with 0x",
+        )
+    return number
+
+
+def assignment(find: Callable[[str], D], text: str) -> tuple[D, Raw]:
+    """``KEY=VALUE`` as it is typed.
+
+    Raises:
+        NotAllowed: no assignment, no such parameter, or no number where one is needed.
+    """
+    key, separator, value = text.partition("=")
+    if not separator:
+        raise NotAllowed(f"{text!r} is no assignment", remedy="write KEY=VALUE, as 6081:00=1000")
+    parameter = find(key)
+    if parameter.type in ("STRING", "OCTETS"):
+        return parameter, value
+    try:
+        return parameter, int(value, 0)
+    except ValueError:
+        return parameter, finite(parameter.key, parameter.name, value)
+
+
+def line(parameter: Described, told: Told) -> str:
+    """A parameter and its value."""
+    if told.raw is None:
+        return f"{parameter.key}  {parameter.name}: {told.error}"
+    label = parameter.enum.get(told.raw, "") if isinstance(told.raw, int) else ""
+    shown = f"{told.value} {parameter.unit}".rstrip() + (f" ({label})" if label else "")
+    raw = f"  [raw {told.raw}]" if told.raw != told.value else ""
+    return f"{parameter.key}  {parameter.name} = {shown}{raw}"
+
+
+def bytes_of(file: Path) -> bytes:
+    """What a file of the command line holds.
+
+    Raises:
+        NotAllowed: it cannot be read.
+    """
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise NotAllowed(
+            f"{file} cannot be read: {error.strerror}", remedy="name a file that can be read"
+        ) from error
+
+
+def other_family(file: str, theirs: str, drive: str, ours: str) -> NotAllowed:
+    """The error of a set that belongs to another drive family."""
+    return NotAllowed(
+        f"{file} is of a {theirs} drive, this is a {ours}",
+        drive=drive,
+        remedy="choose a file of the same drive family",
+    )
+
+
+def show(rows: Iterable[Compared]) -> None:
+    """Print a comparison."""
+    for row in rows:
+        if row.differs:
+            print(f"{row.key}  {row.name}: drive {row.ours} → file {row.theirs}")
+        else:
+            words = f"{row.key}  {row.name}: {row.status.replace('_', ' ')} {row.problem}"
+            print(words.rstrip())
+
+
+def chosen(rows: Iterable[Compared], *, yes: bool) -> list[str]:
+    """Keys that are to be written, after they were shown and confirmed; none where nothing is.
+
+    Raises:
+        NotAllowed: the person said no.
+    """
+    rows = list(rows)
+    show(rows)
+    keys = [row.key for row in rows if row.selected]
+    if not keys:
+        print("nothing to write")
+    elif not yes and not typer.confirm(f"Write these {len(keys)} values?"):
+        raise NotAllowed("nothing was written", remedy="run it again to write")
+    return keys
+
+
+def loaded(result: Mapping[str, object]) -> bool:
+    """Tell what a load did; whether every value was kept."""
+    print(f"written {result['written']}, failed {result['failed']}")
+    print(f"the values before are in {result['backup']}")
+    return result["failed"] == 0

@@ -1,0 +1,77 @@
+"""``servodeck virtual``: one virtual drive on a real wire."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import signal
+import sys
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from backend.commands.session import until_interrupted
+from backend.demo import DemoBench
+from drivers.errors import NotAllowed
+from drivers.urls import parse_url
+from drivers.virtual.mechanics.spec import load_mechanics, standard_mechanics
+
+
+def virtual(
+    drive: str,
+    on: Annotated[str, typer.Option(help="bus URL; serial ones create the pty at that path")],
+    station: Annotated[int, typer.Option()] = 1,
+    mechanics: Annotated[Path | None, typer.Option(help="mechanics (TOML)")] = None,
+    nvm: Annotated[Path | None, typer.Option(help="folder of the drive's memory")] = None,
+) -> None:
+    """Run one virtual drive on a real wire, for any client."""
+
+    async def work() -> None:
+        bus = parse_url(on)
+        if bus.scheme == "ethercat" and not bus.is_virtual:
+            raise NotAllowed(
+                f"a virtual drive does not go on {on} by itself: it would answer on your network",
+                value=on,
+                limit="ethercat://virtual0",
+                remedy="write ethercat://virtual0, or see docs/virtual-drives.md for an interface",
+            )
+        try:
+            spec = load_mechanics(mechanics) if mechanics else standard_mechanics()
+        except (OSError, ValueError) as error:
+            raise NotAllowed(f"{mechanics}: {error}", remedy="correct the file") from error
+        with tempfile.TemporaryDirectory(prefix="servodeck-") as folder:
+            file = Path(folder) / "bench.json"
+            axis = {
+                "name": drive,
+                "drive": drive,
+                "on": on,
+                "station": station,
+                "mechanics": spec.model_dump(exclude_defaults=True),
+            }
+            file.write_text(json.dumps({"axis": [axis]}), "utf-8")
+            with _one_drive(file, Path(folder), nvm) as drives:
+                for real in drives.addresses.values():
+                    print(f"{drive} answers at {real} station {station}  (Ctrl+C ends it)")
+                sys.stdout.flush()
+                await _told_to_end()
+
+    until_interrupted(work)
+
+
+def _one_drive(file: Path, folder: Path, nvm: Path | None) -> DemoBench:
+    """The bench of `virtual`; its errors are about the command line, not about a file."""
+    try:
+        return DemoBench(file, folder, nvm)
+    except NotAllowed as error:
+        error.message = error.message.removeprefix(f"bench file {file}: ")
+        raise
+
+
+async def _told_to_end() -> None:
+    """Wait for Ctrl+C or for the end that a service is given (SIGTERM)."""
+    over, loop = asyncio.Event(), asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, over.set)
+    await over.wait()

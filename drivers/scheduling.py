@@ -1,0 +1,68 @@
+"""When the kernel lets a thread run: what anybody may ask for, and what needs a permission.
+
+Source: sched(7), prctl(2); slices of fair tasks: Linux 6.12, ``kernel/sched/syscalls.c``.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import sys
+
+_PR_SET_TIMERSLACK = 29
+_SYS_SCHED_SETATTR = {"x86_64": 314, "aarch64": 274, "riscv64": 274}
+SHORT_SLICE_NS = 100_000
+"""The least that the kernel gives."""
+
+
+class _SchedAttr(ctypes.Structure):
+    """``struct sched_attr`` of sched_setattr(2)."""
+
+    _fields_ = (
+        ("size", ctypes.c_uint32),
+        ("policy", ctypes.c_uint32),
+        ("flags", ctypes.c_uint64),
+        ("nice", ctypes.c_int32),
+        ("priority", ctypes.c_uint32),
+        ("runtime", ctypes.c_uint64),
+        ("deadline", ctypes.c_uint64),
+        ("period", ctypes.c_uint64),
+    )
+
+
+def fine_timers() -> None:
+    """Let the calling thread's sleeps end on time (Linux groups them by 50 µs otherwise)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+
+
+def real_time(priority: int) -> bool:
+    """SCHED_FIFO for this process; False where that is not permitted.
+
+    A thread that has it may never spin: the kernel throttles it for 50 ms a second.
+    """
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except OSError:
+        return False
+    return True
+
+
+def short_slice() -> bool:
+    """Ask for short turns, and so to get them soon: needs no permission.
+
+    A waking task then goes before one with longer turns that runs (PREEMPT_SHORT), instead of
+    waiting for the end of that one's turn, which is up to 3 ms. Its share of the processor stays
+    the same. False where the kernel does not know of it, or this task is not an ordinary one.
+    """
+    number = _SYS_SCHED_SETATTR.get(platform.machine())
+    if number is None or os.sched_getscheduler(0) != os.SCHED_OTHER:
+        return False
+    wanted = _SchedAttr(
+        size=ctypes.sizeof(_SchedAttr),
+        policy=os.SCHED_OTHER,
+        nice=os.getpriority(os.PRIO_PROCESS, 0),
+        runtime=SHORT_SLICE_NS,
+    )
+    return bool(ctypes.CDLL(None).syscall(number, 0, ctypes.byref(wanted), 0) == 0)
