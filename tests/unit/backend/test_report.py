@@ -295,6 +295,22 @@ def test_pdf_is_in_chinese(facts: Facts) -> None:
         assert part in text
 
 
+def test_pdf_brings_its_fonts_along(facts: Facts) -> None:
+    """Nothing is left to the reader's computer: names in rare characters, and the field's signs."""
+    rare = "龘镕堃 機械 ω Δφ ℃ ① →"
+    data = render_pdf(compose(replace(facts, machine=rare), "zh"))
+    assert rare in pdf_text(data)
+    fonts = {
+        str(font["/BaseFont"]): font.get_object()
+        for page in PdfReader(io.BytesIO(data)).pages
+        for font in (each.get_object() for each in page["/Resources"]["/Font"].values())  # type: ignore[index]
+    }
+    assert any("Droid" in name for name in fonts)
+    for name, font in fonts.items():
+        if name != "/Helvetica":  # reportlab names it on every page, and nothing is set in it
+            assert "/FontFile2" in font["/FontDescriptor"].get_object(), name
+
+
 def test_pdf_takes_any_text(facts: Facts) -> None:
     long = "word " * 4000 + "a" * 3000 + "很长" * 2000
     changed = replace(
