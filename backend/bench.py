@@ -146,7 +146,7 @@ class Bench:
             found = await link.scan(progress, stations, stop_after=1)
         else:
             found = await link.scan(progress, stations)
-        self.journal.add(f"{url}: found {len(found)} drives")
+        self.journal.add(f"{url}: {len(found)} {'drive' if len(found) == 1 else 'drives'} found")
         return found
 
     def _bus_event(self, url: str, event: LinkEvent) -> None:

@@ -29,6 +29,7 @@ TOLD_THERE = frozenset(
     for method, paths in {
         "POST": (
             "/stop", "/session", "/setup", "/guests", "/tokens", "/accounts", "/invitations",
+            "/drives", f"{_DRIVE}/ports",
             "/scan", "/search-line", "/descriptions/from-drive", "/sets/list",
             f"{_DRIVE}/sets", f"{_DRIVE}/transition", f"{_DRIVE}/fault-reset",
             f"{_DRIVE}/procedures/{{name}}", f"{_DRIVE}/jobs/load_set", f"{_DRIVE}/jobs/move",
@@ -45,6 +46,7 @@ TOLD_THERE = frozenset(
         ),
         "PATCH": ("/accounts/{account_id}", "/library/{entry_id}"),
         "DELETE": (
+            _DRIVE,
             "/session", "/sessions/{session_id}", "/tokens/{token_id}", "/accounts/{account_id}",
             "/invitations/{invitation_id}", "/invitations/{invitation_id}/grant",
             "/sets/{file}", "/library/{entry_id}",

@@ -28,8 +28,9 @@ from backend.api.models import (
     StopResult,
 )
 from backend.api.security import require_right
+from backend.audit import Fact
 from backend.audit.asked import note_before
-from backend.bench import Bench
+from backend.bench import Bench, Member
 from backend.jobs import Job, JobResult, Progress
 from backend.people.rights import Right
 from backend.second_port import require_same_drive
@@ -155,8 +156,14 @@ async def connect(
     member = await bench.connect(
         request.url, request.station, request.profile, request.name, found=found
     )
+    _tell_connected(bench, member, request.url, request.station)
     await member.monitor.refresh()
     return convert.drive_summary(bench, member)
+
+
+def _tell_connected(bench: Bench, member: Member, url: str, station: int) -> None:
+    where = f"{member.drive.profile.drive}, {url}, station {station}"
+    bench.audit.add(Fact("station", "connected", member.drive.name, where))
 
 
 @router.get("/drives/{drive_id}")
@@ -187,6 +194,7 @@ async def add_port(
     """
     check = None if request.accept_difference else require_same_drive
     await bench.add_port(member.drive.id, request.url, request.station, check)
+    _tell_connected(bench, member, request.url, request.station)
     return convert.drive_summary(bench, member, connection)
 
 
@@ -194,6 +202,7 @@ async def add_port(
 async def remove_drive(bench: TheBench, member: Controlled) -> Response:
     """Take a drive off the bench."""
     await bench.remove(member.drive.id)
+    bench.audit.add(Fact("station", "taken off the bench", member.drive.name))
     return Response(status_code=204)
 
 

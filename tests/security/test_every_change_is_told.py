@@ -27,8 +27,9 @@ from tests.support.guarded import PASSWORD, Caller, GuardedServer
 from tests.support.station import until
 
 CHANGING = {key for key in ROUTES if key.split(" ")[0] not in ("GET", "WS")}
-#: The first administrator is made on a station of its own, in test_bodies_and_guessing.
-ELSEWHERE = {f"POST {API}/setup"}
+#: The first administrator is made on a station of its own, in test_bodies_and_guessing; drives are
+#: connected over real buses in tests/api/test_two_ports.
+ELSEWHERE = {f"POST {API}{path}" for path in ("/setup", "/drives", "/drives/{drive_id}/ports")}
 SUCCESS = ("200", "201", "202")
 
 
@@ -283,6 +284,7 @@ REQUESTS = [
     Ask("PUT", "/session/password", {"person": "Vera", "action": "password changed"}, {}, "vera",
         {"json": {"present": PASSWORD, "password": PASSWORD + "s"}}, first=Scene.vera),
     Ask("DELETE", "/session", {"person": "Vera", "action": "logged out"}, {}, "vera"),
+    Ask("DELETE", X, BY_OLAF | {"kind": "station", "action": "taken off the bench"}, ON_X),
 ]  # fmt: skip
 
 

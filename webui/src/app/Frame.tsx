@@ -1,5 +1,5 @@
 import { ActionIcon, Drawer, NativeSelect } from '@mantine/core'
-import { type ReactNode, useEffect, useLayoutEffect, useState } from 'react'
+import { type ReactNode, useEffect, useLayoutEffect, useRef, useState } from 'react'
 import { known, useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '../live/store'
@@ -144,12 +144,18 @@ function AxisEntry({ id }: { id: string }) {
   const state = useAxisState(id)
   const t = useT()
   const look = stateLook(state)
+  const entry = useRef<HTMLButtonElement>(null)
+  const chosen = drive === id
+  useEffect(() => {
+    if (chosen) entry.current?.scrollIntoView({ block: 'nearest' })
+  }, [chosen])
   if (!summary) return null
   return (
     <button
+      ref={entry}
       type="button"
       className="entry axis-entry"
-      aria-current={drive === id ? 'true' : undefined}
+      aria-current={chosen ? 'true' : undefined}
       onClick={() => chooseDrive(id)}
     >
       <span className={`dot ${look.tone}`}>

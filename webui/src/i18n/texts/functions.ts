@@ -97,6 +97,10 @@ export const functions = {
   'gains.toTune': ['To the guided tuning', '前往引导调试'],
   'gains.toPage': ['All gains, filters and switching', '全部增益、滤波与切换'],
   'gains.none': ['The profile knows no gains of this drive.', '配置文件不含此驱动器的增益。'],
+  'gains.otherPort': [
+    'Gains that go by another port of this drive only and are not shown here: {count}. Connect that port as well:',
+    '有 {count} 个增益只能通过该驱动器的另一个端口访问，此处未显示。请同时连接该端口：',
+  ],
   'gains.set': ['Set {number}', '第 {number} 组'],
   'gains.picture': ['Control loops', '控制环'],
   'block.level': ['Stiffness level', '刚性等级'],

@@ -24,6 +24,8 @@ export function GainsPage({ drive }: { drive: string }) {
   }, [drive, open, rows])
   const reachable = new Set((rows ?? []).filter((row) => row.reachable).map((row) => row.key))
   const blocks = grouped(functions?.gain_blocks ?? [], reachable)
+  const named = new Set(functions?.gain_blocks.flatMap((block) => block.keys))
+  const elsewhere = (rows ?? []).filter((row) => !row.reachable && named.has(row.key)).length
   const show = (block: string) => {
     const panel = document.getElementById(`block-${block}`)
     panel?.scrollIntoView({ block: 'start' })
@@ -38,6 +40,12 @@ export function GainsPage({ drive }: { drive: string }) {
         {t('gains.pageHelp')} <a href={href('tune', drive)}>{t('gains.toTune')}</a>
       </p>
       <UndoNote drive={drive} onUndone={() => setAgain(again + 1)} />
+      {elsewhere > 0 && (
+        <p className="note warn">
+          {t('gains.otherPort', { count: elsewhere })}{' '}
+          <a href={href('connect', drive)}>{t('page.connect')}</a>
+        </p>
+      )}
       {functions && rows && blocks.length === 0 && <p className="empty">{t('gains.none')}</p>}
       {blocks.length > 0 && (
         <Panel title={t('gains.picture')}>
