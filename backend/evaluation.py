@@ -10,9 +10,8 @@ import numpy as np
 
 from backend.axis import Envelope
 from backend.measurements import BadMeasurement, Measurement
-from backend.tools import inertia as inertia_tool
+from backend.tools import inertia_evaluation, sweep_evaluation
 from backend.tools import step_response as step_tool
-from backend.tools import sweep_evaluation
 from backend.tools.recording import Recording
 
 #: Numbers nearer than this share are the same: another computer sums in another order.
@@ -60,7 +59,7 @@ def recompute(measurement: Measurement) -> dict[str, object]:
             case "sweep":
                 return sweep_evaluation.as_json(sweep_evaluation.reevaluate(arrays, meta))
             case "inertia":
-                return inertia_tool.as_json(inertia_tool.reevaluate(arrays, meta))
+                return inertia_evaluation.as_json(inertia_evaluation.reevaluate(arrays, meta))
             case "step":
                 return _step(measurement)
     except (

@@ -6,7 +6,8 @@
 Against the analytic response of the chain; the limits are those of the design (tuning.md,
 sections 2, 3 and 5). *lockstep* and *real-time* go over EtherCAT frames; *none* plays the
 product's own cycle beside the firmware, which no busy computer disturbs. ``--random`` adds
-mechanics drawn by their number.
+mechanics drawn by their number. DS_C and the drive of CiA 402 alone go over CANopen frames with
+SYNC in virtual time, DS_C with the encoder that it has.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
-import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -24,15 +24,18 @@ import numpy as np
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
-from backend.tools.autotune import AutotuneSettings, autotune
-from backend.tools.inertia import InertiaOutcome, InertiaSettings, Scheme, inertia
+from backend.tools import profile_speed
+from backend.tools.inertia import inertia
+from backend.tools.inertia_evaluation import InertiaOutcome, InertiaSettings, Scheme
 from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import Loop, SweepResult, SweepSettings
+from benchmarks._tune_figures import marked, true_modes
+from benchmarks.autotune_accuracy import tuned
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.virtual.mechanics import MechanicsSpec
-from drivers.virtual.mechanics.chain import continuous_chain
 from drivers.virtual.wires.netns import Namespace
+from tests.virtual.tools.can_rig import can_bench, incremental
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, Errors, bench, errors, mechanics
 
@@ -76,6 +79,11 @@ def drawn(seed: int) -> MechanicsSpec:
     )  # fmt: skip
 
 
+#: Families that are measured over CANopen with SYNC.
+_CANOPEN = ("ds_c", "generic402")
+_DRIVES = ("mms7", "m6l", "r6l", *_CANOPEN)
+
+
 @dataclass(frozen=True)
 class Rig:
     """Where an axis lives: family, rate, and what carries the bytes."""
@@ -92,6 +100,14 @@ class Rig:
         brake = {"2108:01": 1} if vertical and self.drive == "mms7" else None
         if vertical and brake is None:
             spec = spec.model_copy(update={"motor": spec.motor.model_copy(update={"brake": True})})
+        if self.drive in _CANOPEN:
+            can_spec = incremental(spec) if self.drive == "ds_c" else spec
+            async with (
+                can_bench(can_spec, 1e-3 / self.khz, drive=self.drive) as c,
+                profile_speed.prepared(c.axis, c.session, WIDE, True),
+            ):
+                yield c.axis, c.session
+            return
         if self.namespace is None:
             async with direct(spec, 1e-3 / self.khz, drive=self.drive, settings=brake) as d:
                 yield d.axis, d.session
@@ -107,20 +123,12 @@ def _limited(spec: MechanicsSpec) -> bool:
     return spec.travel.max_rev < 100
 
 
-def _true_modes(spec: MechanicsSpec) -> list[tuple[float, float]]:
-    """Frequency (Hz) and damping of the resonances of the chain, from its matrices."""
-    a, _b = continuous_chain(spec, 1e5)
-    poles = np.linalg.eigvals(a)
-    swinging = poles[poles.imag > 1.0]
-    return sorted((float(abs(p)) / (2 * np.pi), float(-p.real / abs(p))) for p in swinging)
-
-
 def _modes(found: SweepResult, spec: MechanicsSpec, highest_hz: float) -> str:
     """Worst error of frequency and damping over the resonances of the band; named when missed."""
     seen = [r for r in found.resonances if r.kind == "resonance"]
     worst_f = worst_d = 0.0
     missed = []
-    for hz, damping in _true_modes(spec):
+    for hz, damping in true_modes(spec):
         if not 5.0 < hz < highest_hz:
             continue
         near = min(seen, key=lambda r: abs(np.log(r.frequency_hz / hz)), default=None)
@@ -129,29 +137,29 @@ def _modes(found: SweepResult, spec: MechanicsSpec, highest_hz: float) -> str:
             continue
         worst_f = max(worst_f, abs(near.frequency_hz / hz - 1))
         worst_d = max(worst_d, abs(near.damping / damping - 1))
-    true = [hz for hz, _damping in _true_modes(spec)]
+    true = [hz for hz, _damping in true_modes(spec)]
     extra = [
         f"{r.frequency_hz:.0f}"
         for r in seen
         if not any(abs(r.frequency_hz / hz - 1) < 0.1 for hz in true)
     ]
-    text = f"f {_marked(worst_f, 0.01, '5.1%')} ζ {_marked(worst_d, 0.15, '4.0%')}"
+    text = f"f {marked(worst_f, 0.01, '5.1%')} ζ {marked(worst_d, 0.15, '4.0%')}"
     text += f" missed {','.join(missed)} Hz" if missed else ""
     return text + (f" extra {','.join(extra)} Hz" if extra else "")
-
-
-def _marked(value: float, limit: float, form: str) -> str:
-    """A figure, with an exclamation mark where it misses its limit."""
-    return f"{value:{form}}" + (" " if value <= limit else "!")
 
 
 def _told(name: str, part: Errors, limits: tuple[float, float]) -> str:
     db, deg = limits
     covered = " " if part.covered >= 0.9 else "!"
     return (
-        f"{name} {_marked(part.magnitude_db, db, '5.2f')}dB "
-        f"{_marked(part.phase_deg, deg, '5.2f')}° {part.covered:4.0%}{covered}"
+        f"{name} {marked(part.magnitude_db, db, '5.2f')}dB "
+        f"{marked(part.phase_deg, deg, '5.2f')}° {part.covered:4.0%}{covered}"
     )
+
+
+def _rated(rig: Rig, spec: MechanicsSpec) -> float | None:
+    """From the nameplate where the drive does not tell it on this bus (DS_C: Modbus only)."""
+    return spec.motor.rated_torque_nm if rig.drive in _CANOPEN else None
 
 
 async def _ready(axis: Axis) -> None:
@@ -165,7 +173,8 @@ async def _frequency(rig: Rig, spec: MechanicsSpec) -> str:
     envelope = Envelope(1.2, 1500.0, 100.0, 60.0) if limited else WIDE
     async with rig.axis(spec) as (axis, session):
         await _ready(axis)
-        found = await sweep(axis, session, SweepSettings(envelope, loop=loop), _silent())
+        settings = SweepSettings(envelope, loop=loop, rated_torque_nm=_rated(rig, spec))
+        found = await sweep(axis, session, settings, _silent())
     free = found.loop == "none"
     if rig.khz >= 4:
         parts = _told("direct", errors(found.direct, spec, 5, 1000), (0.3, 3.0))
@@ -177,7 +186,7 @@ async def _frequency(rig: Rig, spec: MechanicsSpec) -> str:
         above = errors(found.frf, spec, 250 * rig.khz, 400 * rig.khz)
         parts += " " + _told("model above", above, (0.6, 4.0))
     top = min(1200.0, 400 * rig.khz)
-    took = _marked(found.motion_s, 10.0, "4.1f")
+    took = marked(found.motion_s, 10.0, "4.1f")
     model = "" if found.trusted else " no model"
     return f"{found.loop:8} {parts} {_modes(found, spec, top)} {took}s{model}"
 
@@ -187,7 +196,9 @@ async def _inertia(rig: Rig, spec: MechanicsSpec) -> str:
     scheme: Scheme = "limited" if limited else "free"
     async with rig.axis(spec) as (axis, session):
         await _ready(axis)
-        settings = InertiaSettings(WIDE, scheme, search_speed_rpm=60.0)
+        settings = InertiaSettings(
+            WIDE, scheme, search_speed_rpm=60.0, rated_torque_nm=_rated(rig, spec)
+        )
         outcome = await inertia(axis, session, settings, _silent())
     return _moved(outcome, spec)
 
@@ -207,39 +218,9 @@ def _moved(outcome: InertiaOutcome, spec: MechanicsSpec) -> str:
 
 
 async def _tuned(rig: Rig, spec: MechanicsSpec) -> str:
-    limited = _limited(spec)
-    began = time.monotonic()
     async with rig.axis(spec) as (axis, session):
         await _ready(axis)
-        rotor = None if rig.drive == "mms7" else spec.motor.inertia_kgm2
-        settings = AutotuneSettings(
-            WIDE, scheme="limited" if limited else "free", motor_inertia_kgm2=rotor
-        )
-        found = await autotune(axis, session, settings, _silent())
-    applied, verified = found.applied, found.verified
-    if applied is None or verified is None:
-        return "nothing applied"
-    m, p = verified.sweep.margins, applied.promised
-    plain = [c for c in found.candidates if not c.notches]
-    gain = applied.gains.speed_bandwidth_hz / max(
-        (c.gains.speed_bandwidth_hz for c in plain), default=np.nan
-    )
-    return (
-        f"{found.load:9} {len(applied.notches)} notches  bandwidth "
-        f"{_hz(verified.predicted_bandwidth_hz)}→{_hz(verified.measured_bandwidth_hz)}  PM "
-        f"{p.phase_margin_deg:.0f}→{_number(m.get('phase_margin_deg'))}°  GM "
-        f"{p.gain_margin_db:.1f}→{_number(m.get('gain_margin_db'))} dB  Ms {p.ms:.2f}→"
-        f"{_number(m.get('ms'))}  ×{gain:.1f} of no notch  tried {len(found.tried)}  "
-        f"{time.monotonic() - began:.0f} s"
-    )
-
-
-def _hz(value: float | None) -> str:
-    return "–" if value is None else f"{value:.0f} Hz"
-
-
-def _number(value: float | bool | None) -> str:
-    return f"{value:.2f}" if isinstance(value, float) else "–"
+        return await tuned(axis, session, spec, "limited" if _limited(spec) else "free")
 
 
 def _silent() -> Progress:
@@ -262,7 +243,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--khz", type=float, nargs="+", default=[1.0, 4.0])
-    parser.add_argument("--drive", nargs="+", default=["mms7"], choices=["mms7", "m6l", "r6l"])
+    parser.add_argument("--drive", nargs="+", default=["mms7"], choices=_DRIVES)
     parser.add_argument("--only", nargs="+", default=list(AXES), choices=[*AXES, "none"])
     parser.add_argument("--wire", default="lockstep", choices=["lockstep", "real-time", "none"])
     parser.add_argument("--random", type=int, default=0, help="how many drawn mechanics to add")
@@ -274,7 +255,7 @@ def main() -> None:
     axes |= {f"drawn {number}": drawn(number) for number in numbers}
     with contextlib.ExitStack() as stack:
         namespace = None
-        if options.wire != "none":
+        if options.wire != "none" and not set(options.drive) <= set(_CANOPEN):
             namespace = stack.enter_context(Namespace.create())
         rigs = [Rig(d, k, options.wire, namespace) for d in options.drive for k in options.khz]
         asyncio.run(_all(rigs, axes, options.autotune))

@@ -12,14 +12,9 @@ import numpy as np
 from fastapi import APIRouter
 
 from backend.analysis.arrays import magnitude_db, phase_deg
-from backend.analysis.design import (
-    Gains,
-    MeasuredPlant,
-    measured_plant,
-    speed_loop,
-    step_of_closed_loop,
-)
+from backend.analysis.loop_structure import Gains, speed_loop, step_of_closed_loop
 from backend.analysis.margins import closed_from_open, sensitivity
+from backend.analysis.measured_plant import MeasuredPlant, measured_plant
 from backend.analysis.notch import Notch, RealisedNotch
 from backend.api.context import Controlled, TheBench, TheMember
 from backend.api.models_tune import (
@@ -41,7 +36,7 @@ from backend.api.routes_measurements import change_log, measurement_head
 from backend.bench import Bench, Member
 from backend.measurements import BadMeasurement, unpack
 from backend.report.changes import Change
-from backend.tools import autotune, gains, notch, sweep_evaluation
+from backend.tools import gains, notch, sweep_evaluation, tune_candidates
 from backend.tools.axis_facts import read_facts
 from backend.tools.notch_meaning import meaning_of
 from backend.tools.temporary import put_back, write_settings
@@ -205,20 +200,20 @@ async def candidates(
 ) -> CandidatesInfo:
     """Notch sets and gains for a stored response. Nothing is written."""
     plant, found = await _plant(bench, request.measurement)
-    facts = await read_facts(member.axis)
-    load = request.load or autotune.load_class(found)
+    facts = sweep_evaluation.completed(await read_facts(member.axis), found)
+    load = request.load or tune_candidates.load_class(found)
     table = await asyncio.to_thread(
-        autotune.candidates_for, member.drive, facts, plant, request.inertia_kgm2, load,
+        tune_candidates.candidates_for, member.drive, facts, plant, request.inertia_kgm2, load,
         request.sample_rate_hz,
     )  # fmt: skip
-    return CandidatesInfo(load=load, candidates=[autotune.candidate_json(c) for c in table])
+    return CandidatesInfo(load=load, candidates=[tune_candidates.candidate_json(c) for c in table])
 
 
 @router.post("/drives/{drive_id}/tune/predict")
 async def predict(bench: TheBench, member: TheMember, request: PredictRequest) -> PredictionInfo:
     """The speed loop that notches and gains would make of a stored response."""
-    plant, _found = await _plant(bench, request.measurement)
-    facts = await read_facts(member.axis)
+    plant, found = await _plant(bench, request.measurement)
+    facts = sweep_evaluation.completed(await read_facts(member.axis), found)
     wanted = [n for n in _notches(request.notches) if n is not None]
     g, f = request.gains, plant.frequency_hz
     try:

@@ -32,6 +32,7 @@ from backend.report.changes import Change
 from backend.tools import (
     autotune,
     inertia,
+    inertia_evaluation,
     profile_speed,
     step_response,
     sweep,
@@ -149,14 +150,14 @@ async def start_sweep(bench: TheBench, member: Controlled, request: SweepRequest
 @router.post("/drives/{drive_id}/jobs/inertia", status_code=202)
 async def start_inertia(bench: TheBench, member: Controlled, request: InertiaRequest) -> JobInfo:
     """Measure inertia and friction. The result has the form of ``servodeck inertia --out``."""
-    settings = inertia.InertiaSettings(
+    settings = inertia_evaluation.InertiaSettings(
         _envelope(request), request.scheme, request.ends_rev, request.search_torque,
         request.search_speed, request.repetitions, request.rated_torque_nm,
         request.motor_inertia_kgm2,
     )  # fmt: skip
 
     async def tool(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
-        return inertia.as_json(
+        return inertia_evaluation.as_json(
             await inertia.inertia(member.axis, session, settings, progress, keep)
         )
 

@@ -157,9 +157,10 @@ def inertia(
     }  # fmt: skip
 
     async def here() -> dict[str, object]:
-        from backend.tools import inertia as inertia_tool
+        from backend.tools import inertia_evaluation
+        from backend.tools.inertia import inertia as measure_inertia
 
-        settings = inertia_tool.InertiaSettings(
+        settings = inertia_evaluation.InertiaSettings(
             Envelope(travel_rev, speed_rpm, torque_percent, 60.0), scheme.value, ends,
             repetitions=repetitions, rated_torque_nm=rated_torque_nm,
             motor_inertia_kgm2=motor_inertia_kgm2,
@@ -168,8 +169,8 @@ def inertia(
             found,
             session,
         ):
-            return inertia_tool.as_json(
-                await inertia_tool.inertia(found, session, settings, progress())
+            return inertia_evaluation.as_json(
+                await measure_inertia(found, session, settings, progress())
             )
 
     _measure(out, here, "inertia", server, axis, cycle_ms, request)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.design import DriveLoops, Gains
+from backend.analysis.loop_structure import DriveLoops, Gains, LoopFilters
 from backend.axis import Axis
 from backend.drive import Drive
 from backend.tools.axis_facts import AxisFacts, read_facts, si, si_raw, si_value
@@ -20,6 +20,9 @@ from drivers.errors import NotAllowed
 from profiles.schema import GainSpec, StiffnessTable
 
 TURN = 2 * np.pi
+#: Filters are widened in so many steps: a torque filter to half its time, a speed filter by √2;
+#: no torque filter is made shorter than this.
+_WIDENINGS, _SHORTEST_S = 3, 0.1e-3
 #: Loop period of the drives: half of it to compute, half of it until the torque's mean follows.
 _LOOP_PERIOD_S = 50e-6
 
@@ -121,8 +124,9 @@ def plan_gains(
     spec = spec_of(drive)
     if spec.convention == "unit":
         raise NotAllowed(
-            f"{drive.name}: the manual does not print what the gains of {drive.profile.title} mean",
-            drive=drive.name, remedy="use its stiffness levels and measure the effect",
+            f"{drive.name}: the manual does not print what the gains of {drive.profile.title} "
+            "mean, so none can be computed",
+            drive=drive.name, remedy=_by_hand(drive),
         )  # fmt: skip
     raw: dict[str, int] = {}
     if spec.inertia is not None and spec.inertia_meaning is not None:
@@ -143,6 +147,52 @@ def plan_gains(
     if table is not None and table.mode_key is not None and table.manual_raw is not None:
         raw[table.mode_key] = table.manual_raw
     return {key: _within(drive, key, value) for key, value in raw.items()}
+
+
+def filter_choices(drive: Drive, now: LoopFilters) -> tuple[LoopFilters, ...]:
+    """Wider filters that the drive can be given in place of those that it has now."""
+    spec = spec_of(drive)
+    found: list[LoopFilters] = []
+    last = now
+    for _ in range(_WIDENINGS):
+        speed, torque = last.speed_hz, last.torque_hz
+        if spec.speed_filter is not None and speed is not None:
+            speed = max(speed, _held(drive, spec.speed_filter, speed * 2**0.5))
+        if spec.torque_filter is not None and torque is not None:
+            shorter = max(0.5 / (TURN * torque), _SHORTEST_S)
+            shorter = _held(drive, spec.torque_filter, shorter)
+            torque = max(torque, 1.0 / (TURN * shorter) if shorter else torque)
+        wider = LoopFilters(speed, torque)
+        if wider == last:
+            break
+        found.append(wider)
+        last = wider
+    return tuple(found)
+
+
+def _held(drive: Drive, key: str, value: float) -> float:
+    """A value in SI units as the parameter can hold it."""
+    parameter = drive.parameter(key)
+    raw = _within(drive, key, si_raw(parameter, value))
+    return si_value(parameter, _engineering(drive, key, raw)) or 0.0
+
+
+def plan_filters(drive: Drive, filters: LoopFilters) -> dict[str, int]:
+    """Raw values that make the drive's filters these; a corner of None leaves one as it is."""
+    spec = spec_of(drive)
+    raw: dict[str, int] = {}
+    if spec.speed_filter is not None and filters.speed_hz is not None:
+        raw[spec.speed_filter] = si_raw(drive.parameter(spec.speed_filter), filters.speed_hz)
+    if spec.torque_filter is not None and filters.torque_hz is not None:
+        time_s = 1.0 / (TURN * filters.torque_hz)
+        raw[spec.torque_filter] = si_raw(drive.parameter(spec.torque_filter), time_s)
+    return {key: _within(drive, key, value) for key, value in raw.items()}
+
+
+def _by_hand(drive: Drive) -> str:
+    """What is left where nothing can be computed."""
+    what = "choose its stiffness level" if _table(drive) else "change its gains in small steps"
+    return f"{what} on the Tune or Parameters page, and look at a step after each change"
 
 
 def _inertia_raw(
@@ -204,7 +254,7 @@ def loops_of(drive: Drive, facts: AxisFacts) -> DriveLoops:
     if facts.current_bandwidth_hz is None:
         raise NotAllowed(
             f"{drive.name}: the bandwidth of the current loop is not known, so no loop can be "
-            "predicted", drive=drive.name, remedy="tune it by levels and measure the effect",
+            "predicted", drive=drive.name, remedy=_by_hand(drive),
         )  # fmt: skip
     spec = spec_of(drive)
     highest = None

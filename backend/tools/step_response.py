@@ -32,7 +32,8 @@ from drivers.errors import OutOfRange
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 _TURN = 2 * np.pi
-_LEAD_S = 0.05
+#: Rest before the step.
+LEAD_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +110,7 @@ async def step_response(
 def _demand(settings: StepSettings, rate: float) -> npt.NDArray[np.float64]:
     """Commanded speed in rpm, or position in rev from the start."""
     envelope = settings.envelope
-    lead, hold = np.zeros(round(_LEAD_S * rate)), round(settings.hold_s * rate)
+    lead, hold = np.zeros(round(LEAD_S * rate)), round(settings.hold_s * rate)
     if settings.kind == "speed":
         highest, name, travelled = abs(settings.size), "rpm", 0.0
         travelled = highest / 60.0 * settings.hold_s
@@ -141,7 +142,7 @@ def evaluate(
     rate = recording.sample_rate_hz
     time = np.arange(demand.size) / rate
     torque = recording.torque_nm / rated_torque_nm * 100.0
-    begin = round(_LEAD_S * rate)
+    begin = round(LEAD_S * rate)
     step = move = None
     if settings.kind == "speed":
         actual = recording.velocity_rad_s * 60.0 / _TURN

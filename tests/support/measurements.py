@@ -16,7 +16,7 @@ from backend.drive import Drive
 from backend.measurements import pack
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
-from backend.tools.inertia import InertiaSettings
+from backend.tools.inertia_evaluation import InertiaSettings
 from backend.tools.step_response import StepSettings, _demand
 from backend.tools.sweep_evaluation import SweepSettings
 

@@ -1,5 +1,6 @@
 """Designs against the closed loop they promise, simulated and by python-control."""
 
+from dataclasses import replace
 from functools import cache
 
 import control
@@ -8,15 +9,13 @@ import pytest
 from drive_sim import TURN, Drive, Mechanics, simulate
 from measured_axes import COMPLIANT, RIGID, STIFF, measure
 
-from backend.analysis.design import (
-    DriveLoops,
-    design,
-    goals_for,
-    measured_plant,
-    step_of_closed_loop,
-)
+from backend.analysis.design import design
 from backend.analysis.identify import identify_mechanics
+from backend.analysis.loop_goals import goals_for
+from backend.analysis.loop_structure import DriveLoops, step_of_closed_loop
 from backend.analysis.margins import margins
+from backend.analysis.measured_plant import MeasuredPlant, measured_plant
+from backend.analysis.mechanical_model import MechanicalModel, Mode
 from backend.analysis.notch import coefficients_response, encode_coefficients
 
 LOOPS = DriveLoops(1000.0, 50e-6)
@@ -133,3 +132,35 @@ def test_notches_that_the_drive_cannot_make_are_left_out():
     table = design(plant, SHARP.total_kgm2, LOOPS, "medium", slots=4, notch_response=never)
     assert table
     assert not any(c.notches for c in table)
+
+
+def test_a_variant_of_the_mechanics_keeps_the_goals_too():
+    """An axis with play: within the gap the motor is alone, here a third of the whole."""
+    third = Mechanics(RIGID.total_kgm2 / 3, (), RIGID.viscous_nms)
+    alone = MechanicalModel(3.0 / RIGID.total_kgm2, 0.0)
+    plant = replace(plant_of(RIGID), variants=(alone,))
+    table = design(plant, RIGID.total_kgm2, LOOPS, "compliant", slots=0)
+    for c in table:
+        goals = goals_for("compliant", c.marks[0])
+        for mechanics in (RIGID, third):
+            truth = margins(F, true_loop(mechanics, c, F))
+            assert truth.stable
+            assert truth.phase_margin_deg >= goals.phase_margin_deg
+            assert truth.ms <= goals.ms
+    # The motor alone answers three times as much, so up to a third of the gain is left.
+    free = design(plant_of(RIGID), RIGID.total_kgm2, LOOPS, "compliant", slots=0)
+    ratio = free[0].gains.speed_bandwidth_hz / table[0].gains.speed_bandwidth_hz
+    assert 2.0 < ratio < 3.1
+
+
+def test_a_mode_that_no_line_shows_may_lie_anywhere_near():
+    """Above the measured band a mode is shifted by four times as much as within it."""
+    model = MechanicalModel(1e4, 0.0, (Mode(1000.0, 0.02, 1e4, 0.0),))
+    f = np.array([100.0, 1000.0 * 1.05**4])
+    flat = np.ones(2, dtype=complex)
+    moved = MeasuredPlant(f, flat, model, 400.0).response(1.05)
+    assert moved[1] == pytest.approx(
+        MeasuredPlant(f * [1.0, 1.05**-4], flat, model, 4000.0).response()[1], rel=0.25
+    )
+    # 1.05⁴ = 1.2155: the peak itself is there now.
+    assert abs(moved[1]) > 10 * abs(MeasuredPlant(f, flat, model, 4000.0).response(1.05)[1])

@@ -20,7 +20,7 @@ from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.drive import Drive, Port
 from drivers.cia402 import State
-from drivers.errors import DriveError, Rejected
+from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat.cyclic import layout, places
 from drivers.ethercat.mapping import Pdo, plan_station
 from drivers.ethercat.playback import AxisLoop, Limits, Motion
@@ -95,6 +95,8 @@ class DirectLink:
         return [Found(STATION)]
 
     def _access(self) -> None:
+        if self.cut:
+            raise LinkLost("the cable is pulled")
         if self._pump is None:
             self.now_ns += _ACCESS_NS
             self.device.advance(self.now_ns)

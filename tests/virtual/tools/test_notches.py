@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.analysis.design import Gains
+from backend.analysis.loop_structure import Gains
 from backend.analysis.margins import open_from_closed
 from backend.analysis.notch import Notch
 from backend.analysis.sampling import Hold

@@ -1,0 +1,121 @@
+"""What a loop must keep, and whether it does for everything that the axis may be.
+
+Gain margin, phase margin and maximum sensitivity as in Åström & Hägglund, *Advanced PID Control*
+(2006), section 4.6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from backend.analysis.arrays import BoolArray, ComplexArray
+
+LoadClass = Literal["stiff", "medium", "compliant"]
+Mark = Literal["robust", "balanced", "fast"]
+
+
+@dataclass(frozen=True)
+class Goals:
+    """What every candidate must keep in its worst case."""
+
+    gain_margin_db: float
+    phase_margin_deg: float
+    ms: float
+
+    def with_reserve(self) -> Goals:
+        """What a design must keep for a measurement of it to show these in spite of its errors."""
+        db, deg, factor = RESERVE
+        return Goals(self.gain_margin_db + db, self.phase_margin_deg + deg, self.ms / factor)
+
+
+#: A measured margin may be off by this: dB, degrees, factor of Ms.
+RESERVE = (1.5, 3.0, 1.03)
+
+_BALANCED: dict[LoadClass, Goals] = {
+    "stiff": Goals(8.0, 45.0, 1.9),
+    "medium": Goals(9.0, 48.0, 1.8),
+    "compliant": Goals(10.0, 52.0, 1.7),
+}
+
+
+def goals_for(load: LoadClass, mark: Mark) -> Goals:
+    """Goals of a load class: robust asks for more margin, fast accepts less."""
+    base = _BALANCED[load]
+    if mark == "robust":
+        return Goals(base.gain_margin_db + 3.0, base.phase_margin_deg + 7.0, base.ms - 0.25)
+    if mark == "fast":
+        return Goals(base.gain_margin_db - 2.0, base.phase_margin_deg - 8.0, base.ms + 0.3)
+    return base
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The worst over all loops [shifts, lines] that were looked at."""
+
+    gain_margin_db: float
+    phase_margin_deg: float
+    ms: float
+    stable: bool
+
+    def meets(self, goals: Goals) -> bool:
+        """Whether everything is at least as good as asked for."""
+        return (
+            self.stable
+            and self.gain_margin_db >= goals.gain_margin_db
+            and self.phase_margin_deg >= goals.phase_margin_deg
+            and self.ms <= goals.ms
+        )
+
+    @property
+    def promised(self) -> Goals:
+        """As a promise, after the reserve."""
+        db, deg, factor = RESERVE
+        return Goals(self.gain_margin_db - db, self.phase_margin_deg - deg, self.ms * factor)
+
+
+def worst_of(loops: ComplexArray) -> Worst:
+    """Margins of open loops [shifts, lines], read on their dense grid."""
+    size = loops.real**2 + loops.imag**2
+    over = size > 1.0
+    row, line = np.nonzero(over[:, 1:] != over[:, :-1])
+    phase_margin = 90.0
+    if row.size:
+        ends = np.concatenate([loops[row, line], loops[row, line + 1]])
+        phase_margin = float(np.degrees(np.min(np.abs(np.angle(-ends)))))
+    # Passing the negative real axis: the interpolated size there.
+    real, imag = loops.real, loops.imag
+    flips = (imag[:, 1:] > 0) != (imag[:, :-1] > 0)
+    row, line = np.nonzero(flips & (real[:, 1:] < 0) & (real[:, :-1] < 0))
+    gain_margin = 60.0
+    if row.size:
+        low, high = imag[row, line], imag[row, line + 1]
+        share = low / (low - high)
+        level = -(real[row, line] * (1.0 - share) + real[row, line + 1] * share)
+        inside = level[level < 1.0]
+        if inside.size:
+            gain_margin = min(60.0, float(-20.0 * np.log10(np.max(inside))))
+    return Worst(gain_margin, phase_margin, sensitivity_peak(loops), bool(np.all(stable(loops))))
+
+
+def sensitivity_peak(loops: ComplexArray) -> float:
+    """Ms, the largest |1/(1 + L)| of all."""
+    return float(1.0 / np.sqrt(np.min((1.0 + loops.real) ** 2 + loops.imag**2)))
+
+
+def stable(loops: ComplexArray) -> BoolArray:
+    """Nyquist per row: followed down from the top, 1 + L must not have wound round the origin."""
+    turn = np.unwrap(np.angle(1.0 + loops)[:, ::-1], axis=1)
+    end = np.degrees(turn[:, -1])
+    return np.asarray((end > -270.0) & (end < 90.0))
+
+
+#: A torque at its limit acts like less gain, down to this share.
+_LESS_GAIN = np.geomspace(0.02, 0.9, 10)
+
+
+def stable_with_less_gain(loops: ComplexArray) -> bool:
+    """Whether the loops stay stable while the torque is at its limit."""
+    return all(bool(np.all(stable(share * loops))) for share in _LESS_GAIN)

@@ -1,0 +1,263 @@
+"""Which notches and filters let the gain of a speed loop go highest.
+
+Greedy in the number of notches: the best of a family of shapes is added, then all are moved
+together (a pattern search, Hooke & Jeeves 1961) as long as the design gets better. A shape is
+judged by the highest gain that keeps the goals for everything that the axis may be, so most
+shapes are refused by a single look at the sensitivity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.loop_goals import (
+    Goals,
+    Worst,
+    sensitivity_peak,
+    stable_with_less_gain,
+    worst_of,
+)
+from backend.analysis.loop_structure import TURN, DriveLoops, NotchResponse
+from backend.analysis.measured_plant import BEYOND, MeasuredPlant
+from backend.analysis.mechanical_model import MechanicalModel
+from backend.analysis.notch import Notch
+
+#: The PI's corner is the speed bandwidth divided by this.
+INTEGRAL_RATIO = 10.0
+#: A notch, or a wider filter, must earn its place: this share of the bandwidth each.
+_PRICE = 0.03
+_LOWEST_HZ = 0.5
+#: A gain is found to this share; what is better by less is not better.
+_RESOLUTION = 0.01
+#: Widths as multiples of the centre and depths in dB that are tried at every place.
+_WIDTHS = (0.25, 0.5, 0.9, 1.5, 2.2)
+_DEPTHS = (-6.0, -10.0, -16.0, -24.0)
+#: Places as multiples of a resonance: a wide notch above it takes the gain down from the
+#: resonance on, where the motor turns alone, and costs less phase below than one upon it.
+_PLACES = (0.8, 1.0, 1.25, 1.6)
+#: Steps of the pattern search: share of centre, share of width, dB; halved so many times.
+_STEP = (0.12, 0.4, 5.0)
+_HALVINGS, _SWEEPS = 4, 4
+_DEEPEST_DB, _WIDEST, _NARROWEST = -40.0, 4.0, 0.08
+#: A notch may lie this far above the highest line.
+_FARTHEST = 2.5
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Everything of the loop but its gain; ``choice`` counts in the drive's filters."""
+
+    notches: tuple[Notch, ...] = ()
+    choice: int = 0
+
+    @property
+    def price(self) -> float:
+        """What is left of a bandwidth after paying for the parts."""
+        return 1.0 - _PRICE * (len(self.notches) + self.choice)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A shape with the highest gain that keeps the goals, as a bandwidth; 0 where none does.
+
+    ``merit`` is what it is worth: the gain that is left within its bandwidth behind the notches,
+    without what its parts cost. A notch there that takes as much as it lets the gain rise is
+    worth nothing.
+    """
+
+    shape: Shape
+    bandwidth_hz: float
+    merit: float
+
+
+@dataclass
+class LoopSearch:
+    """One axis: what it may be, the drive's loop, and what the drive makes of a notch.
+
+    ``notch_response`` raises ValueError for a notch that the drive cannot make.
+    """
+
+    plant: MeasuredPlant
+    inertia_kgm2: float
+    loops: DriveLoops
+    notch_response: NotchResponse
+    _made: dict[Notch, ComplexArray | None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.frequency_hz: FloatArray = self.plant.frequency_hz
+        self._s = 1j * TURN * self.frequency_hz
+        self._shifts = self.plant.shifted()
+        self.filters = (self.loops.filters, *self.loops.choices)
+        self._fixed = [self.loops.with_filters(f).response(self.frequency_hz) for f in self.filters]
+        self._highest = (
+            self.loops.highest_speed_bandwidth_hz or 0.5 * self.loops.current_bandwidth_hz
+        )
+
+    def fixed(self, shape: Shape) -> ComplexArray | None:
+        """Filters, notches, current loop and delay; None where the drive cannot make them."""
+        total = self._fixed[shape.choice]
+        for notch in shape.notches:
+            made = self._notch(notch)
+            if made is None:
+                return None
+            total = np.asarray(total * made)
+        return total
+
+    def _notch(self, notch: Notch) -> ComplexArray | None:
+        if notch not in self._made:
+            try:
+                self._made[notch] = self.notch_response(notch, self.frequency_hz)
+            except ValueError:
+                self._made[notch] = None
+        return self._made[notch]
+
+    def loops_at(self, fixed: ComplexArray, bandwidth_hz: float) -> ComplexArray:
+        """Open speed loops [shifts, lines] at a gain."""
+        corner = TURN * bandwidth_hz / INTEGRAL_RATIO
+        pi = TURN * bandwidth_hz * self.inertia_kgm2 * (1.0 + corner / self._s)
+        return np.asarray(self._shifts * (fixed * pi))
+
+    def worst(self, shape: Shape, bandwidth_hz: float) -> Worst:
+        """Worst margins of a shape that the drive can make."""
+        fixed = self.fixed(shape)
+        assert fixed is not None
+        return worst_of(self.loops_at(fixed, bandwidth_hz))
+
+    def _keeps(self, fixed: ComplexArray, bandwidth_hz: float, goals: Goals) -> bool:
+        loops = self.loops_at(fixed, bandwidth_hz)
+        return sensitivity_peak(loops) <= goals.ms and worst_of(loops).meets(goals)
+
+    def highest(self, shape: Shape, goals: Goals, above_hz: float = 0.0) -> float:
+        """Highest bandwidth that keeps the goals; 0 where that is not above ``above_hz``."""
+        fixed = self.fixed(shape)
+        if fixed is None or above_hz >= self._highest:
+            return 0.0
+        if above_hz:
+            low = min(above_hz * (1.0 + _RESOLUTION), self._highest)
+            if not self._keeps(fixed, low, goals):
+                return 0.0
+            high = low
+            while high < self._highest:
+                high = min(1.25 * high, self._highest)
+                if not self._keeps(fixed, high, goals):
+                    break
+                low = high
+        else:
+            levels = np.geomspace(_LOWEST_HZ, self._highest, 32)
+            good = next((i for i in range(31, -1, -1) if self._keeps(fixed, levels[i], goals)), -1)
+            if good < 0:
+                return 0.0
+            low, high = float(levels[good]), float(levels[min(good + 1, 31)])
+        while high > low * (1.0 + _RESOLUTION):
+            middle = float(np.sqrt(low * high))
+            low, high = (middle, high) if self._keeps(fixed, middle, goals) else (low, middle)
+        return low if stable_with_less_gain(self.loops_at(fixed, low)) else 0.0
+
+    def best(self, goals: Goals, slots: int) -> list[Found]:
+        """The best with no notch, one, two, … as long as each notch earns its place."""
+        best = self._wider(Found(Shape(), 0.0, 0.0), goals)
+        kept = [best] if best.bandwidth_hz else []
+        for count in range(1, slots + 1):
+            found = best
+            for shape in self._seeds(best.shape, count):
+                found = self._better(found, shape, goals)
+            if found is best:
+                break
+            best = self._refined(found, goals)
+            kept.append(best)
+        return kept
+
+    def _better(self, incumbent: Found, shape: Shape, goals: Goals) -> Found:
+        worth = shape.price * self._left(shape, incumbent.bandwidth_hz or _LOWEST_HZ)
+        if not worth:
+            return incumbent
+        reached = self.highest(shape, goals, incumbent.merit / worth)
+        merit = reached * shape.price * self._left(shape, reached) if reached else 0.0
+        return Found(shape, reached, merit) if merit > incumbent.merit else incumbent
+
+    def _left(self, shape: Shape, bandwidth_hz: float) -> float:
+        """What notches leave of the gain in the decade below a bandwidth; 0: not possible."""
+        total = 1.0
+        grid = np.geomspace(0.1 * bandwidth_hz, bandwidth_hz, 24)
+        for notch in shape.notches:
+            made = self._notch(notch)
+            if made is None:
+                return 0.0
+            level = np.interp(grid, self.frequency_hz, np.log(np.maximum(np.abs(made), 1e-6)))
+            total *= float(np.exp(np.mean(level)))
+        return total
+
+    def _wider(self, found: Found, goals: Goals) -> Found:
+        for choice in range(len(self.filters)):
+            found = self._better(found, replace(found.shape, choice=choice), goals)
+        return found
+
+    def _seeds(self, given: Shape, count: int) -> Iterator[Shape]:
+        """One notch more than given, and the same shape on all of the highest resonances."""
+        ranked = _ranked(self.plant.model, BEYOND * self.plant.measured_hz)
+        for place in self._places():
+            for width in _WIDTHS:
+                for depth in _DEPTHS:
+                    one = Notch(place, width * place, depth)
+                    if len(given.notches) < count:
+                        yield replace(given, notches=(*given.notches, one))
+                    if 1 < count <= len(ranked) and place == ranked[0]:
+                        same = tuple(Notch(hz, width * hz, depth) for hz in ranked[:count])
+                        yield replace(given, notches=same)
+
+    def _places(self) -> list[float]:
+        """Centres worth a try: about the resonances, or about where the loop ends."""
+        ranked = _ranked(self.plant.model, BEYOND * self.plant.measured_hz)
+        places = [factor * hz for hz in ranked[:4] for factor in _PLACES]
+        top = _FARTHEST * self.plant.measured_hz
+        places += [x for x in (240.0, 480.0, 960.0) if x < top]
+        return [hz for hz in places if 5.0 < hz < top]
+
+    def _refined(self, found: Found, goals: Goals) -> Found:
+        """Move all notches together as long as the gain rises."""
+        for halving in range(_HALVINGS):
+            for _ in range(_SWEEPS):
+                before = found
+                for number in range(len(found.shape.notches)):
+                    for notch in _moved(found.shape.notches[number], 0.5**halving):
+                        if notch.center_hz < _FARTHEST * self.plant.measured_hz:
+                            notches = list(found.shape.notches)
+                            notches[number] = notch
+                            shape = replace(found.shape, notches=tuple(notches))
+                            found = self._better(found, shape, goals)
+                found = self._wider(found, goals)
+                if found is before:
+                    break
+        return found
+
+
+def _moved(notch: Notch, scale: float) -> Iterator[Notch]:
+    """The neighbours of a notch in centre, width and depth."""
+    centre, width, depth = (scale * x for x in _STEP)
+    for sign in (1.0, -1.0):
+        factor = (1.0 + centre) ** sign
+        yield Notch(notch.center_hz * factor, notch.width_hz * factor, notch.depth_db)
+        ratio = notch.width_hz / notch.center_hz * (1.0 + width) ** sign
+        if _NARROWEST <= ratio <= _WIDEST:
+            yield Notch(notch.center_hz, ratio * notch.center_hz, notch.depth_db)
+        deep = notch.depth_db + sign * depth
+        if _DEEPEST_DB <= deep <= -1.0:
+            yield Notch(notch.center_hz, notch.width_hz, deep)
+
+
+def _ranked(model: MechanicalModel, highest_hz: float) -> list[float]:
+    """Resonances that rise, the highest first.
+
+    A mode above ``highest_hz`` stands for whatever is stiffer than what was measured: where it
+    lies exactly nobody knows, so it gets no notch.
+    """
+    heights = [
+        (model.height_db(mode), mode.frequency_hz)
+        for mode in model.modes
+        if mode.frequency_hz <= highest_hz
+    ]
+    return [hz for height, hz in sorted(heights, reverse=True) if height > 2.0]

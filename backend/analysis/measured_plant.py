@@ -1,0 +1,84 @@
+"""The mechanics on a dense grid: measured where there are lines, the model elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.frf import Frf
+from backend.analysis.mechanical_model import MechanicalModel
+
+#: Modes may move by this factor in frequency and this in damping after the measurement.
+FREQUENCY_FACTORS = (0.95, 1.0, 1.05)
+DAMPING_FACTORS = (0.6, 1.0, 1.4)
+#: A mode is known a little way beyond the highest line. The factor of frequency counts twice up to
+#: here, and four times above, where a mode stands for whatever is stiffer than what was measured.
+BEYOND = 1.25
+
+
+@dataclass(frozen=True)
+class MeasuredPlant:
+    """Torque to velocity on ``frequency_hz`` [lines].
+
+    ``measured_hz`` is the highest measured line. ``variants`` are mechanics that the axis may be
+    as well, such as the motor alone within a backlash: a design must hold for them, too.
+    """
+
+    frequency_hz: FloatArray
+    correction: ComplexArray
+    model: MechanicalModel
+    measured_hz: float
+    variants: tuple[MechanicalModel, ...] = ()
+
+    def response(self, frequency_factor: float = 1.0, damping_factor: float = 1.0) -> ComplexArray:
+        """Response with all modes moved; the measured deviation from the model stays."""
+        moved = self.model.perturbed(1.0, damping_factor)
+        modes = tuple(
+            replace(
+                m, frequency_hz=m.frequency_hz * frequency_factor ** self._doubt(m.frequency_hz)
+            )
+            for m in moved.modes
+        )
+        moved = replace(moved, modes=modes)
+        return np.asarray(moved.response(self.frequency_hz) * self.correction)
+
+    def _doubt(self, mode_hz: float) -> int:
+        """How many times a shift counts for a mode here."""
+        if mode_hz <= self.measured_hz:
+            return 1
+        return 2 if mode_hz <= BEYOND * self.measured_hz else 4
+
+    def shifted(self) -> ComplexArray:
+        """Everything that the axis may be, [shifts, lines]."""
+        moves = list(product(FREQUENCY_FACTORS, DAMPING_FACTORS)) if self.model.modes else [(1, 1)]
+        rows = [self.response(*move) for move in moves]
+        return np.array([*rows, *(v.response(self.frequency_hz) for v in self.variants)])
+
+
+def measured_plant(
+    frf: Frf, model: MechanicalModel, *, highest_hz: float = 6000.0, lines: int = 400,
+    variants: tuple[MechanicalModel, ...] = (),
+) -> MeasuredPlant:  # fmt: skip
+    """Join a corrected measurement with its model.
+
+    The ratio measurement/model is smooth, so it may be interpolated between lines where the
+    response itself may not; outside the measured band it fades to 1 within a third of an octave.
+    """
+    use = frf.in_band & (frf.coherence > 0.8)
+    f = frf.frequency_hz[use]
+    grid = [np.geomspace(1.0, highest_hz, lines)]
+    special = [m.frequency_hz for m in model.modes] + [a[0] for a in model.antiresonances()]
+    grid += [np.geomspace(0.85 * x, 1.18 * x, 60) for x in special if 1.0 < x < highest_hz / 1.2]
+    dense = np.unique(np.concatenate(grid))
+    if f.size < 2:
+        flat = np.ones(dense.size, dtype=np.complex128)
+        return MeasuredPlant(dense, flat, model, 0.0, variants)
+    log_ratio = np.log(frf.response[use] / model.response(f))
+    fade_f = np.concatenate([[f[0] / 1.26], f, [f[-1] * 1.26]])
+    fade = np.concatenate([[0.0], log_ratio, [0.0]])
+    x, xp = np.log(dense), np.log(fade_f)
+    joined = np.interp(x, xp, fade.real) + 1j * np.interp(x, xp, fade.imag)
+    return MeasuredPlant(dense, np.exp(joined), model, float(f[-1]), variants)

@@ -1,0 +1,111 @@
+"""Where the hard ends of an axis are: it creeps to each at limited torque until it stalls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.axis import Axis
+from backend.cyclic import CyclicSession
+from backend.jobs import Progress
+from backend.tools.axis_facts import AxisFacts
+from backend.tools.inertia_evaluation import InertiaSettings
+from backend.tools.inertia_moves import speed_move
+from backend.tools.probe import RoughFit
+from backend.tools.recording import cycle_s
+from backend.tools.temporary import temporary
+from drivers.errors import NotAllowed, OutOfRange
+
+_TURN = 2 * np.pi
+#: So long at rest is an end; the axis' own start is not judged.
+_STALL_S, _START_S = 0.12, 0.25
+
+
+async def find_ends(
+    axis: Axis,
+    session: CyclicSession,
+    settings: InertiaSettings,
+    facts: AxisFacts,
+    rough: RoughFit,
+    progress: Progress,
+) -> tuple[float, float]:
+    """Creep both ways at limited torque until the axis stalls; positions of the ends in rev."""
+    drive, units = axis.drive, await axis.units()
+    available = settings.search_torque_percent / 100.0 * facts.rated_torque_nm
+    needed = 1.5 * (rough.coulomb_nm + abs(rough.gravity_nm))
+    if available < needed:
+        percent = 100.0 * needed / facts.rated_torque_nm
+        raise OutOfRange(
+            f"{drive.name}: {settings.search_torque_percent:g} % of torque cannot move this axis "
+            "safely against its friction and load",
+            value=settings.search_torque_percent, limit=f"at least {percent:.3g} %",
+            remedy="raise the torque of the search, or teach the ends by jog",
+        )  # fmt: skip
+    limits: dict[str, int] = {}
+    for role in ("torque_limit_positive", "torque_limit_negative", "max_torque"):
+        if (key := drive.key(role)) is not None:
+            wanted = units.torque_raw(settings.search_torque_percent)
+            limits[key] = min(wanted, await drive.raw(key))
+    if not limits:
+        raise NotAllowed(
+            f"{drive.name}: this family has no torque limit that could protect the ends",
+            drive=drive.name, remedy="teach the ends by jog",
+        )  # fmt: skip
+    found = []
+    async with temporary(axis, limits):
+        for number, direction in enumerate((-1.0, 1.0)):
+            progress(0.1 + 0.15 * number, "looking for an end at limited torque")
+            found.append(await _creep(axis, session, settings, facts, direction))
+    return found[0], found[1]
+
+
+@dataclass
+class _Stall:
+    """Sees in the samples as they come when a creeping axis has come to rest."""
+
+    slow: float
+    enough: int
+    start: int
+    count: int = 0
+    resting: int = 0
+    found: bool = False
+
+    def seen(self, rows: npt.NDArray[np.float64]) -> bool:
+        """Whether it rests; ``rows`` [n, 3] are raw position, velocity and torque."""
+        moving = np.flatnonzero(np.abs(rows[:, 1]) >= self.slow)
+        self.resting = self.resting + len(rows) if not moving.size else len(rows) - moving[-1] - 1
+        self.count += len(rows)
+        self.found = self.count > self.start + self.enough and self.resting >= self.enough
+        return self.found
+
+
+async def _creep(
+    axis: Axis, session: CyclicSession, settings: InertiaSettings, facts: AxisFacts,
+    direction: float,
+) -> float:  # fmt: skip
+    """Position of one end in rev."""
+    units, rate = await axis.units(), 1.0 / cycle_s(session)
+    way = settings.envelope.travel_rev
+    speed = min(settings.search_speed_rpm, settings.envelope.speed_rpm)
+    n = round(way / (speed / 60.0) * rate)
+    ramp = np.minimum(np.arange(n) / (0.1 * rate), 1.0)
+    ramp[-1] = 0.0
+    slow = 0.25 * units.velocity_raw(speed)
+    stall = _Stall(slow, round(_STALL_S * rate), round(_START_S * rate))
+
+    envelope = replace(settings.envelope, travel_rev=way * 1.1)
+    recording = await speed_move(
+        axis, session, direction * speed * ramp, envelope, facts, lambda _fraction: None,
+        stall.seen,
+    )  # fmt: skip
+    end = units.position(await axis.position_raw())
+    if not stall.found:
+        raise NotAllowed(
+            f"{axis.drive.name} found no end within {way:g} rev",
+            drive=axis.drive.name, value=float(np.ptp(recording.position_rad)) / _TURN,
+            limit=f"{way:g} rev",
+            remedy="use the free scheme if it turns without ends, or allow a longer search",
+        )  # fmt: skip
+    return end

@@ -1,0 +1,197 @@
+"""What recorded moves say of inertia and friction; works on recordings that were kept, too."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis.inertia import InertiaResult, Interval, estimate_inertia
+from backend.analysis.spectrum import power_density
+from backend.axis import Envelope
+from backend.tools.axis_facts import AxisFacts
+from backend.tools.recording import Recording
+from drivers.errors import NotAllowed
+
+Scheme = Literal["free", "limited", "taught"]
+
+CUTOFF_HZ = 25.0
+#: Above this R² nothing is left to explain; below, the load may swing in this range of Hz.
+_EXPLAINED, _SWING_HZ = 0.9995, (4.0, 80.0)
+
+
+@dataclass(frozen=True, slots=True)
+class InertiaSettings:
+    """Scheme and limits.
+
+    ``envelope`` bounds every move; its travel counts from the start (free), or is the longest
+    way that the search for an end may go (limited). ``ends_rev`` are taught ends in the axis'
+    own position. ``search_torque_percent`` and ``search_speed_rpm`` are for the search.
+    """
+
+    envelope: Envelope
+    scheme: Scheme = "free"
+    ends_rev: tuple[float, float] | None = None
+    search_torque_percent: float = 20.0
+    search_speed_rpm: float = 30.0
+    repetitions: int = 4
+    rated_torque_nm: float | None = None
+    motor_inertia_kgm2: float | None = None
+
+
+@dataclass(frozen=True)
+class InertiaOutcome:
+    """The regression's answer, how it was made, and where the ends are, if any (rev)."""
+
+    result: InertiaResult
+    method: str
+    torque_known: bool
+    ends_rev: tuple[float, float] | None
+    motion_s: float
+    ratio_against: str
+    """What the load ratio compares with, in words; empty where there is no ratio."""
+
+
+def evaluate(
+    recording: Recording, settings: InertiaSettings, facts: AxisFacts,
+    cutoff_hz: float = CUTOFF_HZ,
+) -> InertiaResult:  # fmt: skip
+    """The regression; also works on a recording that was kept."""
+    try:
+        found = estimate_inertia(
+            recording.torque_nm,
+            recording.velocity_rad_s,
+            recording.sample_rate_hz,
+            cutoff_hz=cutoff_hz,
+            torque_limit_nm=settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm,
+            motor_inertia_kgm2=facts.motor_inertia_kgm2,
+            valid=recording.valid,
+        )
+    except ValueError as error:
+        raise NotAllowed(
+            f"the moves are too short to be evaluated: {error}",
+            limit=f"{settings.envelope.travel_rev:g} rev",
+            remedy="allow more travel or time",
+        ) from error
+    reference = _reference_inertia(facts)
+    if found.load_ratio is None and reference and np.isfinite(found.inertia_kgm2.value):
+        return replace(found, load_ratio=found.inertia_kgm2.value / reference - 1.0)
+    return found
+
+
+def oscillation_hz(recording: Recording, result: InertiaResult) -> float | None:
+    """Where the torque swings beside what inertia and friction explain; None where it hardly does.
+
+    Under its speed loop the motor follows and the load swings behind the coupling, at the
+    mechanics' antiresonance.
+    """
+    if not np.isfinite(result.inertia_kgm2.value) or result.r2 > _EXPLAINED:
+        return None
+    rate, velocity = recording.sample_rate_hz, recording.velocity_rad_s
+    rest = recording.torque_nm - result.inertia_kgm2.value * np.gradient(velocity) * rate
+    rest = rest - result.viscous_nms.value * velocity - result.gravity_nm.value
+    rest = rest - result.coulomb_nm.value * np.sign(velocity)
+    density = power_density(rest, rate, round(2.0 * rate))
+    band = (density.frequency_hz >= _SWING_HZ[0]) & (density.frequency_hz <= _SWING_HZ[1])
+    levels = density.value[band]
+    peak = int(np.argmax(levels))
+    if levels[peak] < 8.0 * float(np.median(levels)):
+        return None
+    return float(density.frequency_hz[band][peak])
+
+
+def _reference_inertia(facts: AxisFacts) -> float | None:
+    """The motor's inertia, or in its place what the drive holds as inertia."""
+    return facts.motor_inertia_kgm2 or facts.drive_inertia_kgm2
+
+
+def ratio_against(facts: AxisFacts, settings: InertiaSettings) -> str:
+    """What the load ratio compares with, in words; empty where there is no ratio."""
+    if settings.motor_inertia_kgm2:
+        return "the motor inertia given"
+    if facts.motor_inertia_kgm2:
+        return "the motor inertia that the drive tells"
+    if facts.drive_inertia_kgm2:
+        return "the inertia stored in the drive, which is the motor's until it is changed"
+    return ""
+
+
+def raw_of(
+    recording: Recording, settings: InertiaSettings, facts: AxisFacts, cutoff_hz: float
+) -> tuple[dict[str, npt.NDArray[np.generic]], dict[str, object]]:
+    """Arrays and facts from which `reevaluate` makes the same answer again."""
+    return recording.arrays(), {
+        "tool": "inertia",
+        "cutoff_hz": cutoff_hz,
+        "sample_rate_hz": recording.sample_rate_hz,
+        "facts": asdict(facts),
+        "settings": asdict(settings),
+    }
+
+
+def reevaluate(
+    arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, object]
+) -> InertiaOutcome:
+    """The answer again, from kept raw data.
+
+    Raises:
+        ValueError: not the raw data of an inertia measurement.
+    """
+    given, told = meta.get("settings"), meta.get("facts")
+    if not isinstance(given, dict) or not isinstance(told, dict) or "torque_nm" not in arrays:
+        raise ValueError("not the raw data of an inertia measurement")
+    ends = given.get("ends_rev")
+    settings = InertiaSettings(
+        **{
+            **given,
+            "envelope": Envelope(**given["envelope"]),
+            "ends_rev": None if ends is None else (float(ends[0]), float(ends[1])),
+        }
+    )
+    valid = np.asarray(arrays["valid"], np.bool_)
+    columns = {k: np.asarray(v, np.float64) for k, v in arrays.items() if k != "valid"}
+    rate = float(str(meta["sample_rate_hz"]))
+    facts = AxisFacts(**told)
+    recording = Recording(rate, **columns, valid=valid)
+    cutoff_hz = float(str(meta.get("cutoff_hz", CUTOFF_HZ)))
+    return InertiaOutcome(
+        evaluate(recording, settings, facts, cutoff_hz), f"host, {settings.scheme}",
+        facts.torque_known, settings.ends_rev, recording.velocity_rad_s.size / rate,
+        ratio_against(facts, settings),
+    )  # fmt: skip
+
+
+def as_json(outcome: InertiaOutcome) -> dict[str, object]:
+    """The form that ``servodeck inertia --out`` writes (architecture.md)."""
+    r = outcome.result
+    parts: dict[str, Interval] = {
+        "inertia_kgm2": r.inertia_kgm2, "viscous_nms": r.viscous_nms,
+        "coulomb_nm": r.coulomb_nm, "gravity_nm": r.gravity_nm,
+    }  # fmt: skip
+    ratio = r.load_ratio
+    spread = None
+    if ratio is not None and np.isfinite(r.inertia_kgm2.value):
+        rotor = r.inertia_kgm2.value / (1.0 + ratio)
+        spread = [r.inertia_kgm2.low / rotor - 1.0, r.inertia_kgm2.high / rotor - 1.0]
+    return {
+        "method": outcome.method,
+        **{name: _number(part.value) for name, part in parts.items()},
+        "load_ratio": ratio,
+        "load_ratio_against": outcome.ratio_against,
+        "ci95": {
+            **{name: [_number(p.low), _number(p.high)] for name, p in parts.items()},
+            "load_ratio": spread,
+        },
+        "r2": r.r2,
+        "verdict": r.verdict,
+        "identifiable": r.identifiable,
+        "unit": "SI" if outcome.torque_known else "torque as a share of rated torque",
+        "ends_rev": outcome.ends_rev,
+        "motion_s": outcome.motion_s,
+    }  # fmt: skip
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,82 @@
+"""Writing candidates one after another until one keeps its promise; all others are taken back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from backend.analysis.design import Candidate
+from backend.analysis.loop_goals import Goals
+from backend.axis import Axis
+from backend.cyclic import CyclicSession
+from backend.jobs import Progress
+from backend.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.tools.temporary import put_back, write_settings
+from backend.tools.tune_candidates import plan
+from backend.tools.tune_verify import Check, Keep, Verified, verify
+from drivers.cia402 import State
+from drivers.errors import DriveError
+
+
+@dataclass(frozen=True)
+class Applied:
+    """What is in force now; ``before`` are the raw values that undo it."""
+
+    candidate: Candidate
+    verified: Verified
+    before: dict[str, int]
+
+
+async def first_kept(
+    axis: Axis, session: CyclicSession, check: Check, candidates: Sequence[Candidate],
+    promised: Goals, tried: list[str], progress: Progress, keep: Keep | None,
+) -> Applied | None:  # fmt: skip
+    """The first candidate that keeps its promise stays written; ``tried`` says why others do not.
+
+    ``candidates`` are tried in their order; what is ``promised`` is what was asked for, which a
+    more careful one may keep where it does not reach its own goals.
+
+    Raises:
+        DriveError: the drive has a fault, or the link is lost; nothing stays written.
+    """
+    told = (
+        part(progress, 0.7, 0.72, "6 of 6: verifying that it stands still"),
+        part(progress, 0.72, 0.92, "6 of 6: measuring the tuned loop"),
+        part(progress, 0.92, 0.99, "6 of 6: step"),
+    )
+    for candidate in candidates:
+        progress(0.65, "5 of 6: applying")
+        raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
+        before = await write_settings(axis, raw)
+        try:
+            verified = await verify(axis, session, check, candidate, promised, told, keep)
+        except DriveError as error:
+            await take_back(axis, before)
+            if await axis.state() in (State.FAULT, State.FAULT_REACTION):
+                raise
+            tried.append(f"{candidate.gains.speed_bandwidth_hz:.0f} Hz: {error.message}")
+            continue
+        except BaseException:
+            await take_back(axis, before)
+            raise
+        if verified.kept:
+            return Applied(candidate, verified, before)
+        tried.append(verified.why)
+        await take_back(axis, before)
+    return None
+
+
+async def take_back(axis: Axis, before: dict[str, int]) -> None:
+    """Put these raw values back, whatever happens meanwhile."""
+    await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, axis.drive.name)
+
+
+def part(progress: Progress, low: float, high: float, step: str) -> Progress:
+    """A step's own progress, shown as a part of the whole."""
+
+    def told() -> None:
+        words = f"{step}: {own.step}" if own.step else step
+        progress(low + (high - low) * own.fraction, words)
+
+    own = Progress(told)
+    return own

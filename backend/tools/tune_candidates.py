@@ -1,0 +1,169 @@
+"""Designs for a drive from what was measured of its axis, and the raw values that make them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from backend.analysis.design import Candidate, design
+from backend.analysis.loop_goals import LoadClass
+from backend.analysis.loop_structure import DriveLoops
+from backend.analysis.measured_plant import MeasuredPlant, measured_plant
+from backend.analysis.mechanical_model import MechanicalModel
+from backend.axis import Axis
+from backend.drive import Drive
+from backend.tools import gains as gain_tool
+from backend.tools import notch as notch_tool
+from backend.tools import notch_effect
+from backend.tools.axis_facts import AxisFacts
+from backend.tools.notch_meaning import meaning_of
+from backend.tools.sweep_evaluation import SweepResult
+
+#: A loop can be verified up to this share of the sample rate, so none is designed above it.
+_VERIFIABLE = 0.2
+#: The -3 dB point must lie below this share; the highest gain is lowered so many times for it.
+_SEEN, _NARROWINGS = 0.23, 4
+#: Lines that a cautious design believes.
+_COHERENT = 0.8
+
+
+@dataclass(frozen=True)
+class Design:
+    """All candidates, fastest first; ``caution`` says why they are careful, empty where not."""
+
+    load: LoadClass
+    candidates: tuple[Candidate, ...]
+    caution: str = ""
+
+
+def load_class(mechanics: SweepResult) -> LoadClass:
+    """Stiff, medium or compliant, by where the first antiresonance lies."""
+    low = [r.frequency_hz for r in mechanics.resonances if r.kind == "antiresonance"]
+    first = min(low, default=np.inf)
+    return "compliant" if first < 80.0 else "medium" if first < 300.0 else "stiff"
+
+
+def candidates_for(
+    drive: Drive, facts: AxisFacts, plant: MeasuredPlant, inertia_kgm2: float, load: LoadClass,
+    sample_rate_hz: float | None = None, *, filters: bool = False, notches: bool = True,
+) -> tuple[Candidate, ...]:  # fmt: skip
+    """All candidates for a measured plant; with a sample rate only those that can be verified.
+
+    ``filters``: the drive's torque and speed filters may be set, too.
+    """
+    profile = drive.profile
+    loops = gain_tool.loops_of(drive, facts)
+    if filters:
+        loops = replace(loops, choices=gain_tool.filter_choices(drive, loops.filters))
+    if sample_rate_hz is not None:
+        highest = _VERIFIABLE * sample_rate_hz
+        loops = replace(
+            loops,
+            highest_speed_bandwidth_hz=min(loops.highest_speed_bandwidth_hz or highest, highest),
+        )
+    meaning = meaning_of(drive)
+    known = meaning is not None or not notch_effect.unknown(drive)
+    slots = len(profile.notch.slots) if profile.notch is not None and known and notches else 0
+
+    def designed(loops: DriveLoops) -> tuple[Candidate, ...]:
+        return design(
+            plant, inertia_kgm2, loops, load, slots=slots,
+            notch_response=lambda notch, f: notch_tool.response(profile, notch, f, meaning),
+        )  # fmt: skip
+
+    return _seen_by_the_bus(designed, loops, sample_rate_hz)
+
+
+def _seen_by_the_bus(
+    designed: Callable[[DriveLoops], tuple[Candidate, ...]],
+    loops: DriveLoops, sample_rate_hz: float | None,
+) -> tuple[Candidate, ...]:  # fmt: skip
+    """Slower designs as long as the -3 dB point of one lies above what this bus can see."""
+    table: tuple[Candidate, ...] = ()
+    for _ in range(_NARROWINGS):
+        table = designed(loops)
+        widest = max((c.bandwidth_hz or np.inf for c in table if c.marks), default=0.0)
+        if sample_rate_hz is None or widest <= _SEEN * sample_rate_hz:
+            break
+        share = max(_SEEN * sample_rate_hz / widest, 0.5)
+        loops = replace(
+            loops, highest_speed_bandwidth_hz=share * (loops.highest_speed_bandwidth_hz or 0.0)
+        )
+    return table
+
+
+def design_for(
+    drive: Drive, facts: AxisFacts, mechanics: SweepResult, inertia_kgm2: float,
+    load: LoadClass | None, sample_rate_hz: float,
+) -> Design:  # fmt: skip
+    """The best designs; cautious ones where no model explains what was measured, or none is good.
+
+    Empty where not even those keep their goals.
+    """
+    caution = "no mechanical model explains the frequency response"
+    if mechanics.model is not None:
+        load = load or load_class(mechanics)
+        plant = measured_plant(mechanics.frf, mechanics.model)
+        table = candidates_for(
+            drive, facts, plant, inertia_kgm2, load, sample_rate_hz, filters=True
+        )
+        if table:
+            return Design(load, table)
+        caution = f"no design meets the goals for a {load} load"
+    return cautious_design(drive, facts, mechanics, inertia_kgm2, sample_rate_hz, caution)
+
+
+def cautious_design(
+    drive: Drive, facts: AxisFacts, mechanics: SweepResult, inertia_kgm2: float,
+    sample_rate_hz: float, caution: str,
+) -> Design:  # fmt: skip
+    """Gains alone, safe for whatever the axis may be, slower than a design on a model.
+
+    An axis with play is now the whole and now the motor alone.
+    """
+    plant = cautious_plant(mechanics, inertia_kgm2, facts.motor_inertia_kgm2)
+    table = candidates_for(
+        drive, facts, plant, inertia_kgm2, "compliant", sample_rate_hz, notches=False
+    )
+    return Design("compliant", table, caution)
+
+
+def cautious_plant(
+    mechanics: SweepResult, inertia_kgm2: float, motor_inertia_kgm2: float | None
+) -> MeasuredPlant:
+    """What is certain of an axis that no model explains.
+
+    The coherent lines of the direct estimate, a rigid axis above and below them, and as a variant
+    the lightest that it ever is: the motor alone, as within a backlash, or where that inertia is
+    not known what the measured lines show.
+    """
+    frf = mechanics.direct
+    use = frf.in_band & (frf.coherence > _COHERENT)
+    lightest = inertia_kgm2
+    if np.any(use):
+        omega = 2.0 * np.pi * frf.frequency_hz[use]
+        lightest = min(lightest, float(np.min(1.0 / (np.abs(frf.response[use]) * omega))))
+    if motor_inertia_kgm2 is not None:
+        # Nothing is lighter than the motor; a line that says so is a peak, which is in the lines.
+        lightest = motor_inertia_kgm2
+    rigid = MechanicalModel(1.0 / inertia_kgm2, 1e-3)
+    return measured_plant(frf, rigid, variants=(MechanicalModel(1.0 / lightest, 1e-3),))
+
+
+async def plan(
+    axis: Axis, candidate: Candidate, inertia_kgm2: float, motor_inertia_kgm2: float | None = None
+) -> dict[str, int]:
+    """Raw values of a candidate: gains, inertia, filters and notches."""
+    rotor = await gain_tool.rotor_inertia(axis, motor_inertia_kgm2)
+    raw = gain_tool.plan_gains(axis.drive, candidate.gains, inertia_kgm2, rotor)
+    raw |= gain_tool.plan_filters(axis.drive, candidate.filters)
+    if axis.drive.profile.notch is not None:
+        raw |= await notch_tool.plan_notches(axis.drive, candidate.notches, meaning_of(axis.drive))
+    return raw
+
+
+def candidate_json(candidate: Candidate) -> dict[str, object]:
+    """One row of the table."""
+    return asdict(candidate)

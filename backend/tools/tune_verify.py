@@ -1,0 +1,132 @@
+"""Whether a tuned axis keeps what its design promised: measured, not believed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis.design import Candidate
+from backend.analysis.loop_goals import Goals
+from backend.analysis.sampling import Hold
+from backend.axis import Axis, Envelope
+from backend.cyclic import CyclicSession
+from backend.jobs import Progress
+from backend.tools import step_response as step_tool
+from backend.tools import sweep as sweep_tool
+from backend.tools import sweep_evaluation
+from backend.tools.axis_facts import AxisFacts
+from backend.tools.probe import holding_torque
+
+Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
+
+#: What a measured margin is known to; the designs keep more than this in reserve.
+MARGIN_DB, MARGIN_DEG, MS_RATIO = 1.0, 1.0, 1.03
+#: Torque of a standing axis, root mean square in % of rated torque, that is a hum.
+_HUM_PERCENT = 4.0
+
+
+@dataclass(frozen=True)
+class Verified:
+    """The speed loop as measured after applying, beside what was predicted."""
+
+    sweep: sweep_evaluation.SweepResult
+    step: step_tool.StepResult | None
+    promised: Goals
+    predicted_bandwidth_hz: float | None
+    measured_bandwidth_hz: float | None
+    kept: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class Check:
+    """What the verification must know of the measurements before it."""
+
+    envelope: Envelope
+    facts: AxisFacts
+    inertia_kgm2: float
+    hold: Hold | None
+    rated_torque_nm: float | None
+    motor_inertia_kgm2: float | None
+
+
+async def verify(
+    axis: Axis, session: CyclicSession, check: Check, candidate: Candidate, promised: Goals,
+    told: tuple[Progress, Progress, Progress], keep: Keep | None,
+) -> Verified:  # fmt: skip
+    """Stand still, measure the closed speed loop, make a step; ``told`` is one progress for each.
+
+    Raises:
+        NotAllowed: it does not stand still, or the envelope or a fault ended it.
+    """
+    standing, measuring, stepping = told
+    standing(0.0, "")
+    await holding_torque(axis, session, check.facts)
+    swept = await sweep_tool.sweep(
+        axis, session,
+        sweep_evaluation.SweepSettings(
+            check.envelope, kind="speed_loop", realisations=1, inertia_kgm2=check.inertia_kgm2,
+            hold=check.hold, rated_torque_nm=check.rated_torque_nm,
+        ),
+        measuring, keep,
+    )  # fmt: skip
+    width = swept.margins.get("bandwidth_hz")
+    measured = width if isinstance(width, float) else None
+    why = _broken_promise(candidate, promised, swept.margins)
+    step: step_tool.StepResult | None = None
+    if not why:
+        step = await step_tool.step_response(
+            axis, session, _step_settings(check, candidate), stepping, keep
+        )
+        why = _hum(candidate, step)
+    return Verified(swept, step, promised, candidate.bandwidth_hz, measured, not why, why)
+
+
+def _broken_promise(
+    candidate: Candidate, promised: Goals, found: dict[str, float | bool | None]
+) -> str:
+    """Empty where the measured loop keeps what was promised, else a sentence."""
+    if not found:
+        return "too few lines of the tuned loop could be measured"
+    words = _worse_than(promised, found)
+    return _named(candidate, ", ".join(words)) if words else ""
+
+
+def _worse_than(promised: Goals, found: dict[str, float | bool | None]) -> list[str]:
+    words = []
+    ms, pm, gm = found.get("ms"), found.get("phase_margin_deg"), found.get("gain_margin_db")
+    if isinstance(ms, float) and ms > promised.ms * MS_RATIO:
+        words.append(f"sensitivity {ms:.2f} instead of {promised.ms:.2f}")
+    if isinstance(pm, float) and pm < promised.phase_margin_deg - MARGIN_DEG:
+        words.append(f"phase margin {pm:.0f}° instead of {promised.phase_margin_deg:.0f}°")
+    if isinstance(gm, float) and gm < promised.gain_margin_db - MARGIN_DB:
+        words.append(f"gain margin {gm:.1f} dB instead of {promised.gain_margin_db:.1f} dB")
+    return words
+
+
+def _hum(candidate: Candidate, step: step_tool.StepResult) -> str:
+    """Empty where the torque is quiet before the step, else a sentence.
+
+    A sensor's noise comes back as torque, the more the higher the gain and the wider the filters.
+    """
+    before = step.torque_percent[step.time_s < 0.8 * step_tool.LEAD_S]
+    rms = float(np.std(before))
+    if rms <= _HUM_PERCENT:
+        return ""
+    return _named(candidate, f"the torque hums with {rms:.1f} % of the rated while it stands")
+
+
+def _named(candidate: Candidate, words: str) -> str:
+    return f"{candidate.gains.speed_bandwidth_hz:.0f} Hz: {words}"
+
+
+def _step_settings(check: Check, candidate: Candidate) -> step_tool.StepSettings:
+    """A step of speed whose first torque, gain times step, leaves half of what is permitted."""
+    envelope = check.envelope
+    torque_nm = envelope.torque_percent / 100.0 * check.facts.rated_torque_nm
+    gentle = 0.5 * torque_nm / candidate.gains.speed_nms * 60.0 / (2 * np.pi)
+    size = min(100.0, 0.3 * envelope.speed_rpm, 120.0 * envelope.travel_rev, gentle)
+    return step_tool.StepSettings(envelope, size=size, rated_torque_nm=check.rated_torque_nm)
