@@ -624,6 +624,12 @@ class Drive:
         """CiA 402 state, with the family's own reading of the status word."""
         return cia402.decode_state(status_word, echoes_control=self._own_status)
 
+    def fault_bit(self, key: str) -> int | None:
+        """The bit of the family's status word that tells of a fault; None of any other object."""
+        if key != self.key("status_word"):
+            return None
+        return cia402.fault_bit(echoes_control=self._own_status)
+
     def _named(
         self, error: DriveError, parameter: Parameter, value: Raw | None = None
     ) -> DriveError:

@@ -113,6 +113,14 @@ def decode_state(status_word: int, *, echoes_control: bool = False) -> State:
     return State.UNKNOWN
 
 
+def fault_bit(*, echoes_control: bool = False) -> int:
+    """Bit of the status word that is set in the fault states and in no other (see `decode_state`).
+
+    CiA 402-2 table 29: bit 3; where the low bits repeat the control word, the alarm is bit 7.
+    """
+    return 7 if echoes_control else 3
+
+
 @dataclass(frozen=True, slots=True)
 class Dialect:
     """How a family takes commands with its process data, where CiA 402-2 has it otherwise.

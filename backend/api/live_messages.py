@@ -222,6 +222,9 @@ class ScopeChannelInfo(Message):
     synchronous: bool
     axis_unit: str = Field(default="", description="unit of the axis; empty where there is none")
     axis_factor: float | None = Field(default=None, description="from ``unit`` to ``axis_unit``")
+    fault_bit: int | None = Field(
+        default=None, description="of a status word: the bit that is set while there is a fault"
+    )
 
 
 class Logged(Message):

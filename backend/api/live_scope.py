@@ -200,6 +200,7 @@ class ScopeStreams:
                     synchronous=carried[number].synchronous,
                     axis_unit=unit,
                     axis_factor=factor,
+                    fault_bit=drive.fault_bit(parameter.key),
                 )
             )
         return result

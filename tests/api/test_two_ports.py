@@ -19,6 +19,7 @@ from profiles import load_profile
 from tests.support.station import Station, until
 
 CAN, MODBUS = "canopen://virtual0", "modbus://virtual0"
+AXIS, POSITION = "Low-voltage axis", "6064:00"
 
 
 @pytest.fixture
@@ -84,6 +85,20 @@ def test_jog_and_move(station: Station, z: str) -> None:
     assert float(station.state(z)["position"]) - before == pytest.approx(1.5, abs=0.02)
 
 
+def test_the_scope_knows_which_bit_is_the_alarm(station: Station, z: str) -> None:
+    """003:305: bit 7, not bit 3 as CiA 402-2 has it."""
+    x = station.add(1, name="X")
+    try:
+        with station.live() as page:
+            for drive, key, bit in ((z, "6041:00", 7), (x, "6041:00", 3), (z, POSITION, None)):
+                channels = [{"drive": drive, "key": key}]
+                page.send(type="scope_start", subscription=1, channels=channels)
+                (channel,) = page.wait("scope_info")["channels"]
+                assert channel["fault_bit"] == bit
+    finally:
+        station.ok(station.http.delete(f"/drives/{x}"))
+
+
 def test_unplugged_adapter_recovers(station: Station, z: str) -> None:
     station.drives.command(do="pull", wire=CAN)
     until(lambda: not station.state(z)["fresh"], 5)
@@ -146,8 +161,6 @@ def test_a_mute_node_is_named_with_a_remedy(station: Station, z: str) -> None:
 
 
 # --- what a fault leaves ----------------------------------------------------------------
-
-AXIS, POSITION = "Low-voltage axis", "6064:00"
 
 
 @dataclass(frozen=True)

@@ -6483,6 +6483,12 @@ export interface components {
             axis_unit: string;
             /** Drive */
             drive: string;
+            /**
+             * Fault Bit
+             * @description of a status word: the bit that is set while there is a fault
+             * @default null
+             */
+            fault_bit: number | null;
             /** Key */
             key: string;
             /** Name */

@@ -79,12 +79,12 @@ export function ScopePage() {
   const last = useRef<ScopeFrame | null>(null)
   const tableAt = useRef(0)
   const tabs = useRef<HTMLDivElement>(null)
-  const trigger = triggerOf(setup)
+  const trigger = triggerOf(setup, infos)
   const ranges = rangesOf(setup)
   const rescale = (unit: string, span: Span | null) => change((now) => withRange(now, unit, span))
   const fit = () => change({ ...setup, ranges: [] })
   useSampling(setup, infos)
-  useTrigger(setup, arming)
+  useTrigger(setup, infos, arming)
 
   const view = (): ScopeView | null =>
     shown.length === 0

@@ -10,7 +10,7 @@ export const GREATEST_CHANNELS = 16
 export const GREATEST_MATHS = 8
 /** Fixed scales that a set-up keeps, also of units that are not shown now. */
 const MOST_RANGES = 32
-/** Bit of the status word that is set in both fault states (CiA 402-2, table 29). */
+/** Bit of the status word that is set in both fault states (CiA 402-2, table 29); a family may have another. */
 const FAULT_BIT = 3
 const HIDDEN = 't1'
 const STORED = 'servodeck.scope.setup'
@@ -164,14 +164,14 @@ export const needsLevel = (kind: string) =>
 export const needsHigh = (kind: string) => kind === 'enters' || kind === 'leaves'
 export const needsBit = (kind: string) => kind === 'bit_set' || kind === 'bit_clear'
 
-export function triggerOf(setup: ScopeSetup): ScopeTrigger | null {
-  const { mode, kind, trace, level, high, bit, before } = setup.trigger
+export function triggerOf(setup: ScopeSetup, infos: Infos): ScopeTrigger | null {
+  const { mode, kind, trace, drive, level, high, bit, before } = setup.trigger
   if (mode === 'off') return null
   const settings: TriggerSettings = {
     kind: kind === 'fault' ? 'bit_set' : kind,
     level,
     high,
-    bit: kind === 'fault' ? FAULT_BIT : bit,
+    bit: kind === 'fault' ? (infoOf(infos, drive, STATUS_WORD)?.fault_bit ?? FAULT_BIT) : bit,
     window: setup.window_s,
     before,
   }

@@ -53,8 +53,8 @@ export function useSampling(setup: ScopeSetup, infos: Infos): void {
 let sought = 'null'
 
 /** Arms the trigger; `arming` arms it again. One that was armed before the page was left stays. */
-export function useTrigger(setup: ScopeSetup, arming: number): void {
-  const trigger = triggerOf(setup)
+export function useTrigger(setup: ScopeSetup, infos: Infos, arming: number): void {
+  const trigger = triggerOf(setup, infos)
   const text = JSON.stringify(trigger)
   useEffect(() => {
     if (text === sought && arming === 0) return
