@@ -454,6 +454,14 @@ export const tuning = {
     'Measures inertia and response, computes notches and gains, writes them, and measures again. What does not keep its promise is taken back. Every step can be cancelled; the drive is then as before.',
     '测量惯量和响应，计算陷波和增益，写入后再次测量。不符合承诺的会被撤销。每一步都可取消，取消后驱动器恢复原状。',
   ],
+  'autotune.motorHelp': [
+    'needed where the drive counts its load in multiples of the motor and does not tell the motor: from the data sheet',
+    '若驱动器以电机惯量的倍数表示负载且不给出电机惯量，则需要：见数据表',
+  ],
+  'autotune.noMeaning': [
+    'The manual of this drive does not print what its gains mean, so none can be computed. Change them in small steps and look at a step after each.',
+    '该驱动器的手册没有说明增益的含义，因此无法计算。请小步修改，每次修改后查看阶跃响应。',
+  ],
   'autotune.apply': ['Write and verify the result', '写入并验证结果'],
   'autotune.moves': [
     'The axis is enabled and moves several times for about a minute: forth and back, shaken, and stepped, within ±{travel} rev, {speed} rpm and {torque} % of rated torque. Nobody may be near it.',

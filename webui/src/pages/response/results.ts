@@ -111,6 +111,8 @@ export interface Autotune {
   step: Step | null
   before: Record<string, number>
   tried: string[]
+  /** Absent in jobs of an older server. */
+  notes?: string[]
   measurements?: string[]
 }
 

@@ -5,6 +5,7 @@ import type { AutotuneRequest, AxisState } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setJob } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
+import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
@@ -37,6 +38,7 @@ export function AutotunePanel({
   const [mark, setMark] = useState<(typeof MARKS)[number]>('balanced')
   const [load, setLoad] = useState<(typeof LOADS)[number]>('auto')
   const [apply, setApply] = useState(true)
+  const [motor, setMotor] = useState<number | null>(null)
   const scheme = useScheme()
   const start = useAction()
   const { job, note, dismiss } = useToolJob(drive, 'autotune')
@@ -54,6 +56,7 @@ export function AutotunePanel({
         scheme: scheme.scheme,
         ends_rev: scheme.ends,
         apply,
+        motor_inertia_kgm2: motor,
       }
       setJob(
         await ask(
@@ -81,6 +84,15 @@ export function AutotunePanel({
         data={LOADS.map((each) => ({ value: each, label: t(`load.${each}`) }))}
       />
       <SchemeFields of={scheme} state={state} />
+      <NumberField
+        label={t('inertia.motor')}
+        unit="kg·m²"
+        value={motor}
+        onChange={setMotor}
+        above={0}
+        optional
+        help={t('autotune.motorHelp')}
+      />
       <Checkbox
         label={t('autotune.apply')}
         checked={apply}

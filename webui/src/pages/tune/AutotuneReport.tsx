@@ -67,6 +67,15 @@ export function AutotuneReport({
         </div>
       )}
       <ProblemNote problem={undo.problem} onClose={undo.clear} />
+      {(result.notes?.length ?? 0) > 0 && (
+        <div className="note warn">
+          <ul>
+            {result.notes?.map((each) => (
+              <li key={each}>{each}</li>
+            ))}
+          </ul>
+        </div>
+      )}
       {result.tried.length > 0 && (
         <div className="note warn">
           {t('autotune.tried')}

@@ -1,13 +1,15 @@
+import { href } from '../../app/router'
 import { useT } from '../../i18n'
 import { useAxisState, useDrive } from '../../live/store'
 import { useJobEnd } from '../../widgets/JobNote'
+import { Panel } from '../../widgets/Panel'
 import { useBuses } from '../connect/useBuses'
 import { useLimits } from '../response/limits'
+import { useMeasurable } from '../response/useMeasurable'
 import '../response/response.css'
 import { asAutotune, asInertia } from '../response/results'
 import { useChanges } from '../response/undo'
 import { useGains } from '../response/useGains'
-import { useMeasurable } from '../response/useMeasurable'
 import { useMeasurements } from '../response/useMeasurements'
 import { useToolJob } from '../response/useToolJob'
 import { AutotunePanel } from './AutotunePanel'
@@ -52,10 +54,7 @@ export function TunePage({ drive }: { drive: string }) {
   const able = ready(checks)
   const found = asInertia(inertiaJob?.result) ?? tuned?.inertia ?? null
   const si = found?.identifiable && found.unit === 'SI' ? found.inertia_kgm2 : null
-  const designable =
-    gains.gains !== null &&
-    gains.gains.convention !== 'unit' &&
-    gains.gains.current_bandwidth_hz !== null
+  const designable = gains.gains !== null && gains.gains.convention !== 'unit'
   const ours = measured.list.filter(
     (each) => each.profile === summary.profile && each.drive === summary.name,
   )
@@ -110,6 +109,13 @@ export function TunePage({ drive }: { drive: string }) {
               able={able}
               onChanged={() => void gains.read()}
             />
+          )}
+          {gains.gains && !designable && (
+            <Panel title={t('autotune.title')}>
+              <p className="note info">
+                {t('autotune.noMeaning')} <a href={href('gains', drive)}>{t('gains.toPage')}</a>
+              </p>
+            </Panel>
           )}
           {possible && (
             <StepPanel
