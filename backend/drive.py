@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from drivers import cia402
 from drivers.codec import decode, encode
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, NotInUse, OutOfRange, Rejected
-from drivers.link import Address, Found, Link, LinkQuality
+from drivers.link import Address, Found, Link, LinkQuality, TellsUnreachable
 from profiles.schema import LinkKind, LinkSpec, Parameter, Profile, Raw
 
 #: Addresses per executor call. Small, so that a STOP never waits behind a long batch.
@@ -104,7 +104,13 @@ class Port:
 
     def carries(self, parameter: Parameter) -> bool:
         """Whether this port can transport the parameter."""
-        return carries(self.link.kind, parameter)
+        return carries(self.link.kind, parameter) and not self.why_not(parameter)
+
+    def why_not(self, parameter: Parameter) -> str:
+        """What the link itself has against a parameter that its kind could carry; else empty."""
+        if isinstance(self.link, TellsUnreachable):
+            return self.link.unreachable(self.station, address_of(parameter))
+        return ""
 
 
 def _whole_objects(parameters: Sequence[Parameter]) -> list[list[Parameter]]:
@@ -227,6 +233,9 @@ class Drive:
         """Empty when some port carries the parameter, else a sentence."""
         if any(port.carries(parameter) for port in self.ports):
             return ""
+        for port in self.ports:
+            if carries(port.link.kind, parameter):
+                return port.why_not(parameter)
         kinds = " and ".join(sorted({port.link.kind for port in self.ports})) or "no link"
         needed = "Modbus" if parameter.index is None else "CANopen"
         return f"it exists only over {needed}, and the drive is connected over {kinds}"

@@ -134,6 +134,14 @@ class NeedsProfile(Protocol):
         """Say which family answers at ``station``."""
 
 
+@runtime_checkable
+class TellsUnreachable(Protocol):
+    """A link that knows, without asking the drive, which objects it cannot carry."""
+
+    def unreachable(self, station: int, address: Address) -> str:
+        """Why not, as a sentence; empty where it can. Of the family said to be at ``station``."""
+
+
 @dataclass(frozen=True, slots=True)
 class ScopeBlock:
     """A run of equally spaced samples.

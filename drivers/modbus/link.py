@@ -14,7 +14,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
-from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError, Rejected
+from drivers.errors import (
+    DriveError,
+    LinkLost,
+    LinkTimeout,
+    NotAllowed,
+    ProtocolError,
+    Rejected,
+)
 from drivers.link import (
     Address,
     Cyclic,
@@ -94,6 +101,14 @@ class RegisterLink:
         self._layout.configure(station, profile)
         self._plans.clear()
         self._refused_blocks.clear()
+
+    def unreachable(self, station: int, address: Address) -> str:
+        """See `drivers.link.TellsUnreachable`."""
+        try:
+            self._layout.place(station, address)
+        except NotAllowed as error:
+            return error.message
+        return ""
 
     async def open(self) -> None:
         """Open the adapter. See `drivers.link.Link.open`."""
