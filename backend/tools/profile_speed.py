@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import numpy as np
+import numpy.typing as npt
 
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
@@ -126,6 +127,26 @@ async def prepared(
         await _write_ramps(axis, ramps, _SLOW_RPM_S)
         await _require_signed(axis, session, envelope)
         await _write_ramps(axis, ramps, None)
+        yield
+
+
+@asynccontextmanager
+async def interpolated(
+    axis: Axis, session: CyclicSession, speed_rpm: npt.NDArray[np.float64]
+) -> AsyncIterator[None]:
+    """Let the drive's own ramp carry it from one set-point of a smooth move to the next.
+
+    A speed that steps with every SYNC makes a torque that falls during each cycle, and samples at
+    its end miss half of that: an inertia would come out too small by half a cycle of the speed
+    gain. Nothing for drives with cyclic modes, which interpolate by themselves.
+    """
+    steepest = float(np.max(np.abs(np.diff(speed_rpm)), initial=0.0)) / cycle_s(session)
+    if axis.drive.id not in session.by_speed or not steepest:
+        yield
+        return
+    ramps = [axis.drive.require(f"profile_{name}") for name in ("acceleration", "deceleration")]
+    async with axis.restoring(*ramps):
+        await _write_ramps(axis, ramps, steepest)
         yield
 
 

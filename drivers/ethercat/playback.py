@@ -32,6 +32,8 @@ _RESTLESS = 2
 """Increments per cycle that encoder noise may make of an axis at rest."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STANDARD = cia402.Dialect()
+_REST_S, _GIVE_UP = 0.05, 30
+"""An axis rests after so long without motion; after so many times as long nobody waits for it."""
 
 
 class Phase(Enum):
@@ -95,6 +97,8 @@ class AxisLoop:
         self._dialect = dialect
         self._pause_cycles = round(dialect.pause_s / cycle_s)
         self._pause_left = 0
+        self._rest_cycles = max(round(_REST_S / cycle_s), 1)
+        self._rested = self._stopping = 0
         self._stop_cycles = max(round(STOP_S / cycle_s), 1)
         self._mode: int | None = None
         self._motion: Motion | None = None
@@ -348,6 +352,8 @@ class AxisLoop:
             self.outputs[place] = cia402.DISABLE_VOLTAGE
             return
         if self.goal is State.QUICK_STOP_ACTIVE and self.state not in _ALIVE_STATES:
+            if self._stops_unseen():
+                return
             self.goal = self._after_quick_stop
         word = cia402.next_control_word(self.state, self.goal, self.outputs[place])
         if word == cia402.QUICK_STOP:
@@ -362,6 +368,20 @@ class AxisLoop:
         elif self.state is self.goal:
             self._reset = False
             self.outputs[place] &= ~cia402.FAULT_RESET
+
+    def _stops_unseen(self) -> bool:
+        """Whether a drive whose status word shows no quick stop may still be at it.
+
+        Any other word would take its power away while it brakes.
+        """
+        if not self._dialect.echoes_control:
+            return False
+        self._stopping += 1
+        self._rested = self._rested + 1 if self._moved <= _RESTLESS else 0
+        if self._rested < self._rest_cycles and self._stopping < _GIVE_UP * self._rest_cycles:
+            return True
+        self._stopping = self._rested = 0
+        return False
 
     # Parts ---------------------------------------------------------------------------------
 

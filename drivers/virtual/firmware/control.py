@@ -200,6 +200,9 @@ class DeviceControl:
     def _quick_stop_done(self) -> None:
         self._switch_off()
         self.state = State.SWITCH_ON_DISABLED
+        if self._traits.status == "echo":
+            # Its states are those of the control word, whenever that was written (003:300-303).
+            self._command(decode(self.control_word))
 
     def _hold_stopped(self) -> None:
         # Torque modes know no position lock where 6087h has taken the torque back (000:3020).

@@ -1,0 +1,45 @@
+"""A recording's velocity as the drive reports it, or out of its positions where that is quieter.
+
+A coarse encoder (2500 lines on DS_C) makes a reported speed noisy, while the positions beneath it
+are off by a fraction of an increment at most. Noise in the speed makes a regression's inertia too
+small (errors in the variables), so the quieter of the two is taken.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis.spectrum import power_density
+from backend.tools.recording import Recording
+
+_TURN = 2 * np.pi
+#: Nothing of a slow move is up here, so what is there is noise; shares of the sample rate.
+_NOISE = (0.2, 0.45)
+#: The position must be quieter by this much (power): the drive's own speed knows more otherwise.
+_CLEARLY = 4.0
+_WINDOW = 512
+
+
+def quiet_velocity(recording: Recording, cutoff_hz: float) -> npt.NDArray[np.float64]:
+    """Velocity [n] in rad/s for moves whose content lies below ``cutoff_hz``."""
+    reported, rate = recording.velocity_rad_s, recording.sample_rate_hz
+    count = np.arange(reported.size)
+    good = recording.valid
+    if np.count_nonzero(good) < _WINDOW or not np.any(recording.position_rad):
+        return reported
+    position = np.interp(count, count[good], recording.position_rad[good])
+    given = np.interp(count, count[good], reported[good])
+    # Noise of the position, as a speed at the cutoff.
+    from_position = _noise(position, rate) * (_TURN * cutoff_hz) ** 2
+    if from_position * _CLEARLY > _noise(given, rate):
+        return reported
+    return np.asarray(np.gradient(position) * rate)
+
+
+def _noise(signal: npt.NDArray[np.float64], rate: float) -> float:
+    """Power density of white noise; differences keep the move itself out of the window's skirts."""
+    density = power_density(np.diff(signal, 2), rate, _WINDOW)
+    f = density.frequency_hz / rate
+    use = (f >= _NOISE[0]) & (f <= _NOISE[1])
+    return float(np.median(density.value[use] / (2.0 * np.sin(np.pi * f[use])) ** 4))
