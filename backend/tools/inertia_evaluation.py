@@ -12,6 +12,7 @@ from backend.analysis.inertia import InertiaResult, Interval, estimate_inertia
 from backend.analysis.spectrum import power_density
 from backend.axis import Envelope
 from backend.tools.axis_facts import AxisFacts
+from backend.tools.quiet_velocity import quiet_velocity
 from backend.tools.recording import Recording
 from drivers.errors import NotAllowed
 
@@ -62,7 +63,7 @@ def evaluate(
     try:
         found = estimate_inertia(
             recording.torque_nm,
-            recording.velocity_rad_s,
+            quiet_velocity(recording, cutoff_hz),
             recording.sample_rate_hz,
             cutoff_hz=cutoff_hz,
             torque_limit_nm=settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm,

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from backend.analysis.inertia import MoveLimits, design_moves
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
+from backend.tools import profile_speed
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.inertia_evaluation import CUTOFF_HZ, InertiaSettings
 from backend.tools.probe import RoughFit, require_right_sign, rough_fit
@@ -55,7 +56,10 @@ async def speed_move(
     """Enable, play a speed profile, brake, disable."""
     units = await axis.units()
     values = np.round(speed_rpm * (units.velocity_raw(1e6) / 1e6)).astype(np.int64)
-    async with enabled(axis, session, Mode.CSV) as start:
+    async with (
+        profile_speed.interpolated(axis, session, speed_rpm),
+        enabled(axis, session, Mode.CSV) as start,
+    ):
         await quiet(axis)
         limits = await bus_limits(axis, envelope, start)
         return await play(
