@@ -6,7 +6,7 @@ G = S_yr / S_ur is not (Pintelon & Schoukens, *System Identification*, 2012, sec
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.stats import t as student_t
@@ -71,6 +71,16 @@ class Frf:
         """Lines inside the valid band."""
         low, high = self.valid_band_hz
         return np.asarray((self.frequency_hz >= low) & (self.frequency_hz <= high))
+
+    def cut(self, highest_hz: float) -> Frf:
+        """Without the lines above a frequency."""
+        use = self.frequency_hz <= highest_hz
+        lines = {
+            f.name: getattr(self, f.name)[use]
+            for f in fields(self)
+            if isinstance(getattr(self, f.name), np.ndarray)
+        }
+        return replace(self, **lines)
 
 
 def valid_band_hz(

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.distortion import Distortion, distortion
 from backend.analysis.doubt import Doubt, Shifted
 from backend.analysis.doubt import doubt as joint_doubt
 from backend.analysis.frf import Frf, estimate_periodic, valid_band_hz
@@ -34,6 +35,8 @@ TRUSTED_ERROR = 0.03
 
 #: At most this many rounds of refining loop, path and mechanics against each other.
 _PASSES = 4
+#: What is left of a distortion along one axis of the complex plane, two draws averaged.
+_AVERAGED = 0.5
 #: Path parameters are moved by this much (cycles, logarithm) to see what they do, and moved at
 #: all where torque and motion together put them further off than this share of their deviation.
 _STEP, _SETTLED, _LEAST_STEP = 0.02, 0.2, 1e-4
@@ -48,13 +51,15 @@ class Identification:
     ``direct`` is the estimate with only hold, current loop and delay divided out and its honest
     band (0.25 of the sample rate); ``corrected`` has the folded images removed as well and holds
     to 0.4; ``fit`` is the model that did it. When no model fits (``trusted`` False), both are the
-    plain estimate with a band of 0.1 of the sample rate.
+    plain estimate with a band of 0.1 of the sample rate. Where ``distortion`` shows play, the
+    model is not trusted either: both are the direct estimate, without the lines beyond its band.
     """
 
     direct: Frf
     corrected: Frf
     fit: SampledFit
     trusted: bool = True
+    distortion: Distortion | None = None
 
 
 def identify_mechanics(
@@ -227,12 +232,13 @@ def _implausible(fit: SampledFit) -> float:
 def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
     """The estimates with what the fit found taken out."""
     views, path, fit = trial.views, trial.path, trial.fit
+    spoilt = distortion(task.records, path, task.quantity, views.velocity)
     if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
         # No model explains what was sampled, so neither delay nor images are known.
         raw = views.velocity
         low, high = raw.valid_band_hz
         plain = replace(raw, valid_band_hz=(low, min(high, 0.1 * raw.sample_rate_hz)))
-        return Identification(plain, plain, fit, trusted=False)
+        return Identification(plain, plain, fit, False, spoilt)
     direct, corrected = [], []
     ways = [(views.velocity, fit.delay_s, False)]
     if views.position is not None:
@@ -245,10 +251,22 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
         factor = fit.image_factor(raw.frequency_hz, integrated=integrated)
         # Images stay in the direct estimate: its band must contain them.
         direct.append(_widened(plain, factor, 1.0, doubt.direct[place]))
-        corrected.append(
-            _without_images(plain, factor, task.jitter_s, doubt.corrected[place])
-        )  # fmt: skip
-    return Identification(_pooled(direct), _pooled(corrected), fit)
+        corrected.append(_without_images(plain, factor, task.jitter_s, doubt.corrected[place]))
+    share = spoilt.share * (1.0 if spoilt.play else _AVERAGED)
+    best, lines = (_distorted(_pooled(parts), share) for parts in (corrected, direct))
+    if spoilt.play:
+        lines = lines.cut(lines.valid_band_hz[1])
+        return Identification(lines, lines, fit, False, spoilt)
+    return Identification(lines, best, fit, True, spoilt)
+
+
+def _distorted(frf: Frf, share: FloatArray) -> Frf:
+    """Charge what friction does not explain of the motion between the lines to the lines, too."""
+    return replace(
+        frf,
+        std_db=np.hypot(frf.std_db, 20 / np.log(10) * share),
+        std_deg=np.hypot(frf.std_deg, np.degrees(share)),
+    )
 
 
 @dataclass(frozen=True)

@@ -193,10 +193,7 @@ def collect(
             if position
             else period_spectra(record.response, e, good)
         )
-        direction.append(
-            period_spectra(_direction(record.response), e, good)
-            * _centre_of_interval(e.line_hz, path.sample_rate_hz)
-        )
+        direction.append(friction_direction(record, e, good))
         if quantity == "torque_injection":
             torque.append(period_spectra(own_torque(record, path), e, good))
     if not sent:
@@ -212,6 +209,12 @@ def own_torque(record: Record, path: SignalPath) -> FloatArray:
     if record.torque is None:
         raise ValueError("torque_injection needs the reported torque")
     return record.torque - sampled_command(record.excitation.samples, path)
+
+
+def friction_direction(record: Record, e: Excitation, periods: list[int]) -> ComplexArray:
+    """Spectra [periods, lines] of the direction of motion, on the lines of ``e``."""
+    spectra = period_spectra(_direction(record.response), e, periods)
+    return np.asarray(spectra * _centre_of_interval(e.line_hz, e.sample_rate_hz))
 
 
 def _direction(velocity: FloatArray) -> FloatArray:

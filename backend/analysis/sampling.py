@@ -114,15 +114,17 @@ def _difference_equation(path: SignalPath) -> tuple[FloatArray, float, int]:
     wc = None if path.current_bandwidth_hz is None else 2 * np.pi * path.current_bandwidth_hz
 
     def after(t: FloatArray) -> FloatArray:
-        """Response of the lag to a unit step (zero hold) or unit-slope ramp (linear hold)."""
-        late = np.maximum(t, 0.0)
+        """Response to a value that stays: at once (zero hold), or reached within a cycle."""
         if path.hold == "zero":
-            return np.asarray((t > 0) * 1.0 if wc is None else -np.expm1(-wc * late))
-        return np.asarray(late if wc is None else late + np.expm1(-wc * late) / wc)
+            return np.asarray((t > 0) * 1.0 if wc is None else -np.expm1(-wc * np.maximum(t, 0.0)))
+        if wc is None:
+            return np.asarray(np.clip(t / period_s, 0.0, 1.0))
+        # The line is one of steps, which the sampled torque shows where cycles are short.
+        steps = max(round(period_s / (2 * STEP_LEAD_S)), 1)
+        begun = t[:, None] - STEP_LEAD_S - np.arange(steps) * (period_s / steps)
+        return np.asarray(np.mean(-np.expm1(-wc * np.maximum(begun, 0.0)), axis=1))
 
     t = np.arange(4) * period_s - part
     impulse = after(t) - after(t - period_s)
-    if path.hold == "linear":
-        impulse = (impulse - after(t - period_s) + after(t - 2 * period_s)) / period_s
     a = 0.0 if wc is None else float(np.exp(-wc * period_s))
     return impulse - a * np.concatenate([[0.0], impulse[:-1]]), a, int(whole)

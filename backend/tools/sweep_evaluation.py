@@ -178,7 +178,15 @@ def _saturated(
 
 def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tuple[str, ...]:
     words = []
-    if not found.trusted:
+    if found.distortion is not None and found.distortion.play:
+        words.append(
+            f"between the excited lines there is {found.distortion.level:.0%} of their motion, "
+            "which friction does not explain: the axis has play (gear, coupling, key), or it is "
+            "excited too weakly against its friction. Its response depends on how hard it is "
+            "driven, so nothing is designed from it, and above a quarter of the sample rate "
+            "nothing is shown"
+        )
+    elif not found.trusted:
         words.append(
             "no mechanical model explains the recording: only the part of the plot below a tenth "
             "of the sample rate is shown, and nothing is designed from it"

@@ -1,0 +1,71 @@
+"""Friction is told from play by what it leaves between the excited lines."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drive_sim import TURN, Drive, Mechanics, simulate
+
+from backend.analysis.distortion import distortion
+from backend.analysis.excitation import BaseMotion, choose_lines, multisine, scaled
+from backend.analysis.frf import estimate_periodic
+from backend.analysis.identify import identify_with_path
+from backend.analysis.line_spectra import Record
+from backend.analysis.sampling import SignalPath
+
+RATE, PERIOD = 1000.0, 650
+LINES = choose_lines(5.0, 400.0, RATE / PERIOD, count=150)
+PATH = SignalPath(RATE, current_bandwidth_hz=1000.0)
+
+
+def excitations():
+    for number in range(4):
+        e = multisine(
+            sample_rate_hz=RATE, period_samples=PERIOD, lines=LINES[LINES > 1],
+            realisation=number // 2, invert=bool(number % 2), base=BaseMotion(0.5, RATE / PERIOD),
+            iterations=40, integrations=2, ramp_samples=160,
+        )  # fmt: skip
+        yield scaled(e, 0.4)
+
+
+def records_of(mechanics):
+    drive = Drive(current_hz=1000.0)
+    for e in excitations():
+        run = simulate(mechanics, drive, RATE, torque=e.samples)
+        yield Record(e, run.velocity, run.torque)
+
+
+@pytest.mark.parametrize("coulomb_nm", [0.0, 0.03, 0.06])
+def test_friction_is_no_play(coulomb_nm):
+    records = tuple(records_of(Mechanics(loads=((1e-4, 60.0, 0.006),), coulomb_nm=coulomb_nm)))
+    frf = estimate_periodic(records, PATH, "torque_mode", coulomb_nm=None)
+    found = distortion(records, PATH, "torque_mode", frf)
+    assert not found.play
+    # Friction explains most of what it did.
+    assert found.level <= 0.6 * found.before or found.before < 0.01
+
+
+def test_an_axis_with_play_gets_no_model_and_no_lines_beyond_the_direct_band():
+    linear = tuple(records_of(Mechanics(loads=((1e-4, 60.0, 0.006),), coulomb_nm=0.0)))
+    rng = np.random.default_rng(3)
+    # Motion that comes again with every period, on the empty bins only.
+    e = linear[0].excitation
+    empty = np.setdiff1d(np.arange(e.lines[0], e.lines[-1] + 1), e.lines)
+    spectrum = np.zeros(PERIOD // 2 + 1, dtype=complex)
+    sizes = np.abs(np.fft.rfft(linear[0].response[e.first_sample + PERIOD :][:PERIOD]))
+    around = np.interp(empty, e.lines, sizes[e.lines])
+    spectrum[empty] = 0.5 * around * np.exp(1j * rng.uniform(0, TURN, empty.size))
+    own = np.tile(np.fft.irfft(spectrum, PERIOD), 8)[: e.samples.size + PERIOD]
+    start = PERIOD - e.first_sample % PERIOD
+    records = tuple(
+        replace(r, response=r.response + own[start : start + r.response.size]) for r in linear
+    )
+    found = identify_with_path(records, PATH, "torque_mode", hold_known=True)
+    assert found.distortion.level == pytest.approx(0.5, rel=0.15)
+    assert found.distortion.before == pytest.approx(0.5, rel=0.15)
+    assert found.distortion.play
+    assert not found.trusted
+    assert found.corrected.frequency_hz[-1] <= 250.0
+    assert found.corrected.response.size == found.corrected.std_db.size
+    # The band admits what was added, relative to the lines.
+    assert np.median(found.corrected.std_db) > 0.25 * 8.686
