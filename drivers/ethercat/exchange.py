@@ -5,7 +5,6 @@ from __future__ import annotations
 import array
 import time
 from collections.abc import Sequence
-from dataclasses import asdict
 
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
@@ -303,9 +302,9 @@ class Exchange:
         loop = self.loop
         if loop is None:
             return {"running": False}
-        counters = asdict(loop.counters)
-        late = counters.pop("late")
-        return counters | {
+        figures = dict(vars(loop.counters))
+        late: list[int] = list(figures.pop("late"))
+        return figures | {
             "running": True,
             "late_histogram": late,
             "late_p50_us": percentile_us(late, 0.50),

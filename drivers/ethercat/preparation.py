@@ -159,9 +159,17 @@ class Preparation:
         self._snapshots = self._run(
             "register", {n: setup_.take_snapshot() for n in self._setups}, "noting the registers"
         )
+        # Other drives stay in PREOP: nobody has set their process data up.
+        spared = {
+            s.number: setup_.spare(s)
+            for s in self._stations
+            if s.number not in self._setups and s.mailbox is not None
+        }
+        self._run("register", spared, "leaving other drives alone", optional=set(spared))
         states = {
             station.number: change_state(station, AlState.SAFEOP, time.monotonic)
             for station in self._stations
+            if station.number not in spared
         }
         self._run("register", states, "going to SAFEOP", optional=set(states) - set(self._setups))
 

@@ -36,6 +36,7 @@ def read_items(
     dead: DriveError | None = None
     for index, members in groups.items():
         sizes = _sizes_of_whole(station, index, members) if dead is None else {}
+        doubted = index in station.single_only
         if sizes:
             yield Gap()
             whole = yield from _read_whole(station, index, sizes)
@@ -57,6 +58,9 @@ def read_items(
                 results[item] = error
                 if isinstance(error, LinkLost | LinkTimeout):
                     dead = error
+                    if not doubted:
+                        # It answers nothing: that says nothing about whole objects.
+                        station.single_only.discard(index)
         if index in station.to_prove:
             read = {item[1]: results[item] for item in members}
             good = {sub: value for sub, value in read.items() if isinstance(value, bytes)}

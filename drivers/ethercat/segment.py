@@ -9,6 +9,9 @@ calls stay in a global queue and are raised by later ones.
 And SOEM tells answers apart by an index of four bits alone: when 16 late frames lie in the
 socket, each request is at once answered by one that is 16 frames old, for ever. So late frames
 are thrown away before anything is sent, and registers are read and written by frames of our own.
+
+SOEM believes that slaves of the same vendor, product and revision have the same EEPROM, and reads
+only the first one's. Drives that tell nothing of themselves all have 0, whatever they are.
 """
 
 from __future__ import annotations
@@ -228,6 +231,10 @@ class Segment:
             )
         self.forget_errors()
         self.master.manual_state_change = 1
+        for slave in self.slaves:
+            if not (slave.man or slave.id):
+                # Another drive's EEPROM may have said that this one knows complete access.
+                slave._disable_complete_access()  # noqa: SLF001 - pysoem has no other name for it
         for attempt in range(_MAP_TRIES):
             try:
                 self.master.config_map()

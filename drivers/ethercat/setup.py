@@ -18,6 +18,7 @@ from drivers.ethercat.mapping import Entry, Pdo
 from drivers.ethercat.station import Station, change_state, read_again
 
 FMMU, SYNC_MANAGERS = 0x600, 0x800
+_FMMU_COUNT, _TRIES = 0x004, 3
 WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x400, 0x420
 _MANAGERS, _OUTPUTS, _SM_WATCHDOG = 4, 0x04, 0x40
 """Control byte of a sync manager (ETG.1000.4 clause 6.7): three buffers, written by the master."""
@@ -50,6 +51,20 @@ class Snapshot:
     fmmu: bytes
     sync_managers: bytes
     dc_delay: bytes
+
+
+def spare(station: Station) -> Steps[None]:
+    """Take a slave out of the process data: SOEM has given FMMUs to everyone.
+
+    Otherwise one that nobody uses may count in the working counter, as its controller likes, and
+    hide another one that is missing.
+    """
+    count = yield from read_again(_FMMU_COUNT, 1)
+    if count is None:
+        raise ProtocolError(f"station {station.number} stopped answering: it is left alone")
+    for _ in range(_TRIES if count[0] else 0):
+        if (yield Write(FMMU, bytes(16 * count[0]))) is not None:
+            return
 
 
 def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:

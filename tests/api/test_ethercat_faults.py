@@ -28,6 +28,9 @@ from tests.support.station import Live, Station, until
 B = 1
 """Index of the second slave for the segment's commands; cable 1 leads to it."""
 VELOCITY = 0x606C
+OPTIONS = ["--lockstep", "--mailboxes", "128", "40"]
+"""With answers of 40 bytes, lists of process data come in segments."""
+
 LOST = re.compile("no longer answers|does not answer|no valid process data")
 """How a motion ends whose drive vanished, by what is noticed first."""
 
@@ -124,11 +127,17 @@ class Segment:
         """One parameter, asked of the drive now."""
         return self.station.http.get(f"/drives/{drive}/parameters/2005:03").json()
 
+    def whole(self, drive: str, keys: list[str]) -> Any:
+        """What reading several parameters came to."""
+        job = self.station.http.post(f"/drives/{drive}/jobs/read_all", json={"keys": keys})
+        return self.station.done(job)
+
     def peace(self) -> None:
         self.trouble("peace")
         self.trouble("timing", al_s=0.0, sdo_s=0.0)
         self.trouble("eeprom_busy", slave=B, for_s=0.0)
         self.trouble("heal")
+        self.trouble("die_in_transfer", slave=B, after_segments=None)
         self.trouble("mute", slave=B, on=False)
         self.trouble("power_on", slave=B)
 
@@ -147,9 +156,9 @@ def segment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Segment]:
     bench = folder / "bench.toml"
     bench.write_text(BENCH)
     # A late reply is awaited: a stalling machine is then no trouble of its own.
-    station = Station(folder, bench, ["--lockstep"])
+    station = Station(folder, bench, OPTIONS)
     station.start()
-    made = Segment(station, ["--bench", str(bench), "--on", URL, "--lockstep"])
+    made = Segment(station, ["--bench", str(bench), "--on", URL, *OPTIONS])
     yield made
     made.stop()
     station.stop()
@@ -253,6 +262,25 @@ def test_mute_mailbox_ends_in_words_while_process_data_go_on(running: Segment) -
         10,
         "the parameter can be read again",
     )
+    running.jogs()
+
+
+def test_dying_in_a_transfer_ends_in_words_and_is_read_again(running: Segment) -> None:
+    keys = [f"1A00:{n:02X}" for n in range(9)]
+    before = running.whole(running.b, keys)
+    assert not before["failed"]
+    running.trouble("die_in_transfer", slave=B, after_segments=0)
+    began = time.monotonic()
+    dead = running.whole(running.b, keys)
+    assert time.monotonic() - began < 6
+    assert set(dead["failed"]) == set(keys)
+    assert all("did not answer in time" in words for words in dead["failed"].values()), dead
+    assert running.view()["stations"][1]["state"] == "OP", "its process data still come"
+    assert running.parameter(running.a)["raw"] is not None, "the neighbour is served"
+    running.trouble("die_in_transfer", slave=B, after_segments=None)
+    running.trouble("mute", slave=B, on=False)
+    until(lambda: running.whole(running.b, keys) == before, 10, "the list can be read again")
+    running.settled()
     running.jogs()
 
 

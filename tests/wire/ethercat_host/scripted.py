@@ -27,6 +27,8 @@ class ScriptedSlave:
 
     react: Callable[[bytes], list[bytes]]
     size: int = 128
+    """Of the mailbox to the slave; the one from it has ``answer_size``, or the same."""
+    answer_size: int = 0
     now: float = 0.0
     delay_s: float = 0.0
     alive: bool = True
@@ -45,8 +47,9 @@ class ScriptedSlave:
 
     def box(self, timeout_s: float = 1.0) -> Mailbox:
         return Mailbox(
-            OUT, self.size, IN, self.size, lambda: self.now, self.emergencies.append, timeout_s
-        )
+            OUT, self.size, IN, self.answer_size or self.size, lambda: self.now,
+            self.emergencies.append, timeout_s,
+        )  # fmt: skip
 
     def queue(self, payload: bytes, protocol: int = 3, delay_s: float = 0.0) -> None:
         self.sent = self.sent % 7 + 1
@@ -101,8 +104,10 @@ class ScriptedSlave:
             return b"\x08" if ready else b"\0"
         if step.register in (0x80E, 0x80F):
             return bytes([self.repeat | 1])
-        assert step[:2] == (IN, self.size)
+        size = self.answer_size or self.size
+        assert step[:2] == (IN, size)
         if not ready:
             return b"" if step.may_be_empty else None
         self.last = self.waiting.pop(0)[1]
-        return self.last.ljust(self.size, b"\0")
+        assert len(self.last) <= size
+        return self.last.ljust(size, b"\0")

@@ -114,6 +114,43 @@ def test_long_download_is_cut_to_the_mailbox() -> None:
     assert [s[2] & 1 for s in segments] == [0] * (len(segments) - 1) + [1]
 
 
+@pytest.mark.parametrize(("out", "back"), [(128, 1024), (1024, 128), (49, 37), (17, 16)])
+def test_mailboxes_may_have_any_two_sizes(out: int, back: int) -> None:
+    """An SDO server of the standard's bytes (ETG.1000.6 clauses 5.6.2.2 to 5.6.2.5)."""
+    text = bytes(range(256)) * 3 + b"end"
+    taken = bytearray()
+    place = toggle = 0
+
+    def react(request: bytes) -> list[bytes]:
+        nonlocal place, toggle
+        assert len(request) <= out - 6
+        command, mux = request[2], request[3:6]
+        if command == 0x40:
+            place, toggle = back - 16, 0
+            return [coe(3, b"\x41" + mux + struct.pack("<I", len(text)) + text[:place])]
+        if command == 0x21:
+            assert struct.unpack_from("<I", request, 6)[0] == len(text)
+            taken[:], toggle = request[10:], 0
+            return [coe(3, b"\x60" + mux + bytes(4))]
+        assert command & 0x10 == toggle
+        toggle ^= 0x10
+        if command & 0xE0 == 0x60:
+            part = text[place : place + back - 9]
+            place += len(part)
+            unused = max(7 - len(part), 0)
+            told = command & 0x10 | unused << 1 | (place == len(text))
+            return [coe(3, bytes([told]) + part.ljust(7, b"\0"))]
+        unused = command >> 1 & 7 if len(request) == 10 else 0
+        taken.extend(request[3 : len(request) - unused])
+        return [coe(3, bytes([0x20 | command & 0x10]) + bytes(7))]
+
+    slave = ScriptedSlave(react, size=out, answer_size=back)
+    box = slave.box()
+    assert slave.run(sdo.upload(box, 0x3000, 0)) == text
+    slave.run(sdo.download(box, 0x3000, 0, text))
+    assert bytes(taken) == text
+
+
 def test_a_late_answer_never_answers_the_next_question() -> None:
     """Field lesson: after a time-out the old value came back for the next read of the object."""
     slow = {"on": True}

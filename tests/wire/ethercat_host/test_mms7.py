@@ -22,8 +22,12 @@ ACTUAL = Address(0x6064, 0, "INT32")
 
 @pytest.fixture(scope="module")
 def mms7(namespace: Namespace) -> Iterator[VirtualSegment]:
-    """Its time follows the frames, so that a busy machine is no trouble."""
-    arguments = ["--drive", "mms7", "--sdo-ms", "0.3", "--lockstep"]
+    """Its time follows the frames, so that a busy machine is no trouble.
+
+    Behind it an M6-L, without complete access. Neither tells vendor or product, so that SOEM
+    takes them for the same make.
+    """
+    arguments = ["--drive", "mms7", "--drive", "m6l", "--sdo-ms", "0.3", "--lockstep"]
     with VirtualSegment.start("ec0s", arguments, namespace) as made:
         yield made
 
@@ -75,6 +79,9 @@ async def test_mms7_is_read_whole_and_moves(namespace: Namespace, mms7: VirtualS
             0.002,
         )
         await cyclic.start()
+        assert not [t for t in bus.texts if "refuses" in t], "the M6-L stays as it was"
+        other = await link.survey()
+        assert other.stations[1].state == "PREOP"
         await cyclic.drive_to(1, State.OPERATION_ENABLED, Mode.CSP)
         await until(lambda: cyclic.axis_state(1)[0] == "Operation enabled", 5.0)
         here = int.from_bytes(

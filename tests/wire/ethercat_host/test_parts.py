@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import os
+import platform
+import subprocess
+import sys
 from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
-from drivers import errors
+from drivers import errors, scheduling
 from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat import esc, permissions, protocol, sii
-from drivers.ethercat.al_status import al_status_text, state_name
+from drivers.ethercat.al_status import AlState, al_status_text, state_name
 from drivers.ethercat.cyclic import percentile_us
 from drivers.ethercat.frames import Request
 from drivers.ethercat.lanes import Lanes
@@ -20,7 +23,7 @@ from drivers.ethercat.mailbox import Mailbox, Pause, Read, Step, Steps, Write
 from drivers.ethercat.ring import RING_BYTES, SLOT, VALID, Ring
 from drivers.ethercat.samples import contiguous
 from drivers.ethercat.setup import interpolation_period
-from drivers.ethercat.station import Station, _to_preop
+from drivers.ethercat.station import Station, _to_preop, change_state
 
 
 @pytest.fixture
@@ -229,6 +232,26 @@ def test_permissions_without_the_interface() -> None:
     assert "no network interface 'nosuch0'" in report.words()
 
 
+def test_short_turns_need_no_permission() -> None:
+    """The kernel tells them by sched_getattr(2); in a process of its own, not for these tests."""
+    code = """
+import ctypes, os, platform, struct
+from drivers import scheduling
+asked = scheduling.short_slice()
+told = ctypes.create_string_buffer(56)
+number = {"x86_64": 315}.get(platform.machine(), 275)
+assert ctypes.CDLL(None).syscall(number, 0, told, 56, 0) == 0
+_, policy, _, nice, _, slice_ns = struct.unpack_from("<IIQiIQ", told)
+print(int(asked), policy, nice - os.nice(0), slice_ns)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    asked, policy, nicer, slice_ns = map(int, done.stdout.split())
+    assert asked == (policy == os.SCHED_OTHER), "who may run at idle times only stays there"
+    assert nicer == 0
+    if asked and tuple(map(int, platform.release().split(".")[:2])) >= (6, 12):
+        assert slice_ns == scheduling.SHORT_SLICE_NS
+
+
 def test_percentiles_of_the_lateness() -> None:
     bins = [0] * 16
     bins[3], bins[8] = 99, 1
@@ -248,6 +271,43 @@ def test_what_a_slave_sends_never_ends_the_process() -> None:
     while lanes.pending():
         lanes.step()
     assert isinstance(ended[0], errors.ProtocolError)
+
+
+def test_a_refused_state_is_told_and_acknowledged_before_the_next_request() -> None:
+    """By the registers alone (ETG.1000.4 clause 6.4): 0x130 with error bit 4, its code at 0x134."""
+    state, code = 2, 0
+    asked: list[int] = []
+
+    def answer(step: Step) -> bytes:
+        nonlocal state, code
+        if isinstance(step, Write):
+            assert step.register == 0x120
+            asked.append(step.data[0])
+            if state & 0x10 and not step.data[0] & 0x10:
+                return b""
+            state, code = step.data[0] & 0x0F, 0
+            if step.data[0] == AlState.SAFEOP and len(asked) == 1:
+                state, code = 0x12, 0x001E
+            return b""
+        assert isinstance(step, Read)
+        assert step.register == 0x130
+        return bytes([state, 0, 0, 0]) + code.to_bytes(2, "little")
+
+    def drive(steps: Steps[None]) -> None:
+        reply: bytes | None = None
+        with contextlib.suppress(StopIteration):
+            step = next(steps)
+            while True:
+                reply = b"" if isinstance(step, Pause) else answer(step)
+                step = steps.send(reply)
+
+    station = Station(3)
+    words = r"station 3 refuses SAFEOP and is in PREOP \+ error: invalid input configuration"
+    with pytest.raises(errors.NotAllowed, match=words):
+        drive(change_state(station, AlState.SAFEOP, lambda: 0.0))
+    drive(change_state(station, AlState.SAFEOP, lambda: 0.0))
+    assert asked == [0x04, 0x12, 0x04], "the error is acknowledged in the state it fell to"
+    assert state == AlState.SAFEOP
 
 
 def test_mailboxes_whose_sync_managers_were_lost_are_set_again() -> None:

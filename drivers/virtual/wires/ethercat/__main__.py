@@ -17,7 +17,7 @@ from drivers.virtual.wires.ethercat.bench import axes_by_name, axes_of_bench, lo
 from drivers.virtual.wires.ethercat.clock import LockstepClock, RealClock, SteadyClock, WireClock
 from drivers.virtual.wires.ethercat.segment import Segment
 from drivers.virtual.wires.ethercat.server import SegmentServer
-from drivers.virtual.wires.ethercat.slave import Slave, SlaveIdentity
+from drivers.virtual.wires.ethercat.slave import MAILBOXES, Slave, SlaveIdentity
 from profiles.loader import ProfileError
 
 _FACTORY = "drivers.virtual.firmware.factory:make_device"
@@ -39,6 +39,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--al-ms", type=float, default=2.0, help="time of a state change")
     parser.add_argument("--sdo-ms", type=float, default=1.0, help="answer time of the mailbox")
     parser.add_argument("--eeprom-us", type=float, default=50.0, help="read time of the EEPROM")
+    parser.add_argument(
+        "--mailboxes", type=int, nargs=2, default=MAILBOXES, metavar=("OUT", "IN"),
+        help="bytes of the mailboxes to and from the drives",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, default=1, help="of random trouble")
     parser.add_argument("--realtime", type=int, default=0, help="SCHED_FIFO priority, if allowed")
     return parser
@@ -75,8 +79,11 @@ def build(arguments: argparse.Namespace) -> Segment:
     clock: WireClock = SteadyClock() if arguments.steady else RealClock()
     if arguments.lockstep:
         clock = LockstepClock(arguments.cycle_us * 1000)
+    mailboxes = (arguments.mailboxes[0], arguments.mailboxes[1])
+    if not all(16 <= size <= most for size, most in zip(mailboxes, MAILBOXES, strict=True)):
+        raise ValueError(f"--mailboxes: {mailboxes} are not of 16 to {MAILBOXES[0]} bytes")
     slaves = [
-        Slave(device, clock, SlaveIdentity(serial=axis.serial or station))
+        Slave(device, clock, SlaveIdentity(serial=axis.serial or station), mailboxes)
         for station, (device, axis) in enumerate(zip(devices, axes, strict=True), 1)
     ]
     for slave in slaves:

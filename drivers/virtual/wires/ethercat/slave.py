@@ -26,13 +26,19 @@ from drivers.virtual.wires.ethercat.registers import AlCode, AlState
 _HOUSEKEEPING_NS = 1_000_000
 _NEVER = 1 << 62
 
-MAILBOX_BYTES = 256
-LAYOUT = (
-    sii.SmLayout(0x1000, MAILBOX_BYTES, 0x26, 1, 1),
-    sii.SmLayout(0x1100, MAILBOX_BYTES, 0x22, 1, 2),
-    sii.SmLayout(0x1200, 0, 0x64, 1, 3),
-    sii.SmLayout(0x1500, 0, 0x20, 1, 4),
-)
+MAILBOXES = (256, 256)
+"""Bytes of the mailboxes to and from the drive; no more than that has room."""
+
+
+def _layout(mailboxes: tuple[int, int]) -> tuple[sii.SmLayout, ...]:
+    return (
+        sii.SmLayout(0x1000, mailboxes[0], 0x26, 1, 1),
+        sii.SmLayout(0x1100, mailboxes[1], 0x22, 1, 2),
+        sii.SmLayout(0x1200, 0, 0x64, 1, 3),
+        sii.SmLayout(0x1500, 0, 0x20, 1, 4),
+    )
+
+
 BOOT_LAYOUT = (
     sii.SmLayout(0x1000, 512, 0x26, 1, 1),
     sii.SmLayout(0x1200, 512, 0x22, 1, 2),
@@ -52,19 +58,26 @@ class Slave:
     """See the module docstring. Not thread-safe: the segment's thread calls it."""
 
     def __init__(
-        self, device: Device, clock: WireClock, identity: SlaveIdentity | None = None
+        self,
+        device: Device,
+        clock: WireClock,
+        identity: SlaveIdentity | None = None,
+        mailboxes: tuple[int, int] = MAILBOXES,
     ) -> None:
         self.device = device
+        self._layout = _layout(mailboxes)
         link = device.profile.link("ethercat")
         self._has_dc = _supports_dc(device)
         self.report = SyncReport()
         self.dictionary = CoeDictionary(device, lambda: self.al.state, self.report, self._has_dc)
         complete = bool(link and link.complete_access)
-        self.coe = CoeServer(self.dictionary, complete, MAILBOX_BYTES - HEADER)
+        self.coe = CoeServer(self.dictionary, complete, mailboxes[1] - HEADER)
         self.files = FirmwareStore() if link and link.foe else None
         memory = bytearray(0x10000)
         self.dc = DistributedClock(memory, clock)
-        content = _sii_content(device, self.dictionary, identity or SlaveIdentity(), self._has_dc)
+        content = _sii_content(
+            device, self.dictionary, identity or SlaveIdentity(), self._layout, self._has_dc
+        )
         self.controller = Controller(self, sii.Eeprom(sii.build(content)), self.dc, memory)
         sms = self.controller.sms
         self.al = AlStateMachine(self)
@@ -211,8 +224,9 @@ class Slave:
             return AlCode.NO_SYNC
         return 0
 
-    def _mailbox_set(self, layout: Sequence[sii.SmLayout] = LAYOUT) -> bool:
+    def _mailbox_set(self, wanted: Sequence[sii.SmLayout] | None = None) -> bool:
         """Sync managers 0 and 1 are as the EEPROM describes them."""
+        layout = self._layout if wanted is None else wanted
         return all(
             sm.enabled
             and sm.mailbox
@@ -265,7 +279,11 @@ def _reason(new: AlState, code: int) -> str:
 
 
 def _sii_content(
-    device: Device, dictionary: CoeDictionary, identity: SlaveIdentity, has_dc: bool
+    device: Device,
+    dictionary: CoeDictionary,
+    identity: SlaveIdentity,
+    layout: tuple[sii.SmLayout, ...],
+    has_dc: bool,
 ) -> sii.SiiContent:
     """The EEPROM's content, from the profile and the drive's own 1018h."""
     profile = device.profile
@@ -286,7 +304,7 @@ def _sii_content(
         group=profile.identity.maker,
         coe_details=details,
         foe=bool(link and link.foe),
-        sync_managers=LAYOUT,
+        sync_managers=layout,
         boot=BOOT_LAYOUT if link and link.foe else None,
         rx_pdos=_sii_pdos(device, dictionary, "rx", 2),
         tx_pdos=_sii_pdos(device, dictionary, "tx", 3),
