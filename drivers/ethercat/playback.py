@@ -129,6 +129,9 @@ class AxisLoop:
         if _CONTROL not in self._out:
             raise NotAllowed(f"station {self.station}: the control word is not in the cyclic data")
         if goal is State.OPERATION_ENABLED:
+            if self.goal is not State.OPERATION_ENABLED:
+                # That the last sample is older than its disabling is no reason to stay disabled.
+                self._was_enabled = False
             if self.state in (State.FAULT, State.FAULT_REACTION):
                 raise NotAllowed(
                     f"station {self.station} has a fault and cannot be enabled",

@@ -335,3 +335,14 @@ def test_a_goal_given_while_braking_is_kept() -> None:
     assert bench.axis.phase is Phase.BRAKING, "the brake ramp is not cut short"
     bench.obey(round(STOP_S / CYCLE_S) + 10)
     assert bench.axis.state is State.SWITCH_ON_DISABLED
+
+
+def test_enabling_anew_is_not_taken_back_by_a_sample_from_before_the_disabling() -> None:
+    bench = Bench().enabled()
+    bench.axis.drive_to(State.SWITCH_ON_DISABLED, None)
+    bench.step()
+    # The drive is disabled by now, as its mailbox tells; the last sample is one cycle older.
+    bench.axis.drive_to(State.OPERATION_ENABLED, 8)
+    bench.status = DISABLED
+    bench.obey(10)
+    assert bench.axis.state is State.OPERATION_ENABLED
