@@ -241,13 +241,12 @@ def disk_figures(path: Path) -> tuple[int, int, int]:
     return sum(rows.values()), sum(out.values()), missing
 
 
-def soak(http: httpx.Client, server: int, url: str, folder: Path) -> None:
+def soak(http: httpx.Client, server: int, url: str, folder: Path, browsers: list[Chromium]) -> None:
     """Run it and print the figures."""
     drives = prepare(http)
     time.sleep(BASELINE_S)
     quiet = cycle_figures(http)
     channels = [{"drive": d, "key": k} for d in drives for k in KEYS]
-    browsers = [Chromium(folder / f"browser{n}") for n in (1, 2)]
     before, sleeping = [], []
     for each in browsers:
         with each.attached() as browser:
@@ -279,8 +278,6 @@ def soak(http: httpx.Client, server: int, url: str, folder: Path) -> None:
             after.append(sum(p["cpuTime"] for p in processes(browser)))
             views.append(lost(scope_page(browser)))
     info = http.post("/recordings/soak.sdrec/stop").raise_for_status().json()
-    for each in browsers:
-        each.end()
     busy = cycle_figures(http)
     samples, left_out, missing = disk_figures(folder / "state/recordings/soak.sdrec")
     rate = samples / AXES / took
@@ -331,7 +328,12 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with station_process(folder) as (http, server, url):
-            soak(http, server, url, folder)
+            browsers = [Chromium(folder / f"browser{n}") for n in (1, 2)]
+            try:
+                soak(http, server, url, folder, browsers)
+            finally:
+                for each in browsers:
+                    each.end()
 
 
 if __name__ == "__main__":
