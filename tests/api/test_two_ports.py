@@ -85,6 +85,22 @@ def test_jog_and_move(station: Station, z: str) -> None:
     assert float(station.state(z)["position"]) - before == pytest.approx(1.5, abs=0.02)
 
 
+def test_a_frequency_response_needs_consent_and_leaves_the_bus_as_it_was(
+    station: Station, z: str
+) -> None:
+    limits = {"travel_limit": 3.0, "speed_limit": 600.0, "torque_limit": 50.0, "cycle_ms": 4.0}
+
+    def buses() -> dict[str, Any]:
+        return {b["url"]: b["cyclic"] for b in station.ok(station.http.get("/buses"))}
+
+    before = buses()[CAN]
+    answer = station.http.post(f"/drives/{z}/jobs/sweep", json=limits)
+    assert answer.status_code == 409
+    assert "no watchdog" in answer.json()["detail"]
+    assert buses()[CAN] == before
+    assert station.state(z)["state"] != "Operation enabled"
+
+
 def test_the_scope_knows_which_bit_is_the_alarm(station: Station, z: str) -> None:
     """003:305: bit 7, not bit 3 as CiA 402-2 has it."""
     x = station.add(1, name="X")
