@@ -104,7 +104,8 @@ async def first_look(
             f"{axis.drive.name} moves only {moved:.3g} of {travel:.3g} rev, with up to {peak:.0%} "
             "of its rated torque",
             drive=axis.drive.name, value=round(moved, 4), limit=f"{travel:.3g} rev",
-            remedy="look for a closed brake, a blocked axis or a torque limit that is too low",
+            remedy="look for a closed brake, a blocked axis, a torque limit that is too low or a "
+            "speed loop that is far too soft",
         )  # fmt: skip
     require_right_sign(axis.drive.name, recording)
     fit = rough_fit(
