@@ -104,6 +104,7 @@ def distortion(
     if powers[0] < _ABOVE_NOISE * powers[1]:
         return Distortion(np.asarray(np.interp(frf.frequency_hz, f, share)))
     return Distortion(
-        np.asarray(np.interp(frf.frequency_hz, f, share)),
+        # What lies below the first empty bins is told by all of them, not by one beside a valley.
+        np.asarray(np.interp(frf.frequency_hz, f, share, left=float(np.median(share)))),
         float(np.median(share[upper])), float(np.median(plain[upper])),
     )  # fmt: skip

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -17,12 +17,11 @@ import numpy.typing as npt
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
-from backend.tools import excite
 from backend.tools import notch as notch_tool
-from backend.tools.axis_facts import read_facts
+from backend.tools.axis_facts import AxisFacts, read_facts
 from backend.tools.go_back import go_back
 from backend.tools.probe import PULLED, Probed, holding_torque, probe_axis
-from backend.tools.recording import Recording, require_signals, takes_torque
+from backend.tools.recording import require_signals, takes_torque
 from backend.tools.sweep_evaluation import SweepResult, SweepSettings, evaluate
 from backend.tools.sweep_plan import (
     Setup,
@@ -32,9 +31,9 @@ from backend.tools.sweep_plan import (
     sequences_of,
     setup_of,
 )
-from backend.tools.sweep_play import MODE_OF, play_fitting, scaled_by_speed
+from backend.tools.sweep_play import MODE_OF, Records, play_fitting, scaled_by_speed
 from backend.tools.temporary import temporary
-from drivers.cia402 import Mode
+from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
@@ -55,7 +54,6 @@ async def sweep(
         LinkLost: samples were lost; nothing is concluded from the rest.
     """
     check(settings)
-    closed = settings.kind != "mechanics"
     loop = {"speed_loop": "speed", "position_loop": "position"}.get(settings.kind, settings.loop)
     if loop == "auto" and (settings.excitation == "stepped" or not takes_torque(axis, session)):
         loop = "speed"
@@ -74,17 +72,16 @@ async def sweep(
                 progress(0.02, "feeling the axis with a small torque")
                 probed = await probe_axis(axis, session, settings.envelope, facts, home)
                 loop = chosen_loop(axis, settings, probed)
-        setup = await setup_of(axis, session, settings, facts, loop, probed)
-        beside = not closed and setup.loop != "none" and not setup.by_speed
-        require_signals(axis, session, MODE_OF[setup.loop], beside)
-        progress(0.08, "designing the excitation")
-        sequences = await asyncio.to_thread(sequences_of, setup, settings)
-        if setup.by_speed:
-            progress(0.09, "feeling how much torque the speed loop makes")
-            sequences = await scaled_by_speed(
-                axis, session, settings, setup, sequences, home, progress
-            )
-        records = await play_fitting(axis, session, settings, setup, sequences, home, progress)
+        how = _Sweep(axis, session, settings, facts, home, probed)
+        try:
+            setup, records = await how.measured(loop, progress)
+        except NotAllowed as error:
+            # A pull that friction hides shows when the axis turns.
+            ran_away = loop == "none" and settings.loop == "auto" and "position" in error.message
+            if not ran_away or await axis.state() is State.FAULT:
+                raise
+            await go_back(axis, session, home, settings.envelope, facts)
+            setup, records = await how.measured("speed", progress)
     await go_back(axis, session, home, settings.envelope, facts)
     raw, meta = _raw(records, setup, settings, session)
     if keep is not None:
@@ -101,6 +98,35 @@ async def sweep(
             drive=axis.drive.name,
             remedy="raise the excitation, or look for lost samples and saturated torque",
         ) from error
+
+
+@dataclass(frozen=True)
+class _Sweep:
+    """What was found out before a loop is chosen."""
+
+    axis: Axis
+    session: CyclicSession
+    settings: SweepSettings
+    facts: AxisFacts
+    home: int
+    probed: Probed | None
+
+    async def measured(self, loop: str, progress: Progress) -> tuple[Setup, Records]:
+        """Everything that is played with one loop."""
+        axis, session, settings, home = self.axis, self.session, self.settings, self.home
+        setup = await setup_of(axis, session, settings, self.facts, loop, self.probed)
+        beside = settings.kind == "mechanics" and setup.loop != "none" and not setup.by_speed
+        require_signals(axis, session, MODE_OF[setup.loop], beside)
+        progress(0.08, "designing the excitation")
+        sequences = await asyncio.to_thread(sequences_of, setup, settings)
+        if setup.by_speed:
+            progress(0.09, "feeling how much torque the speed loop makes")
+            sequences = await scaled_by_speed(
+                axis, session, settings, setup, sequences, home, progress
+            )
+        return setup, await play_fitting(
+            axis, session, settings, setup, sequences, home, progress
+        )  # fmt: skip
 
 
 async def _filters_off(axis: Axis, settings: SweepSettings) -> dict[str, int]:
@@ -135,7 +161,7 @@ def _dc(session: CyclicSession) -> bool:
 
 
 def _raw(
-    records: tuple[tuple[excite.Sequence, Recording], ...],
+    records: Records,
     setup: Setup,
     settings: SweepSettings,
     session: CyclicSession,

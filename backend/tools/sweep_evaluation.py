@@ -183,8 +183,8 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
             f"between the excited lines there is {found.distortion.level:.0%} of their motion, "
             "which friction does not explain: the axis has play (gear, coupling, key), or it is "
             "excited too weakly against its friction. Its response depends on how hard it is "
-            "driven, so nothing is designed from it, and above a quarter of the sample rate "
-            "nothing is shown"
+            "driven: no model is made of it, and above a quarter of the sample rate nothing is "
+            "shown"
         )
     elif not found.trusted:
         words.append(

@@ -20,8 +20,10 @@ from drivers.errors import NotAllowed
 
 _TURN = 2 * np.pi
 MODE_OF = {"none": Mode.CST, "speed": Mode.CSV, "position": Mode.CSP}
-#: A loop's reference that took too much torque is played again, this much smaller.
-_ATTEMPTS, _WEAKER = 4, 0.4
+#: What took too much torque is played again, this much smaller and with so much less base motion.
+_ATTEMPTS, _WEAKER, _SLOWER = 4, 0.4, 0.7
+
+Records = tuple[tuple[excite.Sequence, Recording], ...]
 
 
 async def scaled_by_speed(
@@ -47,7 +49,7 @@ async def _play_all(
     sequences: tuple[excite.Sequence, ...],
     home_raw: int,
     progress: Progress,
-) -> tuple[tuple[excite.Sequence, Recording], ...]:
+) -> Records:
     """Every realisation, from the same place as far as the travel asks for it."""
     units = await axis.units()
     records: list[tuple[excite.Sequence, Recording]] = []
@@ -71,7 +73,7 @@ async def _play_all(
 async def play_fitting(
     axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
     sequences: tuple[excite.Sequence, ...], home_raw: int, progress: Progress,
-) -> tuple[tuple[excite.Sequence, Recording], ...]:  # fmt: skip
+) -> Records:  # fmt: skip
     """As `_play_all`; where a loop answers with too much torque the excitation becomes smaller.
 
     How much torque that takes depends on the loop's gains, which are what is measured.
@@ -85,7 +87,13 @@ async def play_fitting(
                 raise
         await quiet(axis)
         await go_back(axis, session, home_raw, settings.envelope, setup.facts)
-        sequences = tuple(replace(s, excitation=scaled(s.excitation, _WEAKER)) for s in sequences)
+        sequences = tuple(
+            replace(
+                s, excitation=scaled(s.excitation, _WEAKER),
+                base=None if s.base is None else s.base * _SLOWER,
+            )
+            for s in sequences
+        )  # fmt: skip
     raise AssertionError
 
 
