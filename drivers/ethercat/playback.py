@@ -32,6 +32,8 @@ _RESTLESS = 2
 """Increments per cycle that encoder noise may make of an axis at rest."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STANDARD = cia402.Dialect()
+_STALE_CYCLES = 3
+"""Samples that may be older than what a mailbox told before an axis was enabled anew."""
 _REST_S, _GIVE_UP = 0.05, 30
 """An axis rests after so long without motion; after so many times as long nobody waits for it."""
 
@@ -113,6 +115,7 @@ class AxisLoop:
         self._after_brake = State.READY
         self._after_quick_stop = State.READY
         self._was_enabled = False
+        self._stale = 0
         self._last_position: int | None = None
         self._moved = 0
         """Increments since the cycle before."""
@@ -130,8 +133,8 @@ class AxisLoop:
             raise NotAllowed(f"station {self.station}: the control word is not in the cyclic data")
         if goal is State.OPERATION_ENABLED:
             if self.goal is not State.OPERATION_ENABLED:
-                # That the last sample is older than its disabling is no reason to stay disabled.
-                self._was_enabled = False
+                # That samples are older than its disabling is no reason to stay disabled.
+                self._was_enabled, self._stale = False, _STALE_CYCLES
             if self.state in (State.FAULT, State.FAULT_REACTION):
                 raise NotAllowed(
                     f"station {self.station} has a fault and cannot be enabled",
@@ -228,7 +231,8 @@ class AxisLoop:
         enabled = self.state is State.OPERATION_ENABLED
         if self._was_enabled and not enabled:
             self._fell_out()
-        self._was_enabled = enabled
+        self._was_enabled = enabled and not self._stale
+        self._stale = max(self._stale - 1, 0)
         if self.phase in (Phase.PLAYING, Phase.HOLDING):
             self._guard(values)
         self._setpoints(values, enabled=enabled)
