@@ -39,6 +39,7 @@ from backend.tools import (
     sweep_evaluation,
 )
 from backend.tools.sweep_preview import preview
+from backend.tools.tune_apply import take_back
 from drivers.errors import DriveError
 
 router = APIRouter()
@@ -190,7 +191,12 @@ async def start_autotune(bench: TheBench, member: Controlled, request: AutotuneR
 
     async def tool(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
         found = await autotune.autotune(member.axis, session, settings, progress, keep)
-        after = {key: await member.drive.raw(key) for key in found.before}
+        try:
+            after = {key: await member.drive.raw(key) for key in found.before}
+        except BaseException:
+            # Whoever cancels now has not seen a result: it is as if it had not been.
+            await take_back(member.axis, found.before)
+            raise
         change_log(bench).add(
             member.drive.id, Change(datetime.now(UTC), "autotune", found.before, after)
         )

@@ -81,7 +81,7 @@ async def verify(
         step = await step_tool.step_response(
             axis, session, _step_settings(check, candidate), stepping, keep
         )
-        why = _hum(candidate, step)
+        why = _named(candidate, hum(step))
     return Verified(swept, step, promised, candidate.bandwidth_hz, measured, not why, why)
 
 
@@ -91,11 +91,11 @@ def _broken_promise(
     """Empty where the measured loop keeps what was promised, else a sentence."""
     if not found:
         return "too few lines of the tuned loop could be measured"
-    words = _worse_than(promised, found)
-    return _named(candidate, ", ".join(words)) if words else ""
+    return _named(candidate, ", ".join(worse_than(promised, found)))
 
 
-def _worse_than(promised: Goals, found: dict[str, float | bool | None]) -> list[str]:
+def worse_than(promised: Goals, found: dict[str, float | bool | None]) -> list[str]:
+    """What of a measured loop is worse than promised, in words."""
     words = []
     ms, pm, gm = found.get("ms"), found.get("phase_margin_deg"), found.get("gain_margin_db")
     if isinstance(ms, float) and ms > promised.ms * MS_RATIO:
@@ -107,8 +107,8 @@ def _worse_than(promised: Goals, found: dict[str, float | bool | None]) -> list[
     return words
 
 
-def _hum(candidate: Candidate, step: step_tool.StepResult) -> str:
-    """Empty where the torque is quiet before the step, else a sentence.
+def hum(step: step_tool.StepResult) -> str:
+    """Empty where the torque is quiet before the step, else in words.
 
     A sensor's noise comes back as torque, the more the higher the gain and the wider the filters.
     """
@@ -116,11 +116,11 @@ def _hum(candidate: Candidate, step: step_tool.StepResult) -> str:
     rms = float(np.std(before))
     if rms <= _HUM_PERCENT:
         return ""
-    return _named(candidate, f"the torque hums with {rms:.1f} % of the rated while it stands")
+    return f"the torque hums with {rms:.1f} % of the rated while it stands"
 
 
 def _named(candidate: Candidate, words: str) -> str:
-    return f"{candidate.gains.speed_bandwidth_hz:.0f} Hz: {words}"
+    return f"{candidate.gains.speed_bandwidth_hz:.0f} Hz: {words}" if words else ""
 
 
 def _step_settings(check: Check, candidate: Candidate) -> step_tool.StepSettings:
