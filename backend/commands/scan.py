@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from backend.commands import remote_params
 from backend.commands.options import Server, Url, server_for
 from backend.commands.session import opened, run, show_progress
 from backend.matching import match_profiles
@@ -53,6 +52,9 @@ _FOUND = {
 async def _found(url: str, server: str | None) -> list[tuple[dict[str, object], dict[str, str]]]:
     """What answers, and the profiles that fit with how sure that is."""
     if at := server_for(url, server):
+        # The messages of the interface take longer to import than the rest.
+        from backend.commands import remote_params
+
         return [
             (f.model_dump(include=_FOUND), {m.profile: m.confidence for m in f.matches})
             for f in await remote_params.scan(at, url)

@@ -87,6 +87,8 @@ class EthercatLink:
     async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
         """Search the segment: every drive is reset to PREOP and identified.
 
+        Where only ``stations`` are asked for that are known and answer, the others are left alone.
+
         Raises:
             Busy: the cyclic exchange runs.
         """

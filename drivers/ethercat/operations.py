@@ -108,8 +108,10 @@ class Operations:
         self.roster.is_open = False
 
     def _scan(self, message: Message, done: Done) -> None:
-        self.roster.attach()
         wanted = message.get("stations")
+        known = wanted is not None and self.roster.knows(wanted)
+        if not known:
+            self.roster.attach()
         chosen = [s for s in self.roster.stations if wanted is None or s.number in wanted]
         left = {station.number for station in chosen}
         if not chosen:
@@ -129,7 +131,7 @@ class Operations:
 
             return identified
 
-        for station in self.roster.stations:
+        for station in chosen if known else self.roster.stations:
             number = station.number
             steps = transactions.identify(station, time.monotonic)
             self.lanes.submit(number, "mailbox", steps, one(number) if number in left else _ignore)

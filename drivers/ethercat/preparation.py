@@ -24,6 +24,7 @@ from drivers.ethercat.station import Station, change_state, identify
 
 CYCLE_NS = (250_000, 10_000_000)
 _SETUP_S = 30.0
+_MAP_TRIES = 3
 T = TypeVar("T")
 Report = Callable[[str, int | None, str], None]
 """Kind of event, station, text."""
@@ -117,22 +118,35 @@ class Preparation:
             },
             "reading the values of the mapped objects",
         )
-        # An emergency that lies in a mailbox would make SOEM's mapping fail.
-        drains = {s.number: s.box.drain() for s in self._stations if s.mailbox is not None}
-        self._run("mailbox", drains, "emptying the mailboxes")
+        probes = {
+            s.number: setup_.reads_whole(s)
+            for s in self._stations
+            if s.mailbox is not None and not (s.vendor_id or s.product_code)
+        }
+        whole = self._run("mailbox", probes, "asking who knows complete access")
+        entry_by_entry = [number for number, can in whole.items() if not can]
         if total > IO_MAP_BYTES:
             self._segment.map(total)
-        self._promise("building the process data map")
-        self._segment.map(total)
-        for number, plan in self._setups.items():
-            told = self._segment.sizes(number)
-            if told != (plan.rx.size, plan.tx.size):
-                raise ProtocolError(
-                    f"station {number} maps {told[0]} bytes of outputs and {told[1]} of inputs,"
-                    f" {plan.rx.size} and {plan.tx.size} were written",
-                    remedy="the drive keeps a mapping of its own: use its fixed process data",
-                )
-        return initial
+        for _ in range(_MAP_TRIES):
+            # An emergency that lies in a mailbox would make SOEM's mapping fail.
+            drains = {s.number: s.box.drain() for s in self._stations if s.mailbox is not None}
+            self._run("mailbox", drains, "emptying the mailboxes")
+            self._promise("building the process data map")
+            self._segment.map(total, entry_by_entry)
+            wrong = {n: p for n, p in self._setups.items() if not self._fits(n, p)}
+            if not wrong:
+                return initial
+        # Not an answer that SOEM missed, then.
+        number, plan = next(iter(wrong.items()))
+        told = self._segment.sizes(number)
+        raise ProtocolError(
+            f"station {number} maps {told[0]} bytes of outputs and {told[1]} of inputs,"
+            f" {plan.rx.size} and {plan.tx.size} were written",
+            remedy="the drive keeps a mapping of its own: use its fixed process data",
+        )
+
+    def _fits(self, number: int, plan: StationSetup) -> bool:
+        return self._segment.sizes(number) == (plan.rx.size, plan.tx.size)
 
     def _check_places(self) -> None:
         jobs = {

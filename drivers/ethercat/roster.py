@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from drivers.errors import Busy, DriveError, LinkLost
 from drivers.ethercat import station as transactions
@@ -195,6 +195,18 @@ class Roster:
         return received
 
     # Finding -------------------------------------------------------------------------------
+
+    def knows(self, numbers: Sequence[int]) -> bool:
+        """These stations are there and need no search, which would reset all the others."""
+        return (
+            self.attached
+            and self.exchange.loop is None
+            and all(1 <= number <= len(self.stations) for number in numbers)
+            and not any(
+                self.stations[number - 1].lost or self.stations[number - 1].badly_found
+                for number in numbers
+            )
+        )
 
     def attach(self) -> None:
         """Search the segment and make the stations; blocks for as long as SOEM takes."""

@@ -20,7 +20,7 @@ import os
 import select
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import pysoem
@@ -212,11 +212,11 @@ class Segment:
         """Write a register of a slave; False when it does not answer."""
         return self.exchange([(station, Write(register, data))])[0] is not None
 
-    def map(self, expected_bytes: int) -> None:
+    def map(self, expected_bytes: int, entry_by_entry: Collection[int] = ()) -> None:
         """Build the IO map from what the drives have mapped. States stay as they are.
 
         ``expected_bytes`` is the sum of all process data, checked before SOEM writes past the
-        end of its buffer.
+        end of its buffer. ``entry_by_entry`` are stations without complete access.
 
         Raises:
             NotAllowed: more process data than the IO map holds.
@@ -231,10 +231,9 @@ class Segment:
             )
         self.forget_errors()
         self.master.manual_state_change = 1
-        for slave in self.slaves:
-            if not (slave.man or slave.id):
-                # Another drive's EEPROM may have said that this one knows complete access.
-                slave._disable_complete_access()  # noqa: SLF001 - pysoem has no other name for it
+        for number in entry_by_entry:
+            # Another drive's EEPROM may have told SOEM that this one has it.
+            self.slaves[number - 1]._disable_complete_access()  # noqa: SLF001 - its only name
         for attempt in range(_MAP_TRIES):
             try:
                 self.master.config_map()

@@ -143,6 +143,15 @@ def interpolation_period(cycle_ns: int) -> tuple[int, int]:
     raise NotAllowed(f"a cycle of {cycle_ns / 1000:g} µs cannot be told to the drive")
 
 
+def reads_whole(station: Station) -> Steps[bool]:
+    """Whether the drive knows complete access, asked with the object that SOEM begins with."""
+    try:
+        yield from coe.upload(station.box, 0x1C00, 0, complete=True)
+    except DriveError:
+        return False
+    return True
+
+
 def assigned_bytes(station: Station) -> Steps[int]:
     """Bytes of all process data that a slave has mapped by itself."""
     total = 0

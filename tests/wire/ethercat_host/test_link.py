@@ -72,6 +72,18 @@ async def test_read_many_mixes_whole_objects_single_ones_and_refusals(rig: Rig) 
         assert rig.do("state")["frames"] - frames < 60  # type: ignore[index]
 
 
+async def test_asking_who_one_station_is_leaves_the_others_alone(rig: Rig) -> None:
+    async with rig.link() as bus:
+        # Whoever is reset now does not come back.
+        rig.do("refuse", slave=0, state="PREOP", code=0x0001)
+        (found,) = await bus.link.scan(quiet, stations=[2])
+        assert found.station == 2
+        assert found.serial == 77
+        assert await bus.link.read(1, STATUS) == b"\x50\x02"
+        every = await bus.link.scan(quiet)
+        assert "INIT" in every[0].state, "a whole search resets everybody"
+
+
 @repeated
 async def test_a_search_does_not_end_what_healthy_drives_were_asked_before(rig: Rig) -> None:
     async with rig.link() as bus:
