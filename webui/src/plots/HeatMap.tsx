@@ -1,5 +1,6 @@
-import { useEffect, useRef } from 'react'
+import { useRef } from 'react'
 import { figure } from '../widgets/format'
+import { sheetOf, upwards, useDrawing } from './canvas'
 import { useSharedCursor } from './shared-cursor'
 import { ticks } from './XyPlot'
 
@@ -49,16 +50,8 @@ export function HeatMap({
 }) {
   const canvas = useRef<HTMLCanvasElement>(null)
   const over = useRef<HTMLDivElement>(null)
-  useEffect(() => {
-    const element = canvas.current
-    if (!element) return
-    const draw = () =>
-      drawMap(element, { times, rows, values, highest, unit, timeLabel, valueLabel })
-    draw()
-    const observer = new ResizeObserver(draw)
-    observer.observe(element)
-    return () => observer.disconnect()
-  }, [times, rows, values, highest, unit, timeLabel, valueLabel, dark])
+  const drawing = { times, rows, values, highest, unit, timeLabel, valueLabel }
+  useDrawing(canvas, (element) => drawMap(element, drawing), [...Object.values(drawing), dark])
   const first = times[0] ?? 0
   const long = (times.at(-1) ?? 0) - first || 1
   const wide = () => over.current?.clientWidth ?? 0
@@ -100,18 +93,13 @@ interface Drawing {
 }
 
 function drawMap(canvas: HTMLCanvasElement, drawing: Drawing): void {
-  const { clientWidth: width, clientHeight: height } = canvas
-  canvas.width = width * devicePixelRatio
-  canvas.height = height * devicePixelRatio
-  const ctx = canvas.getContext('2d')
-  if (!ctx || drawing.times.length === 0) return
+  const sheet = sheetOf(canvas)
+  if (!sheet || drawing.times.length === 0) return
+  const { ctx, width, height, style } = sheet
   const loudest = drawing.values.reduce((a, b) => Math.max(a, b), 0) || 1
-  ctx.scale(devicePixelRatio, devicePixelRatio)
   const [wide, high] = [width - LEFT - RIGHT, height - BOTTOM - TOP]
   ctx.imageSmoothingEnabled = false
   ctx.drawImage(image(drawing, loudest), LEFT, TOP, wide, high)
-  const style = getComputedStyle(document.documentElement)
-  ctx.font = `12px ${getComputedStyle(document.body).fontFamily}`
   ctx.fillStyle = style.getPropertyValue('--dim')
   ctx.textAlign = 'center'
   const [first, last] = [drawing.times[0] as number, drawing.times.at(-1) as number]
@@ -124,12 +112,7 @@ function drawMap(canvas: HTMLCanvasElement, drawing: Drawing): void {
   for (const hz of ticks(0, drawing.highest, high / 36)) {
     ctx.fillText(figure(hz, 5), LEFT - 5, TOP + high * (1 - hz / drawing.highest) + 4)
   }
-  ctx.save()
-  ctx.translate(12, TOP + high / 2)
-  ctx.rotate(-Math.PI / 2)
-  ctx.textAlign = 'center'
-  ctx.fillText(drawing.valueLabel, 0, 0)
-  ctx.restore()
+  upwards(ctx, drawing.valueLabel, 12, TOP + high / 2)
   legend(ctx, width, high, loudest, drawing.unit)
 }
 

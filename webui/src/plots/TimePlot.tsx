@@ -144,6 +144,12 @@ export function TimePlot({
 
 const units = (series: PlotSeries[]) => [...new Set(series.map((each) => each.unit || NO_UNIT))]
 
+/** Colour of a unit's only trace, for its axis; null where several share the axis. */
+function ownColor(series: PlotSeries[], unit: string): string | null {
+  const [only, second] = series.filter((each) => (each.unit || NO_UNIT) === unit)
+  return only && !second ? only.color : null
+}
+
 /** Range of a unit's scale: the fixed one, or over what is in sight. */
 function yRange(plot: uPlot, series: PlotSeries[], unit: string, frame: PlotFrame): Span {
   const fixed = frame.ranges.get(unit === NO_UNIT ? '' : unit)
@@ -210,6 +216,7 @@ function options(
         axis({
           scale: name,
           ...named(name),
+          stroke: ownColor(series, name) ?? text,
           size: narrow ? 42 : 60,
           // eslint-disable-next-line @typescript-eslint/no-unsafe-enum-assignment -- see LEFT
           side: i % 2 === 0 ? LEFT : RIGHT,

@@ -1,5 +1,6 @@
-import { useEffect, useMemo, useRef } from 'react'
+import { useMemo, useRef } from 'react'
 import { figure } from '../widgets/format'
+import { sheetOf, upwards, useDrawing } from './canvas'
 import { useSharedCursor } from './shared-cursor'
 import { nearestPoint, pointAt, type Range } from './xy-points'
 
@@ -35,15 +36,13 @@ export function XyPlot({
   const canvas = useRef<HTMLCanvasElement>(null)
   const over = useRef<HTMLDivElement>(null)
   const curve = useMemo(() => ({ x, y, times, xs: range(x), ys: range(y) }), [x, y, times])
-  useEffect(() => {
-    const element = canvas.current
-    if (!element) return
-    const draw = () => drawXy(element, { ...curve, xLabel, yLabel, color })
-    draw()
-    const observer = new ResizeObserver(draw)
-    observer.observe(element)
-    return () => observer.disconnect()
-  }, [curve, xLabel, yLabel, color, dark])
+  useDrawing(canvas, (element) => drawXy(element, { ...curve, xLabel, yLabel, color }), [
+    curve,
+    xLabel,
+    yLabel,
+    color,
+    dark,
+  ])
   const size = () => ({
     width: over.current?.clientWidth ?? 0,
     height: over.current?.clientHeight ?? 0,
@@ -78,14 +77,9 @@ interface Drawing {
 }
 
 function drawXy(canvas: HTMLCanvasElement, drawing: Drawing): void {
-  const { clientWidth: width, clientHeight: height } = canvas
-  canvas.width = width * devicePixelRatio
-  canvas.height = height * devicePixelRatio
-  const ctx = canvas.getContext('2d')
-  if (!ctx) return
-  const style = getComputedStyle(document.documentElement)
-  ctx.scale(devicePixelRatio, devicePixelRatio)
-  ctx.font = `12px ${getComputedStyle(document.body).fontFamily}`
+  const sheet = sheetOf(canvas)
+  if (!sheet) return
+  const { ctx, width, height, style } = sheet
   const [x0, x1] = drawing.xs
   const [y0, y1] = drawing.ys
   const px = (value: number) => LEFT + ((value - x0) / (x1 - x0)) * (width - LEFT - RIGHT)
@@ -105,12 +99,7 @@ function drawXy(canvas: HTMLCanvasElement, drawing: Drawing): void {
     rule(ctx, LEFT, py(value), width - RIGHT, py(value))
     ctx.fillText(figure(value, 5), LEFT - 5, py(value) + 4)
   }
-  ctx.save()
-  ctx.translate(12, (height - BOTTOM) / 2)
-  ctx.rotate(-Math.PI / 2)
-  ctx.textAlign = 'center'
-  ctx.fillText(drawing.yLabel, 0, 0)
-  ctx.restore()
+  upwards(ctx, drawing.yLabel, 12, (height - BOTTOM) / 2)
   ctx.strokeStyle = drawing.color
   ctx.lineWidth = 1.5
   ctx.beginPath()

@@ -92,6 +92,7 @@ export const scope = {
   'maths.deep': ['Too many brackets in each other.', '括号嵌套过深。'],
   'scale.title': ['Y scales', 'Y 轴刻度'],
   'scale.auto': ['follows the traces', '自动'],
+  'scale.allAuto': ['follow the traces', '自动'],
   'scale.fixed': ['fixed', '固定'],
   'scale.low': ['Lower end, {unit}', '下端，{unit}'],
   'scale.high': ['Upper end, {unit}', '上端，{unit}'],

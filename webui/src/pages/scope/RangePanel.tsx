@@ -30,7 +30,10 @@ export function RangePanel({
   return (
     <details className="scales">
       <summary>
-        {t('scale.title')} <span className="dim num">{words.join(' · ')}</span>
+        {t('scale.title')}{' '}
+        <span className="dim num">
+          {ranges.size === 0 ? t('scale.allAuto') : words.join(' · ')}
+        </span>
       </summary>
       <div className="row wrap">
         {units.map((unit) => {
