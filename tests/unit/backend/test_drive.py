@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from itertools import chain, pairwise
 
 import pytest
 from pydantic import ValidationError
 
 from backend.api.models import ParameterWrite
-from backend.drive import Drive
-from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, Rejected
+from backend.drive import OBJECT_BATCH, Drive, Port
+from backend.tools.parameters import read_all
+from drivers.errors import LinkTimeout, NotAllowed, NotInUse, OutOfRange, Rejected
+from profiles.loader import load_profile
 from tests.support.memory_link import MemoryLink
 
 
@@ -105,6 +108,33 @@ async def test_one_failure_does_not_spoil_a_batch(drive: Drive, link: MemoryLink
     assert readings["2005:10"].error == "refused"
     assert "Modbus" in readings["PA_38"].error
     assert readings["2105:00"].raw == 1
+
+
+async def test_what_is_not_in_use_is_no_failure_and_no_value(
+    drive: Drive, link: MemoryLink
+) -> None:
+    link.read_errors[0x2005, 0x10] = NotInUse("not in use: 2005:00 counts 3 entries")
+    told = await read_all(drive, ["2005:03", "2005:10"], lambda _share, _text: None)
+    assert told == {"read": 1, "failed": {}}
+    reading = drive.readings["2005:10"]
+    assert (reading.raw, reading.unused) == (None, True)
+    assert "counts 3 entries" in reading.error
+
+
+def test_no_object_is_cut_between_two_batches_on_ethercat(link: MemoryLink) -> None:
+    """An object that is cut is read entry by entry, whatever the drive can."""
+    profile = load_profile("mms7")
+    parameters = [p for p in profile.parameters if p.index is not None]
+    port = Port(link, 1, profile.link("ethercat"))
+    link.kind = "ethercat"
+    parts = port.batches(parameters)
+    assert list(chain(*parts)) == sorted(parameters, key=lambda p: p.index or 0)
+    where = [{p.index for p in part} for part in parts]
+    assert len(parts) > 1
+    assert not any(one & other for one, other in pairwise(where))
+    assert all(len(part) >= OBJECT_BATCH for part in parts[:-1])
+    link.kind = "mlink"
+    assert max(len(part) for part in port.batches(parameters)) < 20, "a stop waits for no more"
 
 
 async def test_wrong_length_from_newer_firmware_is_told(drive: Drive, link: MemoryLink) -> None:
