@@ -92,9 +92,12 @@ async def test_a_position_trajectory_is_played_value_for_value(link: CanopenLink
     await until(lambda: bool(blocks) and blocks[-1].samples[-1][1] == 1000)
     played = _column(blocks, "position")
     steps = np.diff(played[played <= 1000])
-    # 10 per cycle; more only where the computer was late by whole cycles.
-    assert set(np.unique(steps)) <= {10.0 * n for n in range(6)}
-    assert np.count_nonzero(steps == 10) > 50
+    # 10 per cycle; more only behind cycles without samples, or that a late computer left out.
+    moving = steps[int(np.argmax(steps > 0)) :]
+    assert not np.any(moving % 10)
+    extra = int(np.sum(np.maximum(moving / 10 - 1, 0)))
+    assert extra <= np.count_nonzero(moving == 0) + sum(block.dropped for block in blocks)
+    assert np.count_nonzero(moving == 10) > 20
 
 
 async def test_a_jump_at_the_beginning_is_refused(link: CanopenLink) -> None:
