@@ -150,6 +150,8 @@ def _modes(found: SweepResult, spec: MechanicsSpec, highest_hz: float) -> str:
 
 def _told(name: str, part: Errors, limits: tuple[float, float]) -> str:
     db, deg = limits
+    if part.lines == 0:
+        return f"{name} withheld"
     covered = " " if part.covered >= 0.9 else "!"
     return (
         f"{name} {marked(part.magnitude_db, db, '5.2f')}dB "

@@ -54,8 +54,8 @@ _APART, _APART_FOLDED, _FOLDED = 0.5, 0.12, 4
 _FREED = 0.1
 #: A start is moved by this much (cycles) to where its delay fits.
 _LATE = 0.1
-#: Images to either side of a line that are looked at in a search.
-_IMAGES = 2
+#: Images of up to about this frequency are looked at in a search.
+_SEARCHED_HZ = 2000.0
 #: Inertia of one more load, relative to the one that it hangs on.
 _RATIOS = (0.05, 0.12, 0.25, 0.5, 1.0, 2.0, 5.0, 12.0, 30.0)
 
@@ -220,7 +220,9 @@ def _with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
     lines = _telling_lines(view, found)
     f = view.f[lines]
     weight = np.minimum(view.weight[lines], 100.0)
-    sampler = view.sampler.thinned(lines).nearest(_IMAGES)
+    # What is folded back from beyond a few kHz is weak.
+    images = max(1, round(_SEARCHED_HZ * problem.period_s))
+    sampler = view.sampler.thinned(lines).nearest(images)
     every = sampler.frequency_hz
     late = delay_response(every, float(found.x[2]) * problem.period_s)
     further = problem.further(found.x, view, every)
