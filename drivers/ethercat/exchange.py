@@ -12,7 +12,6 @@ from drivers.ethercat import setup as setup_
 from drivers.ethercat.al_status import ERROR_BIT, AlState
 from drivers.ethercat.cyclic import CyclicLoop, Image, layout, percentile_us
 from drivers.ethercat.lanes import Done, Lanes
-from drivers.ethercat.mailbox import Pause, Steps
 from drivers.ethercat.playback import AxisLoop, Limits, Motion
 from drivers.ethercat.preparation import Preparation, Report
 from drivers.ethercat.protocol import Message
@@ -20,6 +19,7 @@ from drivers.ethercat.ring import Ring
 from drivers.ethercat.segment import Segment
 from drivers.ethercat.setup import Snapshot, StationSetup
 from drivers.ethercat.station import Station, al_status, change_state
+from drivers.ethercat.steps import Pause, Steps
 
 _WATCHDOG, _OP_TRIES, _OP_PAUSE_S = 0x001B, 5, 0.2
 _LEAVE_S, _SETTLE_DC_S, _SETTLE_S = 0.5, 0.4, 0.02

@@ -6,7 +6,8 @@ import struct
 from collections.abc import Callable
 
 from drivers.errors import DriveError, ProtocolError, Rejected
-from drivers.ethercat.mailbox import FOE, Mail, Mailbox, Pause, Steps
+from drivers.ethercat.mailbox import FOE, Mail, Mailbox
+from drivers.ethercat.steps import Pause, Steps
 
 ERASE_S, PACKET_S = 30.0, 10.0
 """Drives that erase their memory first, or check the whole file at the end, take their time."""

@@ -21,7 +21,7 @@ from typing import Any, Literal, Protocol
 from drivers.errors import DriveError, LinkLost, ProtocolError
 from drivers.ethercat.coe import stopped_first
 from drivers.ethercat.frames import ROOM_BYTES, Request, bytes_of
-from drivers.ethercat.mailbox import Gap, Pause, Read, Step, Steps, Write
+from drivers.ethercat.steps import Gap, Pause, Read, Step, Steps, Write
 
 GRACE_S = 0.01
 """How long a stop lets the answer under way come: most drives need 1 to 5 ms."""

@@ -1,8 +1,6 @@
 """The mailbox of one slave: framing and transactions as generators without any I/O.
 
-A transaction yields `Read`, `Write` and `Pause` steps and is sent back the bytes of a read,
-``b""`` for a write that arrived, or None where nobody answered. Whoever owns the wire runs the
-steps, one frame each, so that process data never wait for a mailbox.
+See `drivers.ethercat.steps` for what a transaction yields and is sent back.
 
 Source: ETG.1000.4 clause 5.6 (mailbox header, counter, repeat), ETG.1000.6 clause 5.6 (CoE).
 """
@@ -11,46 +9,12 @@ from __future__ import annotations
 
 import struct
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple, TypeVar
+from typing import Literal, NamedTuple
 
 from drivers.errors import LinkLost, LinkTimeout, ProtocolError
-
-T = TypeVar("T")
-
-
-class Read(NamedTuple):
-    """Read ``size`` bytes from an ESC register (FPRD).
-
-    ``may_be_empty``: a frame that came back although nobody answered (an empty mailbox, working
-    counter 0) gives ``b""`` and not None, which is then a lost frame.
-    """
-
-    register: int
-    size: int
-    may_be_empty: bool = False
-
-
-class Write(NamedTuple):
-    """Write an ESC register (FPWR)."""
-
-    register: int
-    data: bytes
-
-
-class Pause(NamedTuple):
-    """Leave the station alone for a while."""
-
-    seconds: float
-
-
-class Gap(NamedTuple):
-    """Nothing is under way: here more urgent transactions of the station may come in between."""
-
-
-Step = Read | Write | Pause | Gap
-Steps = Generator[Step, bytes | None, T]
+from drivers.ethercat.steps import Pause, Read, Steps, Write
 
 MAILBOX_ERROR = 0
 COE = 3

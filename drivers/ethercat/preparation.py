@@ -13,7 +13,6 @@ from drivers.ethercat import setup as setup_
 from drivers.ethercat.al_status import AlState
 from drivers.ethercat.cyclic import Image, layout, places
 from drivers.ethercat.lanes import Done, LaneName, Lanes
-from drivers.ethercat.mailbox import Steps
 from drivers.ethercat.mapping import Entry, Pdo
 from drivers.ethercat.playback import AxisLoop
 from drivers.ethercat.protocol import Message
@@ -21,6 +20,7 @@ from drivers.ethercat.ring import Ring
 from drivers.ethercat.segment import IO_MAP_BYTES, Segment
 from drivers.ethercat.setup import Snapshot, StationSetup
 from drivers.ethercat.station import Station, change_state, identify
+from drivers.ethercat.steps import Steps
 
 CYCLE_NS = (250_000, 10_000_000)
 _SETUP_S = 30.0

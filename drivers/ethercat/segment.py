@@ -27,7 +27,7 @@ import pysoem
 
 from drivers.errors import Busy, LinkLost, NotAllowed, ProtocolError
 from drivers.ethercat import frames, permissions
-from drivers.ethercat.mailbox import Read, Write
+from drivers.ethercat.steps import Read, Write
 
 IO_MAP_BYTES = 4096
 MAX_STATIONS = 199

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from drivers.errors import DriveError, NotAllowed, ProtocolError, Rejected
 from drivers.ethercat import coe
 from drivers.ethercat.al_status import AlState
-from drivers.ethercat.mailbox import Read, Steps, Write
 from drivers.ethercat.mapping import Entry, Pdo
 from drivers.ethercat.station import Station, change_state, read_again
+from drivers.ethercat.steps import Read, Steps, Write
 
 FMMU, SYNC_MANAGERS = 0x600, 0x800
 _FMMU_COUNT, _TRIES = 0x004, 3

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError
-from drivers.ethercat.mailbox import Pause, Read, Steps, Write
+from drivers.ethercat.steps import Pause, Read, Steps, Write
 
 ALIAS_WORD, CHECKSUM_WORD, SERIAL_WORD, BOOT_WORD = 0x0004, 0x0007, 0x000E, 0x0014
 MAILBOX_WORD = 0x0018

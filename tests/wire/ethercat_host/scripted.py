@@ -7,7 +7,8 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from drivers.ethercat.mailbox import Gap, Mailbox, Pause, Read, Step, Write
+from drivers.ethercat.mailbox import Mailbox
+from drivers.ethercat.steps import Gap, Pause, Read, Step, Write
 
 T = TypeVar("T")
 OUT, IN = 0x1000, 0x1100

@@ -19,11 +19,12 @@ from drivers.ethercat.al_status import AlState, al_status_text, state_name
 from drivers.ethercat.cyclic import percentile_us
 from drivers.ethercat.frames import Request
 from drivers.ethercat.lanes import Lanes
-from drivers.ethercat.mailbox import Mailbox, Pause, Read, Step, Steps, Write
+from drivers.ethercat.mailbox import Mailbox
 from drivers.ethercat.ring import RING_BYTES, SLOT, VALID, Ring
 from drivers.ethercat.samples import contiguous
 from drivers.ethercat.setup import interpolation_period
 from drivers.ethercat.station import Station, _to_preop, change_state
+from drivers.ethercat.steps import Pause, Read, Step, Steps, Write
 
 
 @pytest.fixture

@@ -15,9 +15,9 @@ from drivers.errors import DriveError, LinkTimeout, NotAllowed
 from drivers.ethercat import coe
 from drivers.ethercat.frames import Request
 from drivers.ethercat.lanes import GRACE_S, Lanes, Urgency
-from drivers.ethercat.mailbox import Read, Write
 from drivers.ethercat.reading import read_items
 from drivers.ethercat.station import Station
+from drivers.ethercat.steps import Read, Write
 from drivers.link import Address
 from tests.wire.ethercat_host.conftest import Rig, until
 from tests.wire.ethercat_host.scripted import OUT, ScriptedSlave

@@ -17,8 +17,8 @@ from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, NotAllowed, Rejected
 from drivers.ethercat.information import EntryDescription, ObjectInfo
 from drivers.ethercat.link import EthercatLink
-from drivers.ethercat.mailbox import Read, Write
 from drivers.ethercat.station import Station, identify
+from drivers.ethercat.steps import Read, Write
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
 from drivers.virtual.wires.netns import Namespace
 from profiles.schema import PdoSet, PdoSpec, Profile
