@@ -20,6 +20,8 @@ from tests.support.station import Station, until
 
 CAN, MODBUS = "canopen://virtual0", "modbus://virtual0"
 AXIS, POSITION = "Low-voltage axis", "6064:00"
+#: One that only Modbus reaches, and one that CANopen carries.
+KEYS = ("PA_38", "6083:00")
 
 
 @pytest.fixture
@@ -60,6 +62,25 @@ def test_two_ports_carry_everything(station: Station, z: str) -> None:
         ("connected", "Z", f"ds_c, {MODBUS}, station 1"),
         ("connected", "Z", f"ds_c, {CAN}, station 3"),
     ]
+
+
+def test_a_set_file_goes_back_by_the_port_that_carries_each_value(station: Station, z: str) -> None:
+    station.ok(station.http.post(f"/drives/{z}/ports", json={"url": MODBUS, "station": 1}))
+
+    def raws() -> dict[str, int]:
+        at = f"/drives/{z}/parameters"
+        return {key: station.ok(station.http.get(f"{at}/{key}"))["raw"] for key in KEYS}
+
+    before = raws()
+    saved = station.ok(station.http.post(f"/drives/{z}/sets", json={"file": "both ports"}))
+    for key in KEYS:
+        station.ok(station.http.put(f"/drives/{z}/parameters/{key}", json={"raw": 321}))
+    diff = station.ok(station.http.get(f"/drives/{z}/diff", params={"file": saved["file"]}))
+    assert {row["key"] for row in diff["rows"] if row["selected"]} == set(KEYS)
+    body = {"file": saved["file"], "keys": list(KEYS)}
+    report = station.done(station.http.post(f"/drives/{z}/jobs/load_set", json=body), 30)
+    assert (report["written"], report["failed"]) == (2, 0)
+    assert raws() == before
 
 
 def test_units_are_rpm_and_times(station: Station, z: str) -> None:
