@@ -252,7 +252,8 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
         # Images stay in the direct estimate: its band must contain them.
         direct.append(_widened(plain, factor, 1.0, doubt.direct[place]))
         corrected.append(_without_images(plain, factor, task.jitter_s, doubt.corrected[place]))
-    share = spoilt.share * (1.0 if spoilt.play else _AVERAGED)
+    # Play changes stiffness, and so everything above the frequency where it shows most.
+    share = np.maximum.accumulate(spoilt.share) if spoilt.play else _AVERAGED * spoilt.share
     best, lines = (_distorted(_pooled(parts), share) for parts in (corrected, direct))
     if spoilt.play:
         lines = lines.cut(lines.valid_band_hz[1])
