@@ -120,6 +120,8 @@ def main() -> None:
                     page.get_by_role("heading", level=1).scroll_into_view_if_needed()
                     save(page, target / f"scope-{screen}-{scheme}.png")
                     if screen == "laptop" and scheme == "light":
+                        table = page.get_by_role("region", name="Measurements")
+                        table.get_by_role("row").last.scroll_into_view_if_needed()
                         save(page, target / "scope-step-laptop-light.png")
                         spectrum(page, station, axis)
                         save(page, target / "scope-spectrum-laptop-light.png")

@@ -22,6 +22,8 @@ interface Frame {
 }
 
 const HEIGHTS: Record<Part, number> = { magnitude: 260, phase: 180, coherence: 100 }
+/** Room that the number of a frequency takes. */
+const LABEL_PX = 54
 const GRAB_PX = 22
 /** uPlot.Scale.Distr, which as an ambient const enum cannot be imported. */
 const LOGARITHMIC = 3
@@ -223,7 +225,7 @@ function options(
         splits: (plot) => logTicks(plot.scales.x?.min ?? 1, plot.scales.x?.max ?? 1000),
         filter: (_plot, splits) => splits,
         values: (plot, splits) =>
-          last ? thinned(plot.width, splits).map((f) => (f === null ? '' : hertz(f))) : [],
+          last ? thinned(plot, splits).map((f) => (f === null ? '' : hertz(f))) : [],
       },
       {
         ...common,
@@ -245,10 +247,14 @@ function options(
   }
 }
 
-/** On a narrow screen only the decades get a number, so that none runs into the next. */
-function thinned(width: number, splits: number[]): (number | null)[] {
-  if (width / splits.length > 52) return splits
-  return splits.map((f) => (Number.isInteger(Math.log10(f)) || splits.length < 4 ? f : null))
+/** The decades get a number, and of the others those that do not run into one. */
+function thinned(plot: uPlot, splits: number[]): (number | null)[] {
+  const place = (f: number) => plot.valToPos(f, 'x')
+  const kept = splits.filter((f) => Number.isInteger(Math.log10(f)))
+  for (const f of splits) {
+    if (kept.every((each) => Math.abs(place(each) - place(f)) >= LABEL_PX)) kept.push(f)
+  }
+  return splits.map((f) => (kept.includes(f) ? f : null))
 }
 
 function shade(plot: uPlot, band: [number, number] | null, color: string): void {
