@@ -60,7 +60,10 @@ def test_a_straight_line_is_told_from_a_staircase(interpolates):
     best = find_paths(records_of(case), SignalPath(1000.0), loop_closed=False, hold_known=False)[0]
     assert best.hold == ("linear" if interpolates else "zero")
     late_s = 1e-3 - (25e-6 if interpolates else 0.0)
-    assert best.command_delay_s == pytest.approx(late_s, abs=25e-6)
+    # The line is one of 50 µs steps; taken for a straight one it is 20 µs off, the corner 14 %.
+    assert best.command_delay_s == pytest.approx(late_s, abs=5e-6)
+    if interpolates:
+        assert best.current_bandwidth_hz == pytest.approx(1000.0, rel=0.03)
 
 
 @pytest.mark.parametrize("late_steps", [20, 36])
