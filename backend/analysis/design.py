@@ -73,9 +73,16 @@ def design(
     """
     search = LoopSearch(plant, inertia_kgm2, loops, notch_response)
     rows: list[Candidate] = []
+    stricter: Found | None = None
     for mark in MARKS:
-        best = search.best(goals_for(load, mark).with_reserve(), slots)
+        goals = goals_for(load, mark).with_reserve()
+        best = search.best(goals, slots)
         winner = max(best, key=lambda found: found.merit, default=None)
+        if stricter is not None and winner is not None:
+            # What keeps stricter goals keeps these with at least as much gain.
+            winner = search.better(winner, stricter.shape, goals)
+            best = best if winner in best else [*best, winner]
+        stricter = winner
         for found in best:
             marks: tuple[Mark, ...] = (mark,) if found is winner else ()
             rows.append(_candidate(search, found, marks))

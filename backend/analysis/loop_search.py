@@ -33,6 +33,8 @@ _PRICE = 0.03
 _LOWEST_HZ = 0.5
 #: A gain is found to this share; what is better by less is not better.
 _RESOLUTION = 0.01
+#: Gains are looked at in these steps before that.
+_COARSE = 1.4
 #: Widths as multiples of the centre and depths in dB that are tried at every place.
 _WIDTHS = (0.25, 0.5, 0.9, 1.5, 2.2)
 _DEPTHS = (-6.0, -10.0, -16.0, -24.0)
@@ -43,7 +45,8 @@ _PLACES = (0.8, 1.0, 1.25, 1.6)
 _STEP = (0.12, 0.4, 5.0)
 _HALVINGS, _SWEEPS = 4, 4
 _DEEPEST_DB, _WIDEST, _NARROWEST = -40.0, 4.0, 0.08
-#: A notch may lie this far above the highest line.
+#: No notch is begun below this, and none ends this far above the highest line.
+_LOWEST_PLACE_HZ = 15.0
 _FARTHEST = 2.5
 
 
@@ -131,31 +134,29 @@ class LoopSearch:
         loops = self.loops_at(fixed, bandwidth_hz)
         return sensitivity_peak(loops) <= goals.ms and worst_of(loops).meets(goals)
 
+    def _safe(self, fixed: ComplexArray, bandwidth_hz: float, goals: Goals) -> bool:
+        kept = self._keeps(fixed, bandwidth_hz, goals)
+        return kept and stable_with_less_gain(self.loops_at(fixed, bandwidth_hz))
+
     def highest(self, shape: Shape, goals: Goals, above_hz: float = 0.0) -> float:
         """Highest bandwidth that keeps the goals; 0 where that is not above ``above_hz``."""
         fixed = self.fixed(shape)
-        if fixed is None or above_hz >= self._highest:
+        lowest = max(above_hz * (1.0 + _RESOLUTION), _LOWEST_HZ)
+        if fixed is None or lowest > self._highest:
             return 0.0
-        if above_hz:
-            low = min(above_hz * (1.0 + _RESOLUTION), self._highest)
-            if not self._keeps(fixed, low, goals):
-                return 0.0
-            high = low
-            while high < self._highest:
-                high = min(1.25 * high, self._highest)
-                if not self._keeps(fixed, high, goals):
-                    break
-                low = high
-        else:
-            levels = np.geomspace(_LOWEST_HZ, self._highest, 32)
-            good = next((i for i in range(31, -1, -1) if self._keeps(fixed, levels[i], goals)), -1)
-            if good < 0:
-                return 0.0
-            low, high = float(levels[good]), float(levels[min(good + 1, 31)])
+        # From the top: where a resonance crosses the limit a higher gain may keep the goals again.
+        count = 2 + int(np.log(self._highest / lowest) / np.log(_COARSE))
+        levels = np.geomspace(lowest, self._highest, count)
+        good = next(
+            (i for i in range(count - 1, -1, -1) if self._safe(fixed, levels[i], goals)), -1
+        )
+        if good < 0:
+            return 0.0
+        low, high = float(levels[good]), float(levels[min(good + 1, count - 1)])
         while high > low * (1.0 + _RESOLUTION):
             middle = float(np.sqrt(low * high))
             low, high = (middle, high) if self._keeps(fixed, middle, goals) else (low, middle)
-        return low if stable_with_less_gain(self.loops_at(fixed, low)) else 0.0
+        return low if self._safe(fixed, low, goals) else float(levels[good])
 
     def best(self, goals: Goals, slots: int) -> list[Found]:
         """The best with no notch, one, two, … as long as each notch earns its place."""
@@ -164,14 +165,15 @@ class LoopSearch:
         for count in range(1, slots + 1):
             found = best
             for shape in self._seeds(best.shape, count):
-                found = self._better(found, shape, goals)
+                found = self.better(found, shape, goals)
             if found is best:
                 break
             best = self._refined(found, goals)
             kept.append(best)
         return kept
 
-    def _better(self, incumbent: Found, shape: Shape, goals: Goals) -> Found:
+    def better(self, incumbent: Found, shape: Shape, goals: Goals) -> Found:
+        """The shape with its highest gain where that is worth more, else the incumbent."""
         worth = shape.price * self._left(shape, incumbent.bandwidth_hz or _LOWEST_HZ)
         if not worth:
             return incumbent
@@ -193,7 +195,7 @@ class LoopSearch:
 
     def _wider(self, found: Found, goals: Goals) -> Found:
         for choice in range(len(self.filters)):
-            found = self._better(found, replace(found.shape, choice=choice), goals)
+            found = self.better(found, replace(found.shape, choice=choice), goals)
         return found
 
     def _seeds(self, given: Shape, count: int) -> Iterator[Shape]:
@@ -215,7 +217,7 @@ class LoopSearch:
         places = [factor * hz for hz in ranked[:4] for factor in _PLACES]
         top = _FARTHEST * self.plant.measured_hz
         places += [x for x in (240.0, 480.0, 960.0) if x < top]
-        return [hz for hz in places if 5.0 < hz < top]
+        return [hz for hz in places if _LOWEST_PLACE_HZ < hz < top]
 
     def _refined(self, found: Found, goals: Goals) -> Found:
         """Move all notches together as long as the gain rises."""
@@ -228,7 +230,7 @@ class LoopSearch:
                             notches = list(found.shape.notches)
                             notches[number] = notch
                             shape = replace(found.shape, notches=tuple(notches))
-                            found = self._better(found, shape, goals)
+                            found = self.better(found, shape, goals)
                 found = self._wider(found, goals)
                 if found is before:
                     break

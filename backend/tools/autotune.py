@@ -34,6 +34,11 @@ from drivers.errors import NotAllowed
 
 #: A response with more of its samples at a torque limit is none.
 _SATURATED = 0.25
+#: Said where no margins could be verified.
+_BY_STEP = (
+    "verified by its standstill and its step alone: too few lines of the tuned loop stand out of "
+    "the noise for its margins to be read"
+)
 #: How the loop tells that it has ended a motion for its torque.
 _TOO_MUCH_TORQUE = "is beyond the limit"
 #: Gains that hardly any axis oscillates with, for measuring one that does with its own.
@@ -312,9 +317,10 @@ async def apply_and_verify(
             remedy="all parameters are as before; look for play and loose parts, measure again, "
             "or choose gains by hand",
         )
+    notes = found.notes if applied.verified.sweep.margins else (*found.notes, _BY_STEP)
     return replace(
         found, applied=applied.candidate, verified=applied.verified, step=applied.verified.step,
-        before=applied.before, tried=tuple(tried),
+        before=applied.before, tried=tuple(tried), notes=notes,
     )  # fmt: skip
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from backend.analysis.design import Candidate
 from backend.analysis.loop_goals import Goals
+from backend.analysis.margins import bandwidth, open_from_closed
 from backend.analysis.sampling import Hold
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
@@ -24,6 +25,10 @@ Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], No
 
 #: What a measured margin is known to; the designs keep more than this in reserve.
 MARGIN_DB, MARGIN_DEG, MS_RATIO = 1.0, 1.0, 1.03
+#: Lines that margins are read from: coherence, standard deviation of the phase, how many at least.
+_COHERENT, _BLURRED_DEG, _LINES = 0.9, 4.0, 12
+#: Where there are fewer, a step may overshoot by this.
+_OVERSHOOT_PERCENT = 40.0
 #: Torque of a standing axis, root mean square in % of rated torque, that is a hum.
 _HUM_PERCENT = 4.0
 
@@ -73,25 +78,45 @@ async def verify(
         ),
         measuring, keep,
     )  # fmt: skip
-    width = swept.margins.get("bandwidth_hz")
+    read = sharp_margins(swept)
+    width = read.get("bandwidth_hz")
     measured = width if isinstance(width, float) else None
-    why = _broken_promise(candidate, promised, swept.margins)
+    why = _named(candidate, ", ".join(worse_than(promised, read)))
     step: step_tool.StepResult | None = None
     if not why:
         step = await step_tool.step_response(
             axis, session, _step_settings(check, candidate), stepping, keep
         )
-        why = _named(candidate, hum(step))
+        words = [hum(step), "" if read else restless(step)]
+        why = _named(candidate, ", ".join(word for word in words if word))
+    swept = replace(swept, margins=read)
     return Verified(swept, step, promised, candidate.bandwidth_hz, measured, not why, why)
 
 
-def _broken_promise(
-    candidate: Candidate, promised: Goals, found: dict[str, float | bool | None]
-) -> str:
-    """Empty where the measured loop keeps what was promised, else a sentence."""
-    if not found:
-        return "too few lines of the tuned loop could be measured"
-    return _named(candidate, ", ".join(worse_than(promised, found)))
+def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool | None]:
+    """Margins of the lines that noise hardly moves; empty where there are too few of them.
+
+    Where a loop's answer is weak against the noise of its sensor, a line says nothing of margins.
+    """
+    frf = swept.frf
+    use = frf.in_band & (frf.coherence > _COHERENT) & ~(frf.std_deg > _BLURRED_DEG)
+    if np.count_nonzero(use) < _LINES:
+        return {}
+    f, closed = frf.frequency_hz[use], frf.response[use]
+    width = bandwidth(f, closed)
+    return {
+        **sweep_evaluation.margins_of(f, open_from_closed(closed)),
+        "bandwidth_hz": width.minus_3db_hz,
+        "bandwidth_90deg_hz": width.minus_90deg_hz,
+    }
+
+
+def restless(step: step_tool.StepResult) -> str:
+    """What a step shows of a loop that answers too few lines, such as a slow one; else empty."""
+    found = step.step
+    if found is not None and found.overshoot_percent <= _OVERSHOOT_PERCENT:
+        return ""
+    return "too few lines of the tuned loop could be measured, and its step overshoots"
 
 
 def worse_than(promised: Goals, found: dict[str, float | bool | None]) -> list[str]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from backend.analysis.frf import Frf
 from backend.analysis.loop_goals import Goals
 from backend.tools.step_response import LEAD_S, StepResult
-from backend.tools.tune_verify import hum, worse_than
+from backend.tools.sweep_evaluation import SweepResult
+from backend.tools.tune_verify import hum, sharp_margins, worse_than
 
 PROMISED = Goals(gain_margin_db=9.0, phase_margin_deg=48.0, ms=1.8)
 
@@ -48,3 +50,23 @@ def test_margins_as_promised_are_kept() -> None:
 def test_each_margin_that_is_missed_is_named(found: dict[str, float], word: str) -> None:
     (words,) = worse_than(PROMISED, dict(found))
     assert words.startswith(word)
+
+
+def loop_swept(std_deg: float) -> SweepResult:
+    """A closed loop of second order, 60 Hz and damping 0.7, whose lines are known to so much."""
+    f = np.linspace(5.0, 400.0, 80)
+    closed = 1.0 / (1.0 - (f / 60.0) ** 2 + 2j * 0.7 * f / 60.0)
+    same = np.ones(f.size)
+    frf = Frf(
+        f, closed, 0.1 * same, std_deg * same, 0.95 * same, same, same, 2000.0, (5.0, 400.0), 4, 0
+    )
+    return SweepResult(
+        "speed_loop", "speed", frf, frf, None, True, "1", (), {}, 0.0, 1.0, 0.0
+    )  # fmt: skip
+
+
+def test_margins_are_read_from_lines_that_noise_hardly_moves() -> None:
+    # L = w²/(s² + 2ζws): the phase margin is atan(2ζ/sqrt(sqrt(1 + 4ζ⁴) − 2ζ²)) = 65.2°.
+    found = sharp_margins(loop_swept(1.0))
+    assert found["phase_margin_deg"] == pytest.approx(65.2, abs=1.5)
+    assert sharp_margins(loop_swept(10.0)) == {}
