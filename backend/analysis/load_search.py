@@ -1,0 +1,239 @@
+"""Where a chain may have one more load: many ways are tried, images included, and ranked.
+
+Each way is a load at a place of the chain; what only gain and delay tell apart is one way.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.chain_model import (
+    LOAD_PARAMETERS,
+    chain_of_modes,
+    loads_of,
+    responses_with_load,
+    with_load,
+)
+from backend.analysis.fit_problem import (
+    HIGHEST_TRIED,
+    USUAL_DAMPING,
+    Found,
+    Problem,
+    View,
+    best_view,
+)
+from backend.analysis.mechanical_model import RIGID_PARAMETERS, TURN
+from backend.analysis.sampling import delay_response
+
+#: Antiresonances that are tried, from this multiple of the lowest line.
+_LOWEST_TRIED = 1.3
+#: Starts nearer to each other than this (logarithm of their frequencies) lead to the same place,
+#: but for what is seen by its images alone: that fits at many places which lie close together.
+_APART, _APART_FOLDED, _FOLDED = 0.5, 0.12, 4
+#: A start is moved by this much (cycles) to where its delay fits.
+_LATE = 0.1
+#: Images of up to about this frequency are looked at in a search.
+_SEARCHED_HZ = 2000.0
+#: Inertia of one more load, relative to the one that it hangs on.
+_RATIOS = (0.05, 0.12, 0.25, 0.5, 1.0, 2.0, 5.0, 12.0, 30.0)
+
+
+def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
+    """The most promising starts with one more load, by trying very many on some lines."""
+    view = best_view(problem.views)
+    lines = telling_lines(view, found)
+    f = view.f[lines]
+    weight = np.minimum(view.weight[lines], 100.0)
+    # What is folded back from beyond a few kHz is weak.
+    images = max(1, round(_SEARCHED_HZ * problem.period_s))
+    sampler = view.sampler.thinned(lines).nearest(images)
+    every = sampler.frequency_hz
+    late = delay_response(every, float(found.x[2]) * problem.period_s)
+    further = problem.further(found.x, view, every)
+    top = float(view.f[-1])
+    grid_hz = np.concatenate(
+        [np.geomspace(_LOWEST_TRIED * float(f[0]), 0.8 * top, 26),
+         np.geomspace(0.8 * top, HIGHEST_TRIED * top, 20)]
+    )  # fmt: skip
+    worst_hz = _worst_hz(view, found)
+    places = range(1 + (found.x.size - RIGID_PARAMETERS) // LOAD_PARAMETERS)
+    trials: list[_Trial] = []
+    for place in places:
+        new = _new_loads(found.x, place, grid_hz, worst_hz)
+        plants = responses_with_load(found.x, place, new, every.ravel())
+        seen = sampler.shown(plants.reshape(-1, *every.shape) * late, further)
+        rest, gain, cycles = _without_gain_and_delay(
+            np.log(seen / view.g[lines]), f * problem.period_s, weight
+        )
+        error = np.abs(rest) * weight
+        costs = np.sum(np.sqrt(1.0 + error**2 / 9.0) - 1.0, axis=1)
+        for i in np.argsort(costs)[:150]:
+            kept, inertia, stiffness, damping = (float(v) for v in new[i])
+            trials.append(
+                _Trial(
+                    float(costs[i]), place, np.log(stiffness / inertia) / 2,
+                    np.log(inertia / kept),
+                    _adjusted(
+                        with_load(found.x, place, (kept, inertia, stiffness, damping)),
+                        float(gain[i]), float(cycles[i]),
+                    ),
+                )
+            )  # fmt: skip
+    ranked = sorted(trials, key=lambda t: t.cost)
+    edges = np.log(TURN * np.array([0.0, 0.3 * top, 0.7 * top, np.inf]) + 1e-12)
+    chosen = ranked[:1]
+    for (low, high), count in zip(itertools.pairwise(edges), (1, 1, _FOLDED), strict=True):
+        here = [t for t in ranked if low <= t.frequency < high]
+        apart = _APART if count == 1 else _APART_FOLDED
+        chosen += _different(here, chosen, count, apart)
+    return [t.x for t in chosen + _different(ranked, chosen, 1)]
+
+
+def _without_gain_and_delay(
+    logs: ComplexArray, cycles: FloatArray, weight: FloatArray
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """What is left of logarithms [n, lines] without a common gain and delay, and these two [n].
+
+    ``cycles`` are the lines' frequencies times the sampling period, in which the delay is counted.
+    """
+    squared = weight**2
+    gain = logs.real @ squared / np.sum(squared)
+    turn = TURN * cycles
+    late = -(logs.imag @ (squared * turn)) / np.sum(squared * turn**2)
+    late = np.clip(late, -_LATE, _LATE)
+    return np.asarray(logs - gain[:, None] + 1j * late[:, None] * turn), gain, late
+
+
+def _adjusted(x: FloatArray, gain: float, cycles: float) -> FloatArray:
+    """A chain whose response is smaller by the logarithm ``gain`` and comes earlier by cycles."""
+    out = x.copy()
+    out[[0, 1, *range(RIGID_PARAMETERS, x.size)]] += gain
+    out[2:4] -= cycles
+    return out
+
+
+def with_one_more_mode(problem: Problem, found: Found) -> list[FloatArray]:
+    """The chain whose modes are those found and the one that explains most of what is left.
+
+    Splitting an inertia moves all modes; this start leaves the known ones where they are.
+    """
+    view, model = best_view(problem.views), found.model
+    f = view.f
+    late = delay_response(f, float(found.x[3 if view.integrated else 2]) * problem.period_s)
+    scale = view.weight / np.abs(view.g)
+    s = 1j * TURN * f
+
+    def columns(hz: FloatArray, damping: FloatArray) -> FloatArray:
+        w = TURN * hz
+        z = s[:, None] * scale[:, None] / (s[:, None] ** 2 + 2 * damping * w * s[:, None] + w**2)
+        return np.concatenate([z.real, z.imag])
+
+    hz, damping = (
+        a.ravel() for a in np.meshgrid(np.geomspace(1.5 * f[0], f[-1], 90), (0.01, 0.05))
+    )
+    known = columns(
+        np.array([1e-3, *(m.frequency_hz for m in model.modes)]),
+        np.array([0.0, *(m.damping for m in model.modes)]),
+    )
+    rest = (view.g * np.conj(late) - model.response(f)) * scale
+    target = np.concatenate([rest.real, rest.imag])
+    q, _ = np.linalg.qr(known)
+    free = columns(hz, damping)
+    free -= q @ (q.T @ free)
+    norm = np.maximum(np.linalg.norm(free, axis=0), 1e-9)
+    explained = free.T @ (target - q @ (q.T @ target)) / norm
+    best = int(np.argmax(explained))
+    residue = float(explained[best] / norm[best])
+    if residue <= 0:
+        return []
+    try:
+        x = chain_of_modes(
+            model.gain,
+            np.array([*(m.frequency_hz for m in model.modes), hz[best]]),
+            np.array([*(max(m.residue, 1e-9) for m in model.modes), residue]),
+            float(np.exp(found.x[1])), USUAL_DAMPING,
+        )  # fmt: skip
+    except ValueError:
+        return []
+    x[2:RIGID_PARAMETERS] = found.x[2:RIGID_PARAMETERS]
+    return [x]
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A way to add a load: where, logarithms of its antiresonance and of its share, parameters."""
+
+    cost: float
+    place: int
+    frequency: float
+    ratio: float
+    x: FloatArray
+
+    def like(self, other: _Trial, apart: float) -> bool:
+        """Whether both lead to the same place: frequencies less ``apart`` (logarithm)."""
+        return (
+            self.place == other.place
+            and abs(self.frequency - other.frequency) < apart
+            and abs(self.ratio - other.ratio) < 1.5
+        )
+
+
+def telling_lines(view: View, found: Found, count: int = 35) -> npt.NDArray[np.int64]:
+    """Some lines evenly, and those that are explained worst so far."""
+    rest = np.hypot(*np.split(_residuals_of(view, found), 2))
+    even = np.linspace(0, view.f.size - 1, min(count, view.f.size)).astype(np.int64)
+    return np.unique(np.concatenate([even, np.argsort(-rest)[:count]]))
+
+
+def _residuals_of(view: View, found: Found) -> FloatArray:
+    """The view's part of the residuals: views come in order, real then imaginary parts."""
+    size = 2 * view.f.size
+    return found.residuals[size : 2 * size] if view.second else found.residuals[:size]
+
+
+def _new_loads(x: FloatArray, place: int, grid_hz: FloatArray, worst_hz: FloatArray) -> FloatArray:
+    """All loads [n, 4] that are tried at one place: added to what is there, or taken from it.
+
+    Where the explanation fails most, there is an antiresonance or a resonance.
+    """
+    whole = float(np.exp(x[0]) if place == 0 else loads_of(x)[place - 1, 0])
+    rows = []
+    for ratio in _RATIOS:
+        tried_hz = np.concatenate([grid_hz, worst_hz, worst_hz / np.sqrt(1.0 + ratio)])
+        for kept in (whole, whole / (1.0 + ratio)):
+            inertia = kept * ratio
+            stiffness = (TURN * tried_hz) ** 2 * inertia
+            damping = 2.0 * USUAL_DAMPING * np.sqrt(stiffness * inertia)
+            same = np.ones(tried_hz.size)
+            rows.append(np.column_stack([same * kept, same * inertia, stiffness, damping]))
+    return np.concatenate(rows)
+
+
+def _different(
+    trials: list[_Trial], known: list[_Trial], count: int, apart: float = _APART
+) -> list[_Trial]:
+    """The best few that are neighbours neither of the known ones nor of each other."""
+    kept: list[_Trial] = []
+    for trial in trials:
+        if not any(trial.like(k, apart) for k in [*known, *kept]):
+            kept.append(trial)
+        if len(kept) == count:
+            break
+    return kept
+
+
+def _worst_hz(view: View, found: Found, count: int = 4) -> FloatArray:
+    """Where the explanation fails most, at places that are not neighbours."""
+    rest = np.hypot(*np.split(_residuals_of(view, found), 2))
+    chosen: list[float] = []
+    for i in np.argsort(-rest):
+        if all(abs(np.log(view.f[i] / f)) > 0.05 for f in chosen):
+            chosen.append(float(view.f[i]))
+        if len(chosen) == count:
+            break
+    return np.array(chosen)
