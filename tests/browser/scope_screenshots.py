@@ -29,13 +29,14 @@ from tests.browser.test_scope import (
 )
 from tests.support.station import Station, until
 
-COLOURS = 128
+COLOURS = 256
 
 
 def save(page: Page, path: Path) -> None:
     """As small as a picture of few colours can be."""
     picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
-    picture.quantize(COLOURS).save(path, optimize=True)
+    # Fewer colours would cost thin lines theirs, by which they are told apart.
+    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def step(page: Page, station: Station, axis: str) -> None:
