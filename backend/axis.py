@@ -14,8 +14,9 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
 
 from backend import restoring
-from backend.drive import Drive, Reading
+from backend.drive import Drive
 from backend.power import PowerState
+from backend.readings import Reading
 from backend.restoring import CLEANUP_TIMEOUT_S, shielded
 from backend.travel_units import TravelUnit
 from backend.units import AxisUnits, read_units

@@ -14,7 +14,7 @@ from backend.audit.witness import Witness
 from backend.axis import Axis
 from backend.axis_store import AxisStore
 from backend.cyclic import CyclicSession
-from backend.drive import Drive, Port, Reading
+from backend.drive import Drive
 from backend.drive_list import DriveList, SavedDrive, SavedPort
 from backend.files import StorageFailed
 from backend.jobs import Job, JobRunner, Progress
@@ -22,6 +22,8 @@ from backend.journal import Journal
 from backend.matching import profile_for
 from backend.measurements import MeasurementStore
 from backend.monitor import Monitor, Snapshot
+from backend.ports import Port
+from backend.readings import Reading
 from backend.records import Records
 from backend.scope import ScopeHub
 from drivers.errors import Busy, DriveError, NotAllowed

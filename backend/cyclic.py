@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.drive import Drive, Port, address_of
+from backend.drive import Drive
+from backend.ports import Port, address_of
 from drivers.errors import Busy, NotAllowed
 from drivers.link import (
     Cyclic,

@@ -7,25 +7,17 @@ counts is the value that came back.
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
+from backend.ports import Port, address_of, carries
+from backend.readings import CommandRecord, Reading, WriteRecord
 from drivers import cia402
 from drivers.codec import decode, encode
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, NotInUse, OutOfRange, Rejected
-from drivers.link import Address, Found, Link, LinkQuality, TellsUnreachable
-from profiles.schema import LinkKind, LinkSpec, Parameter, Profile, Raw
-
-#: Addresses per executor call. Small, so that a STOP never waits behind a long batch.
-BATCH = 16
-#: The same where the link itself lets a write go between two requests of a batch, and where
-#: neighbouring registers share a request: those of a long batch are split less often.
-REGISTER_BATCH = 64
-#: The same on EtherCAT, whose link parts a batch by itself and reads whole objects: one that is
-#: cut between two batches would be read entry by entry.
-OBJECT_BATCH = 128
+from drivers.link import Address, Found, LinkQuality
+from profiles.schema import Parameter, Profile, Raw
 
 #: Roles that command motion; they are never "changed but not saved".
 _COMMAND_ROLES = frozenset({
@@ -38,106 +30,6 @@ _MOTION_ROLES = frozenset({
     "profile_velocity", "profile_acceleration", "profile_deceleration", "max_torque",
     "torque_limit_positive", "torque_limit_negative", "home_offset",
 })  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """What a drive said of one parameter. ``value`` is in the parameter's unit."""
-
-    key: str
-    raw: Raw | None
-    value: Raw | None
-    time: float | None
-    """Seconds since the epoch, None when never read."""
-    error: str = ""
-    unused: bool = False
-    """The drive's own count leaves it out, as ``error`` says: there is nothing to be read."""
-
-
-@dataclass(frozen=True, slots=True)
-class WriteRecord:
-    """A value that was sent to the drive; raw values.
-
-    ``before`` is what was known before, ``after`` what was read back; ``problem`` says why that
-    is not known, and then the drive may hold either.
-    """
-
-    drive: str
-    name: str
-    key: str
-    parameter: str
-    before: Raw | None
-    wanted: Raw
-    after: Raw | None
-    problem: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class CommandRecord:
-    """A motion object that was sent without reading back; ``problem`` empty where it arrived."""
-
-    drive: str
-    name: str
-    key: str
-    parameter: str
-    raw: int
-    problem: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Port:
-    """One way to reach a drive."""
-
-    link: Link
-    station: int
-    spec: LinkSpec | None
-
-    def batches(self, parameters: Sequence[Parameter]) -> list[list[Parameter]]:
-        """Parts to ask for in one call each; what is read together stays together."""
-        if self.link.kind == "ethercat":
-            return _whole_objects(parameters)
-        size, ordered = BATCH, list(parameters)
-        if self.spec and self.spec.max_registers:
-            size = REGISTER_BATCH
-            ordered.sort(key=lambda p: p.modbus_register or 0)
-        return [ordered[at : at + size] for at in range(0, len(ordered), size)]
-
-    def carries(self, parameter: Parameter) -> bool:
-        """Whether this port can transport the parameter."""
-        return carries(self.link.kind, parameter) and not self.why_not(parameter)
-
-    def why_not(self, parameter: Parameter) -> str:
-        """What the link itself has against a parameter that its kind could carry; else empty."""
-        if isinstance(self.link, TellsUnreachable):
-            return self.link.unreachable(self.station, address_of(parameter))
-        return ""
-
-
-def _whole_objects(parameters: Sequence[Parameter]) -> list[list[Parameter]]:
-    parts: list[list[Parameter]] = []
-    ordered = sorted(parameters, key=lambda p: p.index or 0)
-    for _, members in itertools.groupby(ordered, key=lambda p: p.index):
-        if not parts or len(parts[-1]) >= OBJECT_BATCH:
-            parts.append([])
-        parts[-1].extend(members)
-    return parts
-
-
-def carries(kind: LinkKind, parameter: Parameter) -> bool:
-    """Whether a port of this kind can transport the parameter."""
-    if kind == "modbus":
-        return parameter.modbus_register is not None
-    return parameter.index is not None
-
-
-def address_of(parameter: Parameter) -> Address:
-    """Bus address of a parameter."""
-    return Address(
-        index=parameter.index,
-        subindex=parameter.subindex or 0,
-        type=parameter.type,
-        register=parameter.modbus_register,
-    )
 
 
 @dataclass(slots=True)
@@ -664,8 +556,3 @@ def _shown(parameter: Parameter, raw: Raw | None) -> str:
         return "a number beyond all measure"
     unit = f" {parameter.unit}" if parameter.unit else ""
     return f"{value}{unit}" if value == raw else f"{value}{unit} (raw {raw})"
-
-
-def with_error(reading: Reading, error: str) -> Reading:
-    """The old reading marked as not renewed."""
-    return replace(reading, error=error)

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from backend.axis import Axis
-from backend.drive import Drive, Reading
+from backend.drive import Drive
 from backend.faults import integer
 from backend.functions import functions_of
+from backend.readings import Reading
 from drivers.errors import NotAllowed
 from profiles.functions import FaultHistory, HistorySlot
 from profiles.schema import Fault

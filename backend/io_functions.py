@@ -6,9 +6,10 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from backend.drive import Drive, Reading
+from backend.drive import Drive
 from backend.faults import integer
 from backend.functions import functions_of
+from backend.readings import Reading
 from drivers.errors import NotAllowed, OutOfRange, Rejected
 from profiles.functions import TerminalBits, TerminalFacts
 from profiles.schema import IoTerminal

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from backend.bench import Bench, Member
 from backend.cyclic import CyclicSession
-from backend.drive import Port
+from backend.ports import Port
 from backend.tools import profile_speed
 from drivers.errors import DriveError
 

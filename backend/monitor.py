@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from backend.axis import Axis
-from backend.drive import Reading
 from backend.faults import active_faults, fault_keys, integer
 from backend.journal import Journal, Level
+from backend.readings import Reading
 from backend.units import AxisUnits
 from drivers import cia402
 from drivers.cia402 import State

@@ -14,8 +14,8 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from backend.drive import Reading
 from backend.parameter_set import MAX_BYTES, BadSet, Row
+from backend.readings import Reading
 from profiles.schema import Parameter, Profile, Raw
 
 _MAX_LINES = 20_000

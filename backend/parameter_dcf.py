@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from datetime import datetime
 
-from backend.drive import Reading
 from backend.parameter_csv import ParameterList
 from backend.parameter_set import BadSet, Row
+from backend.readings import Reading
 from profiles.importer import (
     ImportFailed,
     ImportReport,

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal
 
-from backend.drive import Drive, Reading
+from backend.drive import Drive
+from backend.readings import Reading
 from drivers.errors import DriveError, NotAllowed
 from profiles.schema import Parameter, Profile, Raw
 

@@ -7,8 +7,9 @@ import time
 
 from backend.causes import hints
 from backend.cyclic import CyclicSession
-from backend.drive import Drive, address_of
+from backend.drive import Drive
 from backend.faults import active_faults, fault_keys
+from backend.ports import address_of
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.codec import encode

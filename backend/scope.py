@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from backend.axis import Axis
-from backend.drive import Reading
+from backend.readings import Reading
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock
 

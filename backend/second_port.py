@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from backend.drive import Drive, Port, carries
+from backend.drive import Drive
 from backend.parameter_set import storable
+from backend.ports import Port, carries
 from drivers.errors import LinkTimeout, NotAllowed
 from profiles.schema import LinkKind
 

@@ -7,12 +7,13 @@ from datetime import UTC, datetime
 from backend.api import models
 from backend.api.errors import problem_of
 from backend.bench import Bench, Member
-from backend.drive import Drive, Reading
+from backend.drive import Drive
 from backend.jobs import Job
 from backend.journal import Entry
 from backend.matching import match_profiles
 from backend.monitor import Snapshot
 from backend.parameter_set import Difference
+from backend.readings import Reading
 from backend.tools.procedures import describe
 from drivers import cia402
 from drivers.cia402 import Mode

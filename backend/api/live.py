@@ -53,12 +53,12 @@ from backend.api.security_messages import require_message
 from backend.api.security_socket import OpenSockets
 from backend.audit.asked import Asked, asked
 from backend.bench import Bench, Member
-from backend.drive import Reading
 from backend.jobs import Job, JobResult, Progress
 from backend.journal import Entry
 from backend.monitor import Snapshot
 from backend.people.identity import Actor, Identity, acting
 from backend.people.station import People
+from backend.readings import Reading
 from backend.tools.cyclic_motion import jog_cyclic
 from backend.tools.jog import Hold, jog
 from drivers.errors import DriveError

@@ -30,8 +30,8 @@ from backend.api.models import (
     WriteResult,
 )
 from backend.bench import Bench, Member
-from backend.drive import Reading
 from backend.jobs import JobResult, Progress
+from backend.readings import Reading
 from backend.tools import cyclic_motion, homing, move, parameters, procedures
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange

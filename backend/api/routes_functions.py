@@ -29,10 +29,11 @@ from backend.audit.asked import note_before
 from backend.axis import Envelope
 from backend.axis_store import AxisRecord, AxisStore
 from backend.bench import Member
-from backend.drive import Drive, Reading
+from backend.drive import Drive
 from backend.fault_history import PastFault, history_of, read_history
 from backend.functions import functions_of
 from backend.mechanics_calc import GearPlan, Mechanics
+from backend.readings import Reading
 from backend.tools import identification
 from drivers.errors import DriveError
 from profiles.functions import FaultHistory, Functions

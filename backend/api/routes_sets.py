@@ -14,11 +14,12 @@ from backend.api.errors import NotFound
 from backend.api.models import Diff, SaveSetRequest
 from backend.api.models_library import StoredSet, ThreeWay
 from backend.bench import Bench
-from backend.drive import Drive, Reading
+from backend.drive import Drive
 from backend.library.identity import doubts
 from backend.library.three_way import three_way as compare_three
 from backend.parameter_set import MAX_BYTES, BadSet, ParameterSet, Row
 from backend.people.identity import acting_person
+from backend.readings import Reading
 from backend.tools import parameters
 from drivers.errors import NotAllowed, OutOfRange
 

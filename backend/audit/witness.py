@@ -9,8 +9,8 @@ from backend.access import Holder
 from backend.audit.asked import settings_now
 from backend.audit.facts import Fact, Kind, Value
 from backend.audit.log import AuditLog
-from backend.drive import CommandRecord, WriteRecord
 from backend.jobs import Job
+from backend.readings import CommandRecord, WriteRecord
 
 #: Jobs that only read what the pages show anyway.
 _UNREMARKABLE = frozenset({"reread", "read_all"})

@@ -13,9 +13,10 @@ from typing import ParamSpec, TypeVar
 
 import typer
 
-from backend.drive import Drive, Port
+from backend.drive import Drive
 from backend.jobs import Progress
 from backend.matching import match_profiles, profile_for
+from backend.ports import Port
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link, NeedsProfile
 from drivers.urls import link_for

@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.drive import Drive, Reading
+from backend.drive import Drive
 from backend.parameter_set import Row, compare
+from backend.readings import Reading
 from profiles.schema import Parameter, Raw
 
 Status = Literal[

@@ -16,9 +16,9 @@ from pathlib import Path
 from backend import __version__
 from backend.bench import Bench
 from backend.cyclic import INPUT_ROLES, OUTPUT_ROLES
-from backend.drive import Reading
 from backend.files import StorageFailed, checked_name
 from backend.monitor import Snapshot
+from backend.readings import Reading
 from backend.recording import facts
 from backend.recording.bundle import build_apart
 from backend.recording.evidence import Evidence, Value

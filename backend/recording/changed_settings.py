@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 from backend.bench import Bench
 from backend.cyclic import OUTPUT_ROLES
-from backend.drive import Drive, Reading
+from backend.drive import Drive
+from backend.readings import Reading
 
 #: Commands, which a motion writes twenty times a second, are no settings; the mode is one.
 _COMMANDS = tuple(role for role in OUTPUT_ROLES if role != "mode")

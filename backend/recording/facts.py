@@ -10,8 +10,9 @@ from typing import Any
 
 from backend import parameter_set
 from backend.bench import Bench, Member
-from backend.drive import Drive, Reading
+from backend.drive import Drive
 from backend.fault_history import PastFault, history_of, read_history
+from backend.readings import Reading
 from drivers.errors import DriveError
 
 

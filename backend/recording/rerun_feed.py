@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from backend.bench import Bench
-from backend.drive import Reading
 from backend.journal import Entry
+from backend.readings import Reading
 from backend.recording.changed_settings import ChangedSettings
 from backend.recording.reader import Channel
 from backend.recording.recorder import describe_streams

@@ -10,10 +10,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from backend.bench import Bench
-from backend.drive import Reading
 from backend.files import StorageFailed
 from backend.jobs import Job, JobResult, Progress
 from backend.journal import Entry
+from backend.readings import Reading
 from backend.recording.capture import FaultCapture
 from backend.recording.changed_settings import ChangedSettings
 from backend.recording.library import RecordingLibrary

@@ -19,8 +19,9 @@ import numpy.typing as npt
 
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
-from backend.drive import Drive, address_of
+from backend.drive import Drive
 from backend.jobs import JobResult, Progress
+from backend.ports import address_of
 from backend.restoring import shielded
 from backend.tools.jog import Hold, JogSettings, require_scale
 from drivers import link as bus

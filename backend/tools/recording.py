@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession, channel
-from backend.drive import address_of
 from backend.jobs import Progress
+from backend.ports import address_of
 from backend.restoring import shielded
 from drivers import link as bus
 from drivers.cia402 import Mode, State

@@ -7,8 +7,9 @@ from collections import Counter
 import pytest
 
 from backend.axis import Axis
-from backend.drive import Drive, Port
+from backend.drive import Drive
 from backend.jobs import Progress
+from backend.ports import Port
 from backend.tools.procedures import run_procedure
 from drivers.link import Found
 from profiles import load_profile

@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from backend.drive import Drive, Port
+from backend.drive import Drive
+from backend.ports import Port
 from drivers.link import Found
 from profiles.schema import (
     Identity,

@@ -9,7 +9,8 @@ import pytest
 from pydantic import ValidationError
 
 from backend.api.models import ParameterWrite
-from backend.drive import OBJECT_BATCH, Drive, Port
+from backend.drive import Drive
+from backend.ports import OBJECT_BATCH, Port
 from backend.tools.parameters import read_all
 from drivers.errors import LinkTimeout, NotAllowed, NotInUse, OutOfRange, Rejected
 from profiles.loader import load_profile

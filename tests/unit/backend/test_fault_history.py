@@ -8,8 +8,9 @@ import pytest
 
 from backend.axis import Axis
 from backend.bench import Member
-from backend.drive import Drive, Port
+from backend.drive import Drive
 from backend.fault_history import named_fault, read_history
+from backend.ports import Port
 from backend.recording.facts import past_faults
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address

@@ -10,10 +10,11 @@ import pytest
 from backend import forcing
 from backend.access import Leases
 from backend.axis import Axis
-from backend.drive import Drive, Port
+from backend.drive import Drive
 from backend.forcing import ForcingSessions
 from backend.io_functions import ProbeSettings, probe_bits, read_terminals, set_probe
 from backend.jobs import JobRunner
+from backend.ports import Port
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange, Rejected
 from profiles.functions import Forcing, Functions, Probe, TerminalBits, TerminalFacts, TouchProbe
 from profiles.schema import IoFunction, IoTerminal, Parameter, Profile, Quirk

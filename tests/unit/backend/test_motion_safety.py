@@ -14,8 +14,8 @@ from backend.api.app import make_app
 from backend.axis import Envelope
 from backend.bench import Bench, Member
 from backend.cyclic import CyclicState
-from backend.drive import Port
 from backend.jobs import Progress
+from backend.ports import Port
 from backend.tools import jog as jogging
 from backend.tools import move as moving
 from backend.tools.cyclic_motion import GeneratorSettings, generate, jog_cyclic

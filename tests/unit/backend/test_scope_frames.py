@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from backend.api.scope_blocks import encode_block
+from backend.drive import Drive
 from backend.scope_units import axis_scale
 from backend.units import AxisUnits
 from drivers.link import ScopeBlock
 from profiles.loader import load_profile
 from tests.support.memory_link import MemoryLink
 
-from backend.drive import Drive, Port  # isort: skip
+from backend.ports import Port  # isort: skip
 
 
 def decode(frame: bytes) -> tuple[dict[str, float], np.ndarray, np.ndarray]:

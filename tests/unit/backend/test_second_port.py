@@ -6,8 +6,9 @@ from typing import Literal
 
 import pytest
 
-from backend.drive import Drive, Port
+from backend.drive import Drive
 from backend.parameter_set import storable
+from backend.ports import Port
 from backend.second_port import missing_ports, require_same_drive
 from drivers.codec import encode
 from drivers.errors import NotAllowed

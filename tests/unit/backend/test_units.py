@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from backend.drive import Drive, Port
+from backend.drive import Drive
+from backend.ports import Port
 from backend.units import read_units
 from drivers.errors import NotAllowed
 from drivers.link import Found

@@ -18,7 +18,8 @@ import can
 
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
-from backend.drive import Drive, Port
+from backend.drive import Drive
+from backend.ports import Port
 from backend.tools import profile_speed
 from drivers.canopen.frames import SYNC, Frame
 from drivers.canopen.link import CanopenLink

@@ -18,7 +18,8 @@ import numpy as np
 
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
-from backend.drive import Drive, Port
+from backend.drive import Drive
+from backend.ports import Port
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat.cyclic import layout, places

@@ -13,8 +13,9 @@ import numpy as np
 
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
-from backend.drive import Drive, Port
+from backend.drive import Drive
 from backend.jobs import Progress
+from backend.ports import Port
 from drivers.ethercat.link import EthercatLink
 from drivers.virtual.mechanics import MechanicsSpec, analytic_response
 from drivers.virtual.wires.ethercat.launch import VirtualSegment

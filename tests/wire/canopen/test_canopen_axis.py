@@ -12,7 +12,8 @@ import pytest
 
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
-from backend.drive import Drive, Port
+from backend.drive import Drive
+from backend.ports import Port
 from backend.tools.cyclic_motion import jog_cyclic
 from backend.tools.jog import Hold, JogSettings, jog
 from drivers.canopen.link import CanopenLink

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backend.drive import Drive, Port
+from backend.drive import Drive
+from backend.ports import Port
 from profiles import load_profile
 
 from .conftest import OpenLink

@@ -1,0 +1,56 @@
+"""What is known of a drive's parameters, and what was sent to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from profiles.schema import Raw
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a drive said of one parameter. ``value`` is in the parameter's unit."""
+
+    key: str
+    raw: Raw | None
+    value: Raw | None
+    time: float | None
+    """Seconds since the epoch, None when never read."""
+    error: str = ""
+    unused: bool = False
+    """The drive's own count leaves it out, as ``error`` says: there is nothing to be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class WriteRecord:
+    """A value that was sent to the drive; raw values.
+
+    ``before`` is what was known before, ``after`` what was read back; ``problem`` says why that
+    is not known, and then the drive may hold either.
+    """
+
+    drive: str
+    name: str
+    key: str
+    parameter: str
+    before: Raw | None
+    wanted: Raw
+    after: Raw | None
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRecord:
+    """A motion object that was sent without reading back; ``problem`` empty where it arrived."""
+
+    drive: str
+    name: str
+    key: str
+    parameter: str
+    raw: int
+    problem: str = ""
+
+
+def with_error(reading: Reading, error: str) -> Reading:
+    """The old reading marked as not renewed."""
+    return replace(reading, error=error)
