@@ -26,6 +26,8 @@ from backend.analysis.sampling import SignalPath, reported_response
 
 #: Empty bins that a level is taken over, to each side, and the fewest that tell anything.
 _REACH, _FEWEST = 6, 12
+#: What a bin that is left out may hold of what an excited one does: rounding, and nothing else.
+_SILENT = 1e-3
 #: Play is looked for above this share of the sample rate: below, friction rules.
 _LOWEST = 0.1
 #: So much of the motion is too much, in any case or where friction explains none of it.
@@ -63,6 +65,9 @@ def distortion(
         return none
     bins = np.arange(e.lines[0], e.lines[-1] + 1)
     empty = np.setdiff1d(bins, np.append(e.lines, e.base_line))
+    # A chirp and a PRBS excite bins that are not evaluated, too.
+    played = np.abs(np.fft.rfft(e.one_period))
+    empty = empty[played[empty] < _SILENT * np.median(played[e.lines])]
     if empty.size < _FEWEST:
         return none
     f = empty * (e.sample_rate_hz / e.period_samples)
