@@ -35,7 +35,13 @@ REAL_TIME = [
     "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
 ]  # fmt: skip
 #: Suites that compute and keep no time: what the others leave of the machine is enough for them.
-PATIENT = ["tests/profiles", "tests/unit", "tests/virtual/conformance", "tests/virtual/firmware"]
+PATIENT = [
+    "tests/profiles", "tests/unit", "tests/virtual/conformance", "tests/virtual/firmware",
+    # Measurements and tunings whose buses follow the frames, however late they come.
+    "tests/virtual/tools/test_excitations.py",
+    "tests/virtual/tools/test_families.py", "tests/virtual/tools/test_notches.py",
+    "tests/virtual/tools/test_play.py", "tests/virtual/tools/test_wrong_situations.py",
+]  # fmt: skip
 #: Runs only while nothing else wants to (SCHED_IDLE), so that no bus is kept waiting for it.
 AT_IDLE = ["chrt", "--idle", "0"]
 
@@ -78,8 +84,9 @@ BUSES = [pytest("EtherCAT tests", *REAL_TIME)]
 PAGES = [pytest("browser tests", "-m", "browser", "tests/browser")]
 BESIDE = [
     Check("docs", [str(BIN / "mkdocs"), "build", "--strict", "--quiet"]),
-    # A worker of its own writes to a pipe: tests of full disks bound the length of files.
-    pytest("patient tests", "-n", "1", *PATIENT),
+    # Workers write to a pipe: tests of full disks bound the length of files. At idle priority a
+    # test may stand still for minutes, which is no hanging.
+    pytest("patient tests", *TWO, "--timeout=900", *PATIENT),
 ]
 
 
