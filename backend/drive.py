@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from backend.ports import Port, address_of, carries
 from backend.readings import CommandRecord, Reading, WriteRecord
+from backend.rest import Rest, Resting
 from drivers import cia402
 from drivers.codec import decode, encode
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, NotInUse, OutOfRange, Rejected
@@ -50,8 +51,7 @@ class Drive:
     def __init__(self, drive_id: str, name: str, profile: Profile, ports: Sequence[Port]) -> None:
         self.id = drive_id
         self.name = name
-        self.resting = False
-        """A procedure leaves the drive alone (it stores): no routine polling meanwhile."""
+        self.rest = Rest(name)
         self.notes = ""
         self.profile = profile
         self.ports = tuple(ports)
@@ -228,7 +228,8 @@ class Drive:
             )
         port = self.port_for(parameter)
         try:
-            data = await port.link.read(port.station, address_of(parameter))
+            async with self.rest.asking():
+                data = await port.link.read(port.station, address_of(parameter))
             reading = self._reading(parameter, data)
         except DriveError as error:
             raise self._named(error, parameter) from error
@@ -276,7 +277,12 @@ class Drive:
         return result
 
     async def _read_chunk(self, port: Port, chunk: Sequence[Parameter]) -> list[Reading]:
-        answers = await port.link.read_many(port.station, [address_of(p) for p in chunk])
+        answers: Sequence[bytes | DriveError]
+        try:
+            async with self.rest.asking():
+                answers = await port.link.read_many(port.station, [address_of(p) for p in chunk])
+        except Resting as error:
+            answers = [error] * len(chunk)
         readings: list[Reading] = []
         for parameter, answer in zip(chunk, answers, strict=True):
             if isinstance(answer, DriveError):
@@ -392,6 +398,10 @@ class Drive:
         return reading
 
     async def _send_and_read(self, port: Port, parameter: Parameter, value: Raw) -> Reading:
+        async with self.rest.asking():
+            return await self._sent_and_read(port, parameter, value)
+
+    async def _sent_and_read(self, port: Port, parameter: Parameter, value: Raw) -> Reading:
         try:
             await self._send(port, parameter, value)
         except DriveError as error:
@@ -437,7 +447,8 @@ class Drive:
             if port.link.kind == "modbus":
                 continue
             try:
-                data = await port.link.read(port.station, Address(0x1018, 4, "UINT32"))
+                async with self.rest.asking():
+                    data = await port.link.read(port.station, Address(0x1018, 4, "UINT32"))
             except (Rejected, NotAllowed):
                 continue
             return int.from_bytes(data, "little") or None
@@ -467,6 +478,7 @@ class Drive:
         """
         parameter = self.parameter(key)
         port = self.port_for(parameter)
+        self.rest.interrupt()
         try:
             await port.link.write(port.station, address_of(parameter), encode(parameter.type, raw))
         except BaseException as error:

@@ -111,7 +111,7 @@ class Monitor:
         if await self.axis.repeat_stop():
             text = f"{self.axis.drive.name}: the stop that had not reached it was sent again"
             self._journal.add(text, level="warning", drive=self.axis.drive.id)
-        if self.axis.drive.resting:
+        if self.axis.drive.rest.held:
             return before
         try:
             snapshot = await self._read()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Sequence
+from contextlib import AsyncExitStack
 
 from backend.axis import Axis
 from backend.jobs import JobResult, Progress
@@ -68,19 +70,37 @@ async def run_procedure(
             remedy="disable the axis first",
         )
     words = describe(procedure)
-    for number, step in enumerate(procedure.steps):
-        progress(number / len(procedure.steps), words[number])
-        try:
-            await _step(axis, step)
-        except DriveError as error:
-            left = len(procedure.steps) - number - 1
-            error.message = (
-                f"{procedure.title}, step {number + 1} ({words[number]}): {error.message}"
-                + (f"; the {left} steps after it were not done" if left else "")
-            )
-            raise
+    async with AsyncExitStack() as left_alone:
+        for number, step in enumerate(procedure.steps):
+            progress(number / len(procedure.steps), words[number])
+            try:
+                if rest_s := _rest_from(procedure.steps, number):
+                    await left_alone.enter_async_context(drive.rest.alone(rest_s))
+                await _step(axis, step)
+            except DriveError as error:
+                left = len(procedure.steps) - number - 1
+                error.message = (
+                    f"{procedure.title}, step {number + 1} ({words[number]}): {error.message}"
+                    + (f"; the {left} steps after it were not done" if left else "")
+                )
+                raise
+            if isinstance(step, WaitStep):
+                await left_alone.aclose()
     _remember(axis, procedure.name)
     return {"procedure": procedure.name, "steps": words}
+
+
+def _rest_from(steps: Sequence[Step], number: int) -> float:
+    """For how long others leave the drive alone from this step on; 0 to begin nothing.
+
+    It begins before the write that a wait follows: what is asked between the two, an EP3E would
+    hear while it stores, and store nothing (001:1212).
+    """
+    step, after = steps[number], steps[number + 1 : number + 2]
+    if isinstance(step, WriteStep) and after and isinstance(after[0], WaitStep):
+        return after[0].seconds
+    begun = number > 0 and isinstance(steps[number - 1], WriteStep)
+    return step.seconds if isinstance(step, WaitStep) and not begun else 0.0
 
 
 async def _step(axis: Axis, step: Step) -> None:
@@ -99,12 +119,7 @@ async def _step(axis: Axis, step: Step) -> None:
                 if raw is not None:
                     await drive.write(key, raw)
         case WaitStep():
-            # Traffic spoils what an EP3E stores (001:1212): the monitor must be silent, too.
-            drive.resting = True
-            try:
-                await asyncio.sleep(step.seconds)
-            finally:
-                drive.resting = False
+            await asyncio.sleep(step.seconds)
         case PollStep():
             await _poll(axis, step)
         case ReconnectStep():
