@@ -1,8 +1,8 @@
 """Opening the database, bringing it up to date, and transactions on worker threads.
 
 SQLite by default (``servodeck.db`` in the state folder: WAL, foreign keys, full synchronisation,
-five seconds of patience), PostgreSQL by URL. Migrations run when it is opened, in one transaction
-under a lock, so that stations that start together do not disturb each other.
+writers one after the other), PostgreSQL by URL. Migrations run when it is opened, in one
+transaction under a lock, so that stations that start together do not disturb each other.
 """
 
 from __future__ import annotations
@@ -35,6 +35,11 @@ FILE = "servodeck.db"
 #: Any number that nothing else on the server uses; all servodeck stations use the same.
 _MIGRATION_LOCK = 0x5E2D0DEC
 _PATIENCE_S = 5
+#: For the write lock of SQLite. A writer of another process is waited for by asking again and
+#: again, and may be overtaken each time; on a slow disk that takes a while.
+_SQLITE_PATIENCE_S = 15
+#: Writers of this process queue here, by file, where none is overtaken for long.
+_writers: dict[str, threading.Lock] = {}
 
 
 class DatabaseFailed(StorageFailed):
@@ -122,11 +127,30 @@ class Store:
         """
         engine = self.open().execution_options(immediate=True)
         with (
+            self._alone(),
             self._translated(),
             Session(engine, expire_on_commit=False) as session,
             session.begin(),
         ):
             yield session
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """The only writer of this process, where the database takes only one at a time."""
+        if not self._is_sqlite:
+            yield
+            return
+        lock = _writers.setdefault(str(Path(self.url.database or "").resolve()), threading.Lock())
+        if not lock.acquire(timeout=_SQLITE_PATIENCE_S):
+            raise DatabaseFailed(
+                f"the database {self.shown} has been busy for {_SQLITE_PATIENCE_S} s",
+                value=self.shown,
+                remedy="try again; if it stays so, its disk is too slow or fails",
+            )
+        try:
+            yield
+        finally:
+            lock.release()
 
     async def call(self, work: Callable[P, T], /, *arguments: P.args, **named: P.kwargs) -> T:
         """Run blocking work on a thread of the store, as the person who asks for it."""
@@ -160,7 +184,7 @@ class Store:
                 ) from error
         # No error text, and so no log, may repeat what was stored: hashes of passwords too.
         engine = create_engine(
-            self.url, hide_parameters=True, connect_args={"timeout": _PATIENCE_S}
+            self.url, hide_parameters=True, connect_args={"timeout": _SQLITE_PATIENCE_S}
         )
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
