@@ -22,6 +22,7 @@ from drivers.ethercat.realtime import RealTime
 from drivers.ethercat.ring import Ring
 from drivers.ethercat.roster import Roster, Send
 from drivers.ethercat.segment import Segment
+from drivers.ethercat.setup import FoundInPart
 from drivers.ethercat.station import Station
 
 _CONTROL_WORD = 0x6040
@@ -29,6 +30,8 @@ _MAX_STEPS_PER_CYCLE = 16
 _STARVED_CYCLES = 8
 _NS_PER_BYTE = 80
 """100 Mbit/s: a frame may not become so long that process data wait for it."""
+_FIND_TRIES = 3
+"""A search that lost a frame has not seen everything; one that loses some each time is told."""
 
 
 class Operations:
@@ -330,6 +333,16 @@ class Operations:
     # Cyclic --------------------------------------------------------------------------------
 
     def _configure(self, message: Message, done: Done) -> None:
+        for _ in range(_FIND_TRIES - 1):
+            try:
+                answer = self._find_and_configure(message)
+            except FoundInPart:
+                continue
+            done(answer, None)
+            return
+        done(self._find_and_configure(message), None)
+
+    def _find_and_configure(self, message: Message) -> Message:
         self.roster.attach()
         for number in message["stations"]:
             if not 1 <= number <= len(self.roster.stations):
@@ -337,10 +350,13 @@ class Operations:
                     f"there is no station {number}: {len(self.roster.stations)} were found"
                 )
         self.roster.exchange.prepare(self.roster.stations)
+        for number in message["stations"]:
+            if self.roster.stations[number - 1].badly_found:
+                raise FoundInPart(f"station {number} was found only in part", remedy="try again")
         identities = {n: self.roster.stations[n - 1].identity for n in message["stations"]}
         _require_same(message.get("identities"), identities)
         answer = self.roster.exchange.configure(self.roster.stations, message)
-        done(answer | {"identities": identities}, None)
+        return answer | {"identities": identities}
 
     def _start(self, _message: Message, done: Done) -> None:
         self.roster.exchange.start(done)

@@ -68,6 +68,7 @@ class Preparation:
 
         Raises:
             NotAllowed: cycle, mapping or watchdog is not possible, with drive and reason.
+            FoundInPart: the search was disturbed; one more may help.
         """
         cycle_ns = int(message["cycle_ns"])
         if not CYCLE_NS[0] <= cycle_ns <= CYCLE_NS[1]:
@@ -150,7 +151,7 @@ class Preparation:
 
     def _check_places(self) -> None:
         jobs = {
-            number: setup_.check_places(self._stations[number - 1], plan)
+            number: setup_.check_places(self._stations[number - 1], plan, time.monotonic)
             for number, plan in self._setups.items()
         }
         self._run("register", jobs, "looking where the process data are")

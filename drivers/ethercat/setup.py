@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from drivers.errors import DriveError, NotAllowed, ProtocolError, Rejected
-from drivers.ethercat import coe
+from drivers.ethercat import coe, sii
 from drivers.ethercat.al_status import AlState
 from drivers.ethercat.mapping import Entry, Pdo
 from drivers.ethercat.station import Station, change_state, read_again
@@ -250,11 +250,16 @@ def _watch_outputs() -> Steps[int]:
     return watching
 
 
-def check_places(station: Station, setup: StationSetup) -> Steps[None]:
+class FoundInPart(ProtocolError):
+    """The EEPROM tells what the search did not learn: one of its frames was lost or late."""
+
+
+def check_places(station: Station, setup: StationSetup, clock: Callable[[], float]) -> Steps[None]:
     """The process data lie in the slave's process memory, as its EEPROM must tell.
 
     Raises:
         NotAllowed: they do not; outputs would be written nowhere, or into registers.
+        FoundInPart: its EEPROM tells, but the search has not read it.
     """
     managers = yield from read_again(SYNC_MANAGERS, 8 * _MANAGERS)
     if managers is None:
@@ -264,7 +269,14 @@ def check_places(station: Station, setup: StationSetup) -> Steps[None]:
         start, length = struct.unpack_from("<HH", managers, 8 * number)
         active = managers[8 * number + 6] & 1
         placed += bool(active and length and start >= _PROCESS_MEMORY)
-    if placed < bool(setup.rx.size) + bool(setup.tx.size):
+    needed = bool(setup.rx.size) + bool(setup.tx.size)
+    if placed < needed:
+        if (yield from sii.process_data_places(clock)) >= needed:
+            raise FoundInPart(
+                f"station {station.number} was found only in part: its EEPROM tells where its"
+                " process data are, but the search missed it",
+                remedy="try again; this computer was too busy, or the cable loses frames",
+            )
         raise NotAllowed(
             f"station {station.number}: its EEPROM does not tell where its process data are",
             remedy="it can be read and written, but not moved through cyclic data;"

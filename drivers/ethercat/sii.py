@@ -18,6 +18,9 @@ ALIAS_WORD, CHECKSUM_WORD, SERIAL_WORD, BOOT_WORD = 0x0004, 0x0007, 0x000E, 0x00
 MAILBOX_WORD = 0x0018
 """Offset and size of the mailbox out, of the mailbox in, and the protocols (ETG.1000.6 5.4)."""
 CONFIG_WORDS = 7
+_CATEGORIES_WORD, _SYNC_MANAGERS, _LAST = 0x0040, 41, 0xFFFF
+"""Type and length in words head every category (ETG.1000.6 table 19 and 5.4)."""
+_MOST_CATEGORIES = 64
 
 _OWNER, _CONTROL, _DATA = 0x500, 0x502, 0x508
 _READ, _WRITE, _ENABLE_WRITE = 0x0100, 0x0200, 0x0001
@@ -120,6 +123,25 @@ def has_mailbox(clock: Callable[[], float]) -> Steps[bool]:
     _, out_size, _, in_size, protocols = words
     blank = 0xFFFF in (out_size, in_size, protocols)
     return not blank and min(out_size, in_size) >= _LEAST_MAILBOX and protocols != 0
+
+
+def process_data_places(clock: Callable[[], float]) -> Steps[int]:
+    """How many sync managers beyond the mailboxes the EEPROM puts into the process memory.
+
+    0 where it has no such category. Errors as `read`.
+    """
+    word = _CATEGORIES_WORD
+    for _ in range(_MOST_CATEGORIES):
+        kind, words = struct.unpack("<HH", (yield from read(word, 2, clock)))
+        if kind == _LAST:
+            break
+        if kind == _SYNC_MANAGERS:
+            managers = yield from read(word + 2, words, clock)
+            # Each has eight bytes; the first two are where it begins.
+            starts = [start for start, _ in struct.iter_unpack("<H6s", managers[: words // 4 * 8])]
+            return sum(start >= _RAM for start in starts[2:])
+        word += 2 + words
+    return 0
 
 
 def _take() -> Steps[None]:

@@ -12,6 +12,8 @@ imports nothing of servodeck, and its slaves have the oddities that real ones ha
 ``bare``     a drive whose EEPROM has a wrong checksum and no category: no strings, no general part,
              no FMMUs, sync managers or PDOs. Its dictionary is told in fragments that end in the
              middle of a number, and with names longer than its mailbox
+``hasty``    a servo whose sync managers the first search does not get to read, as when frames of
+             the search are lost
 """
 
 from __future__ import annotations
@@ -330,7 +332,29 @@ class Bare(Servo):
             self.post(struct.pack("<HBBH", 0x8000, opcode | more, 0, left) + part)
 
 
-KINDS = {"coupler": Coupler, "outputs": Outputs, "servo": Servo, "bare": Bare}
+class Hasty(Servo):
+    product = 0x0403
+    managers_at = 2 * 0x52  # behind the general category
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.searches = 0
+
+    def write(self, at: int, data: bytes) -> bool:
+        if at <= 0x10 < at + len(data):
+            self.searches += 1
+        written = super().write(at, data)
+        if at <= 0x502 < at + len(data) and self.searches < 2 and self.memory[0x130] & 0x0F == 1:
+            (word,) = struct.unpack_from("<I", self.memory, 0x504)
+            seen = bytearray(self.answer)
+            for place in (self.managers_at, self.managers_at + 1):
+                if 0 <= place - 2 * word < len(seen):
+                    seen[place - 2 * word] = 0x0F  # a category that nobody knows
+            self.answer = bytes(seen)
+        return written
+
+
+KINDS = {"coupler": Coupler, "outputs": Outputs, "servo": Servo, "bare": Bare, "hasty": Hasty}
 
 
 def station(slave: Slave) -> int:
