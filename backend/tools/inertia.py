@@ -66,16 +66,16 @@ async def inertia(
             remedy="jog it between the ends, or teach them again",
         )  # fmt: skip
     progress(0.0, "a first short move")
-    rough = await first_look(axis, session, settings, facts, home, ends)
+    look = await first_look(axis, session, settings, facts, home, ends)
     if settings.scheme == "limited":
-        ends = await find_ends(axis, session, settings, facts, rough, progress)
+        ends = await find_ends(axis, session, settings, facts, look.rough, progress)
     travel, start = _where(settings, ends, units.position(home))
     if abs(start - units.position(home)) > 0.01:
         await go_back(axis, session, units.position_raw(start), _wide(settings, ends), facts)
     told = share(progress, 0.35, 0.65, "moving forth and back")
     shape = Shape()
     recording = await identification_moves(
-        axis, session, settings, facts, rough, travel, shape, told
+        axis, session, settings, facts, look, travel, shape, told
     )
     progress(0.65, "evaluating")
     result = await asyncio.to_thread(evaluate, recording, settings, facts, shape.cutoff_hz)
@@ -86,9 +86,9 @@ async def inertia(
         told = share(
             progress, 0.66, 0.9, f"once more, gently: the load swings at {swing_hz:.0f} Hz"
         )
-        better = RoughFit(
-            max(result.inertia_kgm2.value, rough.inertia_kgm2), rough.coulomb_nm, rough.gravity_nm
-        )
+        rough = look.rough
+        heavier = max(result.inertia_kgm2.value, rough.inertia_kgm2)
+        better = replace(look, rough=RoughFit(heavier, rough.coulomb_nm, rough.gravity_nm))
         again = await identification_moves(
             axis, session, settings, facts, better, travel, gentle, told
         )

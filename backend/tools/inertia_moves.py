@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.inertia import MoveLimits, design_moves
+from backend.analysis.inertia import MoveLimits, Trajectory, design_moves
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.tools import profile_speed
 from backend.tools.axis_facts import AxisFacts
+from backend.tools.go_back import go_back
 from backend.tools.inertia_evaluation import CUTOFF_HZ, InertiaSettings
 from backend.tools.probe import RoughFit, require_right_sign, rough_fit
 from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play, quiet
@@ -24,6 +25,14 @@ _TURN = 2 * np.pi
 _RAMP_S = 0.15
 _SMOOTHING_S = 0.03
 _FIRST_REV = 0.12
+#: A first move that gets less than this share of its way is made larger, while it takes little
+#: torque: a heavy load on a loop that was never tuned for it hardly follows.
+_FOLLOWED = 0.2
+#: Of less than this share of its way the loop is soft: it is helped by torque sent ahead of it.
+_FOLLOWS_WELL = 0.7
+#: Moves that take more torque than is permitted become weaker by this factor, so many times.
+_WEAKER, _ATTEMPTS = 0.6, 3
+_FRICTION_RAD_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -44,6 +53,14 @@ class Shape:
         )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class FirstLook:
+    """About how heavy the axis is, and what share of a short way its speed loop followed."""
+
+    rough: RoughFit
+    followed: float
+
+
 async def speed_move(
     axis: Axis,
     session: CyclicSession,
@@ -52,10 +69,16 @@ async def speed_move(
     facts: AxisFacts,
     progress: Callable[[float], None],
     until: Callable[[npt.NDArray[np.float64]], bool] | None = None,
+    torque_nm: npt.NDArray[np.float64] | None = None,
 ) -> Recording:
-    """Enable, play a speed profile, brake, disable."""
+    """Enable, play a speed profile, brake, disable; ``torque_nm`` [n] is sent ahead of the loop."""
     units = await axis.units()
     values = np.round(speed_rpm * (units.velocity_raw(1e6) / 1e6)).astype(np.int64)
+    sent = Play(Mode.CSV, values)
+    if torque_nm is not None:
+        per_nm = 100.0 / (units.torque(1.0) * facts.rated_torque_nm)
+        offsets = np.round(torque_nm * per_nm).astype(np.int64)
+        sent = replace(sent, offset_role="torque_offset", offsets=offsets)
     async with (
         profile_speed.interpolated(axis, session, speed_rpm),
         enabled(axis, session, Mode.CSV) as start,
@@ -63,8 +86,7 @@ async def speed_move(
         await quiet(axis)
         limits = await bus_limits(axis, envelope, start)
         return await play(
-            axis, session, Play(Mode.CSV, values), limits, facts.rated_torque_nm, progress,
-            until=until,
+            axis, session, sent, limits, facts.rated_torque_nm, progress, until=until,
         )  # fmt: skip
 
 
@@ -75,20 +97,62 @@ async def first_look(
     facts: AxisFacts,
     home_raw: int,
     ends: tuple[float, float] | None,
-) -> RoughFit:
-    """A short move forth and back: does it move at all, and how heavy is it about?"""
+) -> FirstLook:
+    """A short move forth and back: does it move at all, and how heavy is it about?
+
+    Raises:
+        NotAllowed: it hardly moves, it moves the wrong way, or it takes too much torque.
+    """
     units, envelope, rate = await axis.units(), settings.envelope, 1.0 / cycle_s(session)
-    travel = min(_FIRST_REV, 0.4 * envelope.travel_rev)
+    aim = min(_FIRST_REV, 0.4 * envelope.travel_rev)
     forward = 1.0
-    if ends is not None and units.position(home_raw) + travel > ends[1] - 0.02:
+    if ends is not None and units.position(home_raw) + aim > ends[1] - 0.02:
         forward = -1.0
     n = round(0.35 * rate)
     hump = 1.0 - np.cos(_TURN * (np.arange(n) + 0.5) / n)
-    speed = forward * hump * travel / (n / rate) * 60.0
-    speed *= min(1.0, 0.5 * envelope.speed_rpm / float(np.max(np.abs(speed))))
-    whole = np.concatenate([speed, -speed, np.zeros(round(0.1 * rate))])
+    speed = forward * hump * aim / (n / rate) * 60.0
+    highest_rpm = 0.5 * envelope.speed_rpm
+    speed *= min(1.0, highest_rpm / float(np.max(np.abs(speed))))
+    while True:
+        whole = np.concatenate([speed, -speed, np.zeros(round(0.1 * rate))])
+        recording = await _first_move(axis, session, envelope, facts, whole)
+        moved = float(np.ptp(recording.position_rad)) / _TURN
+        peak = float(np.max(np.abs(recording.torque_nm))) / facts.rated_torque_nm
+        if moved >= _FOLLOWED * aim:
+            break
+        # Should it follow all at once, twice the way must still be permitted, and twice the torque.
+        way_rev = 2.0 * float(np.sum(np.abs(speed))) / rate / 60.0
+        if (
+            way_rev > 0.8 * envelope.travel_rev
+            or 2.0 * float(np.max(np.abs(speed))) > highest_rpm
+            or 2.0 * peak > 0.8 * envelope.torque_percent / 100.0
+        ):
+            raise NotAllowed(
+                f"{axis.drive.name} moves only {moved:.3g} of {aim:.3g} rev, with up to {peak:.0%} "
+                "of its rated torque",
+                drive=axis.drive.name, value=round(moved, 4), limit=f"{aim:.3g} rev",
+                remedy="look for a closed brake, a blocked axis, a torque limit that is too low or "
+                "a speed loop that is far too soft",
+            )  # fmt: skip
+        speed = 2.0 * speed
+    require_right_sign(axis.drive.name, recording)
+    fit = rough_fit(
+        recording.torque_nm, recording.velocity_rad_s, recording.sample_rate_hz, recording.valid
+    )
+    floor = 0.5 * (facts.motor_inertia_kgm2 or 1e-7)
+    rough = RoughFit(max(fit.inertia_kgm2, floor), max(fit.coulomb_nm, 0.0), fit.gravity_nm)
+    return FirstLook(rough, moved / (float(np.sum(np.abs(speed))) / rate / 60.0))
+
+
+async def _first_move(
+    axis: Axis,
+    session: CyclicSession,
+    envelope: Envelope,
+    facts: AxisFacts,
+    speed_rpm: npt.NDArray[np.float64],
+) -> Recording:
     try:
-        recording = await speed_move(axis, session, whole, envelope, facts, lambda _fraction: None)
+        return await speed_move(axis, session, speed_rpm, envelope, facts, lambda _fraction: None)
     except NotAllowed as error:
         if "torque" not in error.message:
             raise
@@ -97,22 +161,6 @@ async def first_look(
             drive=axis.drive.name,
             remedy="look for a closed brake, a blocked axis or gains that are far too high",
         ) from error
-    moved = float(np.ptp(recording.position_rad)) / _TURN
-    if moved < 0.2 * travel:
-        peak = float(np.max(np.abs(recording.torque_nm))) / facts.rated_torque_nm
-        raise NotAllowed(
-            f"{axis.drive.name} moves only {moved:.3g} of {travel:.3g} rev, with up to {peak:.0%} "
-            "of its rated torque",
-            drive=axis.drive.name, value=round(moved, 4), limit=f"{travel:.3g} rev",
-            remedy="look for a closed brake, a blocked axis, a torque limit that is too low or a "
-            "speed loop that is far too soft",
-        )  # fmt: skip
-    require_right_sign(axis.drive.name, recording)
-    fit = rough_fit(
-        recording.torque_nm, recording.velocity_rad_s, recording.sample_rate_hz, recording.valid
-    )
-    floor = 0.5 * (facts.motor_inertia_kgm2 or 1e-7)
-    return RoughFit(max(fit.inertia_kgm2, floor), max(fit.coulomb_nm, 0.0), fit.gravity_nm)
 
 
 async def identification_moves(
@@ -120,19 +168,62 @@ async def identification_moves(
     session: CyclicSession,
     settings: InertiaSettings,
     facts: AxisFacts,
-    rough: RoughFit,
+    look: FirstLook,
     travel_rev: float,
     shape: Shape,
     told: Callable[[float], None],
 ) -> Recording:
-    """The identification moves."""
+    """The identification moves; weaker ones where the loop answers with too much torque."""
+    envelope, rough = settings.envelope, look.rough
+    ahead = look.followed < _FOLLOWS_WELL and _takes_torque_ahead(axis, session)
+    room = replace(envelope, travel_rev=min(envelope.travel_rev, travel_rev * 1.15))
+    start = await axis.position_raw()
+    for attempt in range(_ATTEMPTS):
+        trajectory = _moves(axis, session, settings, facts, rough, travel_rev, shape, attempt)
+        tail = np.zeros(round(0.2 * trajectory.sample_rate_hz))
+        speed = np.concatenate([trajectory.velocity_rad_s, tail])
+        torque = rough.inertia_kgm2 * np.concatenate([trajectory.acceleration_rad_s2, tail])
+        torque += rough.coulomb_nm * np.tanh(speed / _FRICTION_RAD_S)
+        try:
+            return await speed_move(
+                axis, session, speed * 60.0 / _TURN, room, facts, told,
+                torque_nm=torque if ahead else None,
+            )  # fmt: skip
+        except NotAllowed as error:
+            if attempt == _ATTEMPTS - 1 or "torque" not in error.message:
+                raise
+        await quiet(axis)
+        await go_back(axis, session, start, room, facts)
+    raise AssertionError
+
+
+def _takes_torque_ahead(axis: Axis, session: CyclicSession) -> bool:
+    key = axis.drive.key("torque_offset")
+    return key is not None and session.carries(axis.drive, key)
+
+
+def _moves(
+    axis: Axis,
+    session: CyclicSession,
+    settings: InertiaSettings,
+    facts: AxisFacts,
+    rough: RoughFit,
+    travel_rev: float,
+    shape: Shape,
+    attempt: int,
+) -> Trajectory:
+    """The trajectory of the first attempt, or a weaker one of a later.
+
+    Raises:
+        OutOfRange: the envelope does not allow it.
+    """
     envelope, rate = settings.envelope, 1.0 / cycle_s(session)
     friction = rough.coulomb_nm + abs(rough.gravity_nm)
     torque = envelope.torque_percent / 100.0 * facts.rated_torque_nm
     speed = 0.8 * envelope.speed_rpm * _TURN / 60.0
     # As gentle as ramps of this length are, but well above friction.
     gentle = max(rough.inertia_kgm2 * speed / shape.ramp_s, 4.0 * rough.coulomb_nm)
-    wanted = min(0.7 * torque, friction + gentle / 0.7)
+    wanted = friction + _WEAKER**attempt * (min(0.7 * torque, friction + gentle / 0.7) - friction)
     try:
         trajectory = design_moves(
             MoveLimits(0.8 * travel_rev * _TURN, speed, wanted), rough.inertia_kgm2, rate,
@@ -151,7 +242,4 @@ async def identification_moves(
             value=duration_s, limit=f"{envelope.time_s:g} s",
             remedy="allow more time, speed or torque, or less travel",
         )  # fmt: skip
-    tail = np.zeros(round(0.2 * rate))
-    rpm = np.concatenate([trajectory.velocity_rad_s, tail]) * 60.0 / _TURN
-    room = replace(envelope, travel_rev=min(envelope.travel_rev, travel_rev * 1.15))
-    return await speed_move(axis, session, rpm, room, facts, told)
+    return trajectory
