@@ -1,8 +1,9 @@
 """Cyclic jitter, overruns and CPU use of the EtherCAT host beside a bare pysoem loop.
 
 For every rate and number of slaves, one after the other in one run: a bare pysoem loop that does
-nothing but sleep, send and receive; our host with scope streaming to a server that is idle; and
-with a server that is busy (a thread computing spectra, as a web client's analysis would).
+nothing but sleep, send and receive, and our host with scope streaming; each with a server beside
+it that is idle, and with one that is busy (a thread computing spectra, as a web client's analysis
+would).
 
     python -m benchmarks.ethercat_cycle [--seconds 5] [--rates 1000,2000,4000] [--slaves 1,4]
 
@@ -20,6 +21,8 @@ import subprocess
 import sys
 import textwrap
 import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -76,11 +79,13 @@ _BARE = textwrap.dedent(
 Row = tuple[int, int, int, int, int, float]
 
 
-def bare(namespace: Namespace, rate: int, seconds: float) -> Row:
-    result = subprocess.run(
-        namespace.command([sys.executable, "-c", _BARE, str(rate), str(seconds)]),
-        capture_output=True, text=True, check=True, env=child_environment(),
-    )  # fmt: skip
+def bare(namespace: Namespace, rate: int, seconds: float, *, busy: bool) -> Row:
+    """Figures of the loop that does nothing else."""
+    with busy_server() if busy else nullcontext():
+        result = subprocess.run(
+            namespace.command([sys.executable, "-c", _BARE, str(rate), str(seconds)]),
+            capture_output=True, text=True, check=True, env=child_environment(),
+        )  # fmt: skip
     row: Row = tuple(json.loads(result.stdout))
     return row
 
@@ -104,8 +109,7 @@ async def ours(
     """Figures of the host, and the server's CPU; samples are received throughout."""
     link = EthercatLink("ec0m", launcher=namespace.command([]))
     await link.open()
-    stop = threading.Event()
-    worker = threading.Thread(target=_spectra, args=(stop,))
+    work = ExitStack()
     try:
         await link.scan(lambda _share, _text: None)
         cyclic = link.process_data
@@ -127,7 +131,7 @@ async def ours(
             await cyclic.drive_to(station, State.OPERATION_ENABLED, Mode.CSP)
         await asyncio.sleep(1.0)
         if busy:
-            worker.start()
+            work.enter_context(busy_server())
         before = dict(link.quality().details)
         errors = link.quality().wkc_errors + link.quality().lost_frames
         pid = link._host.pid
@@ -148,9 +152,7 @@ async def ours(
         )  # fmt: skip
         await cyclic.stop()
     finally:
-        stop.set()
-        if worker.is_alive():
-            worker.join()
+        work.close()
         await link.close()
     return row, 100 * server / seconds
 
@@ -159,6 +161,19 @@ def _percentile(late: list[int], fraction: float) -> int:
     from drivers.ethercat.cyclic import percentile_us
 
     return percentile_us(late, fraction)
+
+
+@contextmanager
+def busy_server() -> Iterator[None]:
+    """This process computes as the server of a busy page does."""
+    stop = threading.Event()
+    worker = threading.Thread(target=_spectra, args=(stop,))
+    worker.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        worker.join()
 
 
 def _spectra(stop: threading.Event) -> None:
@@ -180,7 +195,9 @@ def main(argv: list[str] | None = None) -> int:
         arguments = ["--drive", "mms7"] * slaves + ["--realtime", "20"]
         with Namespace.create() as namespace, VirtualSegment.start("ec0s", arguments, namespace):
             for rate in map(int, options.rates.split(",")):
-                _show(rate, slaves, "bare pysoem loop", bare(namespace, rate, options.seconds))
+                for busy in (False, True):
+                    row = bare(namespace, rate, options.seconds, busy=busy)
+                    _show(rate, slaves, "bare, busy server" if busy else "bare, idle server", row)
                 for busy in (False, True):
                     row, server = asyncio.run(
                         ours(namespace, rate, slaves, options.seconds, busy=busy)
