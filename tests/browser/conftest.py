@@ -7,7 +7,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, Playwright, sync_playwright
+from playwright.sync_api import (
+    Browser,
+    BrowserContext,
+    Page,
+    Playwright,
+    expect,
+    sync_playwright,
+)
 
 from tests.browser.cable import Cable
 from tests.browser.driving import Bench
@@ -20,6 +27,8 @@ FLAGS = [
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
 ]  # fmt: skip
 #: A wide and a narrow screen with a finger, as in the field.
+#: For what must appear: the tests run beside others, on a computer that has no time to spare.
+PATIENCE_MS = 15_000
 LAPTOP = {"viewport": {"width": 1280, "height": 800}}
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 
@@ -33,6 +42,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def playwright() -> Iterator[Playwright]:
     """One for all tests: a second one in the same process is refused."""
+    expect.set_options(timeout=PATIENCE_MS)
     with sync_playwright() as running:
         yield running
 
@@ -79,7 +89,7 @@ def x(station: Station) -> Iterator[str]:
 def _open(browser: Browser, url: str, **screen: object) -> Iterator[Page]:
     context: BrowserContext = browser.new_context(locale="en", **screen)  # type: ignore[arg-type]
     page = context.new_page()
-    page.set_default_timeout(15_000)
+    page.set_default_timeout(PATIENCE_MS)
     defects: list[str] = []
     page.on("pageerror", lambda error: defects.append(str(error)))
     page.on(

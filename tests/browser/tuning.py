@@ -18,6 +18,7 @@ from playwright.sync_api import Locator, Page, expect
 
 from backend.demo import DemoBench
 from drivers.virtual.wires.netns import unavailable
+from tests.browser.conftest import PATIENCE_MS
 from tests.browser.driving import open_axis
 from tests.support.station import Station, until
 
@@ -64,7 +65,7 @@ def running(folder: Path) -> Iterator[Station]:
     try:
         yield station
     finally:
-        expect.set_options(timeout=5_000)
+        expect.set_options(timeout=PATIENCE_MS)
         station.stop()
 
 
