@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 
 from fastapi import APIRouter
 
@@ -160,13 +160,19 @@ async def write_parameter(
     return convert.reading(member.drive, reading.key)
 
 
+def _choose(known: Iterable[str]) -> str:
+    """The remedy for a name that is none."""
+    there = ", ".join(known)
+    return f"choose one of: {there}" if there else "this drive has none: use another way"
+
+
 def _require_known(member: Member, key: str) -> None:
     if member.drive.profile.parameter(key) is None:
         raise NotFound(
             f"{member.drive.name} has no parameter {key}",
             drive=member.drive.name,
             parameter=key,
-            remedy="keys look like 6040:00; see GET …/parameters",
+            remedy="search the Parameters page for its name or number; keys look like 6040:00",
         )
 
 
@@ -235,7 +241,7 @@ async def run_procedure(
             f"{member.drive.name} has no procedure {name!r}",
             drive=member.drive.name,
             value=name,
-            remedy="see GET …/procedures",
+            remedy=_choose(p.name for p in member.drive.profile.procedures),
         )
     bench.require_idle(member)
     job = bench.jobs.start(
@@ -360,7 +366,7 @@ async def start_homing(bench: TheBench, member: Controlled, request: HomeRequest
             f"{member.drive.name} has no homing method {request.method}",
             drive=member.drive.name,
             value=request.method,
-            remedy="see GET …/homing-methods",
+            remedy=_choose(str(m.method) for m in member.drive.profile.homing_methods),
         )
     job = bench.jobs.start(
         "home",

@@ -16,6 +16,7 @@ from backend import parameter_set
 from backend.audit.chain import Anchor
 from backend.audit.export_check import check_lines
 from backend.audit.trail import Filter
+from backend.commands.options import Json
 from backend.commands.session import told
 from backend.commands.state import state_folder
 from backend.journal import Journal
@@ -193,7 +194,7 @@ def list_(
     database: Database = None,
     kind: Annotated[str, typer.Option(help=", ".join(KINDS))] = "",
     tag: Annotated[str, typer.Option()] = "",
-    as_json: Annotated[bool, typer.Option("--json")] = False,
+    as_json: Json = False,
 ) -> None:
     """Search the library."""
     records = _existing(config, database)

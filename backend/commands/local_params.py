@@ -18,15 +18,15 @@ from backend.library import SetLibrary
 from backend.parameter_set import ParameterSet
 from backend.tools import parameters, procedures
 from drivers.errors import NotAllowed
+from profiles.schema import Raw
 
 
-async def get(place: Place, keys: list[str]) -> None:
-    """Read parameters and print them."""
+async def get(place: Place, keys: list[str], *, as_json: bool) -> bool:
+    """Read parameters and print them; whether all could be read."""
     async with drive_at(place.url, place.station, place.profile) as drive:
         readings = await drive.read_many(keys)
-        for key in keys:
-            parameter = drive.parameter(key)
-            print(values.line(parameter, readings[parameter.key]))
+        wanted = [drive.parameter(key) for key in keys]
+    return values.show_readings([(p, readings[p.key]) for p in wanted], as_json=as_json)
 
 
 async def put(place: Place, assignments: list[str], *, raw: bool) -> None:
@@ -73,12 +73,12 @@ async def save(place: Place) -> None:
         print(f"{drive.name}: saved in the drive's memory")
 
 
-async def diff(place: Place, file: Path) -> bool:
+async def diff(place: Place, file: Path, *, as_json: bool) -> bool:
     """Print what differs; whether anything does."""
     content = _content(file)
     async with drive_at(place.url, place.station, place.profile) as drive:
         rows = await _differences(drive, content, file)
-    values.show(rows)
+    values.show(rows, as_json=as_json)
     return any(row.differs for row in rows)
 
 
@@ -110,11 +110,16 @@ async def _differences(drive: Drive, content: ParameterSet, file: Path) -> list[
     keys = [row.key for row in content.rows if row.key in drive.profile.by_key]
     reachable = [k for k in keys if not drive.unreachable_why(drive.parameter(k))]
     ours = await drive.read_many(reachable, show_progress)
-    return [
-        Compared(
-            row.key, row.parameter.name if row.parameter else "?", row.ours, row.theirs,
-            row.status, row.problem, row.selected,
-        )
-        for row in parameter_set.compare(drive, content.rows, ours)
-        if row.status != "same"
-    ]  # fmt: skip
+    rows = parameter_set.compare(drive, content.rows, ours)
+    return [_compared(row) for row in rows if row.status != "same"]
+
+
+def _compared(row: parameter_set.Difference) -> Compared:
+    def value(raw: Raw | None) -> Raw | None:
+        return raw if raw is None or row.parameter is None else row.parameter.to_value(raw)
+
+    name, unit = (row.parameter.name, row.parameter.unit) if row.parameter else ("?", "")
+    return Compared(
+        row.key, name, unit, row.ours, value(row.ours), row.theirs, value(row.theirs),
+        row.status, row.problem, row.selected,
+    )  # fmt: skip

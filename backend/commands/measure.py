@@ -11,9 +11,10 @@ from typing import Annotated
 
 import typer
 
+from backend.api.models import DriveSummary
 from backend.axis import Axis, Envelope
-from backend.commands.remote import remote
-from backend.commands.session import drive_at, progress, run
+from backend.commands.remote import Remote, remote
+from backend.commands.session import drive_at, progress, run_in_order
 from backend.cyclic import CyclicSession
 from backend.files import write_atomically
 from drivers.errors import NotAllowed
@@ -115,7 +116,7 @@ def sweep(
             f_min_hz, f_max_hz, share, realisations, rated_torque_nm=rated_torque_nm,
             excitation=excitation.value,
         )  # fmt: skip
-        async with _session(url, station, profile, cycle_ms, settings.envelope, consent) as (
+        async with exchanging(url, station, profile, cycle_ms, settings.envelope, consent) as (
             found,
             session,
         ):
@@ -146,9 +147,7 @@ def inertia(
     consent: Consent = False,
 ) -> None:
     """Measure inertia and friction and write them as JSON. The axis moves."""
-    ends = None
-    if end_low_rev is not None and end_high_rev is not None:
-        ends = (end_low_rev, end_high_rev)
+    ends = taught_ends(end_low_rev, end_high_rev)
     request: dict[str, object] = {
         "travel_limit": travel_rev, "speed_limit": speed_rpm, "torque_limit": torque_percent,
         "time_limit_s": 60.0, "consent": consent, "scheme": scheme.value, "ends_rev": ends,
@@ -165,7 +164,7 @@ def inertia(
             repetitions=repetitions, rated_torque_nm=rated_torque_nm,
             motor_inertia_kgm2=motor_inertia_kgm2,
         )  # fmt: skip
-        async with _session(url, station, profile, cycle_ms, settings.envelope, consent) as (
+        async with exchanging(url, station, profile, cycle_ms, settings.envelope, consent) as (
             found,
             session,
         ):
@@ -177,7 +176,7 @@ def inertia(
 
 
 @asynccontextmanager
-async def _session(
+async def exchanging(
     url: str | None, station: int, profile: str | None, cycle_ms: float, envelope: Envelope,
     consent: bool,
 ) -> AsyncIterator[tuple[Axis, CyclicSession]]:  # fmt: skip
@@ -207,7 +206,7 @@ def _measure(
 ) -> None:  # fmt: skip
     async def work() -> None:
         if server is not None:
-            answer = await _through_server(server, axis, tool, cycle_ms, request)
+            answer = await through_server(server, axis, tool, cycle_ms, request)
         else:
             assert callable(here)
             answer = await here()
@@ -216,7 +215,7 @@ def _measure(
             print(line)
         print(f"written: {out}")
 
-    run(work)
+    run_in_order(work)
 
 
 def _told(tool: str, answer: dict[str, object]) -> list[str]:
@@ -240,15 +239,38 @@ def _shown(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else "not known"
 
 
-async def _through_server(
+async def through_server(
     server: str, name: str | None, tool: str, cycle_ms: float, request: dict[str, object]
 ) -> dict[str, object]:
     """Run the job on a server and wait for it; its own bus exchange is started where needed."""
     async with remote(server) as at:
-        drives = await at.drives()
-        drive = next((d for d in drives if name in (d.name, d.id)), None)
-        if drive is None:
-            names = ", ".join(d.name for d in drives) or "none"
-            raise NotAllowed(f"{server} has no drive {name!r}", value=name, limit=names,
-                             remedy="give its name with --axis")  # fmt: skip
+        drive = await drive_of(at, name)
         return await at.result(f"/drives/{drive.id}/jobs/{tool}", request | {"cycle_ms": cycle_ms})
+
+
+async def drive_of(at: Remote, name: str | None) -> DriveSummary:
+    """The server's drive of this name or id.
+
+    Raises:
+        NotAllowed: there is none; the message lists those that are.
+    """
+    drives = await at.drives()
+    drive = next((d for d in drives if name in (d.name, d.id)), None)
+    if drive is None:
+        names = ", ".join(d.name for d in drives) or "none"
+        raise NotAllowed(f"{at.address} has no drive {name!r}", value=name, limit=names,
+                         remedy="give its name with --axis")  # fmt: skip
+    return drive
+
+
+def taught_ends(low_rev: float | None, high_rev: float | None) -> tuple[float, float] | None:
+    """Both ends, or none of them.
+
+    Raises:
+        typer.BadParameter: only one is given.
+    """
+    if low_rev is None or high_rev is None:
+        if low_rev is not None or high_rev is not None:
+            raise typer.BadParameter("give both --end-low-rev and --end-high-rev, or none of them")
+        return None
+    return low_rev, high_rev

@@ -10,7 +10,7 @@ from typing import Annotated, Protocol
 import typer
 
 from backend.commands import local_params, remote_params
-from backend.commands.options import Place, Profile, Server, Station, Url, place
+from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
 from backend.commands.session import run
 from backend.commands.values import bytes_of
 from backend.files import write_atomically
@@ -25,7 +25,7 @@ app = typer.Typer(help="Read and write parameters on a bus, or by a running serv
 class _Params(Protocol):
     """`local_params` and `remote_params`."""
 
-    async def get(self, place: Place, keys: list[str]) -> None: ...
+    async def get(self, place: Place, keys: list[str], *, as_json: bool) -> bool: ...
 
     async def put(self, place: Place, assignments: list[str], *, raw: bool) -> None: ...
 
@@ -35,7 +35,7 @@ class _Params(Protocol):
 
     async def save(self, place: Place) -> None: ...
 
-    async def diff(self, place: Place, file: Path) -> bool: ...
+    async def diff(self, place: Place, file: Path, *, as_json: bool) -> bool: ...
 
     async def load(self, place: Place, file: Path, *, yes: bool, other_drive: bool) -> bool: ...
 
@@ -48,15 +48,16 @@ def _by(where: Place) -> _Params:
 @app.command("get")
 def get(
     url: Url, keys: list[str], station: Station = 1, profile: Profile = None,
-    server: Server = None,
+    server: Server = None, as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Read parameters and print them."""
+    """Read parameters and print them; exit code 1 when one could not be read."""
 
-    async def work() -> None:
+    async def work() -> bool:
         where = place(url, station, profile, server)
-        await _by(where).get(where, keys)
+        return await _by(where).get(where, keys, as_json=as_json)
 
-    run(work)
+    if not run(work):
+        raise typer.Exit(1)
 
 
 @app.command("set")
@@ -116,15 +117,17 @@ def save(
 
 @app.command("diff")
 def diff(
-    url: Url, file: Path, station: Station = 1, profile: Profile = None, server: Server = None
-) -> None:
-    """Compare a parameter set with the drive; exit code 1 when they differ."""
+    url: Url, file: Path, station: Station = 1, profile: Profile = None,
+    server: Server = None, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Compare a parameter set with the drive; exit code 1 when they differ, 2 on an error."""
 
     async def work() -> bool:
         where = place(url, station, profile, server)
-        return await _by(where).diff(where, file)
+        return await _by(where).diff(where, file, as_json=as_json)
 
-    if run(work):
+    # A script must not take a bus that is silent for a drive that differs.
+    if run(work, error_code=2):
         raise typer.Exit(1)
 
 

@@ -20,14 +20,13 @@ from backend.parameter_set import parse
 from drivers.errors import NotAllowed
 
 
-async def get(place: Place, keys: list[str]) -> None:
-    """Read parameters and print them."""
+async def get(place: Place, keys: list[str], *, as_json: bool) -> bool:
+    """Read parameters and print them; whether all could be read."""
     async with remote_drive(place) as (at, drive):
         await at.result(f"/drives/{drive.id}/jobs/read_all", {"keys": keys})
         find = await _rows(at, drive)
-        for key in keys:
-            row = find(key)
-            print(values.line(row, row.reading))
+        rows = [find(key) for key in keys]
+    return values.show_readings([(row, row.reading) for row in rows], as_json=as_json)
 
 
 async def put(place: Place, assignments: list[str], *, raw: bool) -> None:
@@ -66,11 +65,11 @@ async def dump(
     print(f"{out}: also kept by the server as {kept.file}")
 
 
-async def diff(place: Place, file: Path) -> bool:
+async def diff(place: Place, file: Path, *, as_json: bool) -> bool:
     """Print what differs; whether anything does."""
     async with remote_drive(place) as (at, drive):
         _, rows = await _differences(at, drive, file)
-    values.show(rows)
+    values.show(rows, as_json=as_json)
     return any(row.differs for row in rows)
 
 
@@ -120,8 +119,8 @@ async def _differences(
     rows = [row for row in told.rows if row.status not in ("same", "not_in_file")]
     return kept, [
         Compared(
-            row.key, row.name or "?", row.drive_raw, row.file_raw, row.status, row.problem,
-            row.selected,
+            row.key, row.name or "?", row.unit, row.drive_raw, row.drive_value, row.file_raw,
+            row.file_value, row.status, row.problem, row.selected,
         )
         for row in rows
     ]  # fmt: skip

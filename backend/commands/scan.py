@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from typing import Annotated
 
-import typer
-
-from backend.commands.options import Server, Url, server_for
+from backend.commands.options import Json, Server, Url, server_for
 from backend.commands.session import opened, run, show_progress
 from backend.matching import match_profiles
 from drivers.urls import parse_url
@@ -16,7 +13,7 @@ from drivers.urls import parse_url
 
 def scan(
     url: Url,
-    as_json: Annotated[bool, typer.Option("--json")] = False,
+    as_json: Json = False,
     server: Server = None,
 ) -> None:
     """Look for drives on a bus."""
@@ -29,7 +26,8 @@ def scan(
         for row, fits in rows:
             which = ", ".join(f"{name} ({sure})" for name, sure in fits.items())
             name = row["name"] or "no name"
-            print(f"station {row['station']}: {name}  serial {row['serial']}  {which}")
+            serial = "no serial number" if row["serial"] is None else f"serial {row['serial']}"
+            print(f"station {row['station']}: {name}  {serial}  {which}")
         if not rows:
             print(f"no drive answers: check {_LOOK_AT[parse_url(url).scheme]}")
 

@@ -27,34 +27,50 @@ T = TypeVar("T")
 
 
 @contextmanager
-def reported() -> Iterator[None]:
-    """What a user can mend becomes one readable message and exit code 1."""
+def reported(code: int = 1) -> Iterator[None]:
+    """What a user can mend becomes one readable message and this exit code."""
     try:
         yield
     except DriveError as error:
-        raise _told(error.message, error.remedy) from error
+        raise _told(error.message, error.remedy, code) from error
     except ProfileError as error:
-        raise _told(str(error), "see `servodeck profile check`") from error
+        raise _told(str(error), "see `servodeck profile check`", code) from error
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        raise _told(f"{place}{error.strerror or error}", None) from error
+        raise _told(f"{place}{error.strerror or error}", None, code) from error
 
 
-def _told(message: str, remedy: str | None) -> typer.Exit:
+def _told(message: str, remedy: str | None, code: int) -> typer.Exit:
     print(f"error: {message}", file=sys.stderr)
     if remedy:
         print(f"try:   {remedy}", file=sys.stderr)
-    return typer.Exit(1)
+    return typer.Exit(code)
 
 
-def run(work: Callable[[], Awaitable[T]]) -> T:
+def run(work: Callable[[], Awaitable[T]], *, error_code: int = 1) -> T:
     """Run a command; see `reported`."""
 
     async def body() -> T:
         return await work()
 
-    with reported():
+    with reported(error_code):
         return asyncio.run(body())
+
+
+def run_in_order(work: Callable[[], Awaitable[T]]) -> T:
+    """Run what moves an axis: Ctrl+C and SIGTERM let it put everything back first; exit code 130.
+
+    What the drive was lent for a measurement is put back while the work is cancelled.
+    """
+    # The event loop makes a cancelling of SIGINT alone.
+    before = signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+    try:
+        return run(work)
+    except KeyboardInterrupt:
+        print("cancelled; the axis is disabled, its settings are as before", file=sys.stderr)
+        raise typer.Exit(130) from None
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def until_interrupted(work: Callable[[], Awaitable[None]]) -> None:

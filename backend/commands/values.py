@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -36,6 +37,10 @@ class Described(Protocol):
     def enum(self) -> Mapping[int, str]:
         """Words of its values."""
 
+    @property
+    def bits(self) -> Mapping[str, str]:
+        """Words of its bits."""
+
 
 class Told(Protocol):
     """What a drive said of it; ``raw`` is None where ``error`` says why."""
@@ -54,12 +59,15 @@ class Told(Protocol):
 
 
 class Compared(NamedTuple):
-    """One row of a set beside the drive; raw values."""
+    """One row of a set beside the drive."""
 
     key: str
     name: str
-    ours: Raw | None
-    theirs: Raw | None
+    unit: str
+    drive_raw: Raw | None
+    drive_value: Raw | None
+    file_raw: Raw | None
+    file_value: Raw | None
     status: str
     problem: str
     selected: bool
@@ -71,6 +79,9 @@ class Compared(NamedTuple):
 
 
 D = TypeVar("D", bound=Described)
+
+#: The widest word with bits: a negative one is told as it is on the wire.
+_WIDEST = 0xFFFF_FFFF
 
 
 def finite(key: str, name: str, text: str) -> float:
@@ -114,11 +125,41 @@ def assignment(find: Callable[[str], D], text: str) -> tuple[D, Raw]:
 def line(parameter: Described, told: Told) -> str:
     """A parameter and its value."""
     if told.raw is None:
-        return f"{parameter.key}  {parameter.name}: {told.error}"
-    label = parameter.enum.get(told.raw, "") if isinstance(told.raw, int) else ""
-    shown = f"{told.value} {parameter.unit}".rstrip() + (f" ({label})" if label else "")
-    raw = f"  [raw {told.raw}]" if told.raw != told.value else ""
-    return f"{parameter.key}  {parameter.name} = {shown}{raw}"
+        return f"{parameter.key}  {parameter.name}: {told.error or 'not read'}"
+    label = _label(parameter, told)
+    shown = _in_unit(told.raw, told.value, parameter.unit)
+    if parameter.bits and isinstance(told.raw, int):
+        shown = f"{told.raw} ({told.raw & _WIDEST:#06x})"
+    return f"{parameter.key}  {parameter.name} = {shown}" + (f" ({label})" if label else "")
+
+
+def show_readings(read: Iterable[tuple[Described, Told]], *, as_json: bool) -> bool:
+    """Print parameters with their values; whether each has one."""
+    rows = list(read)
+    if as_json:
+        print(json.dumps([_row(parameter, told) for parameter, told in rows], indent=1))
+    else:
+        for parameter, told in rows:
+            print(line(parameter, told))
+    return all(told.raw is not None for _, told in rows)
+
+
+def _row(parameter: Described, told: Told) -> dict[str, object]:
+    return {
+        "key": parameter.key, "name": parameter.name, "value": told.value,
+        "unit": parameter.unit, "raw": told.raw, "label": _label(parameter, told),
+        "error": told.error,
+    }  # fmt: skip
+
+
+def _label(parameter: Described, told: Told) -> str:
+    return parameter.enum.get(told.raw, "") if isinstance(told.raw, int) else ""
+
+
+def _in_unit(raw: Raw | None, value: Raw | None, unit: str) -> str:
+    if raw is None:
+        return "none"
+    return f"{value} {unit}".rstrip() + (f"  [raw {raw}]" if raw != value else "")
 
 
 def bytes_of(file: Path) -> bytes:
@@ -144,11 +185,16 @@ def other_family(file: str, theirs: str, drive: str, ours: str) -> NotAllowed:
     )
 
 
-def show(rows: Iterable[Compared]) -> None:
+def show(rows: Iterable[Compared], *, as_json: bool = False) -> None:
     """Print a comparison."""
+    if as_json:
+        print(json.dumps([row._asdict() for row in rows], indent=1))
+        return
     for row in rows:
         if row.differs:
-            print(f"{row.key}  {row.name}: drive {row.ours} → file {row.theirs}")
+            ours = _in_unit(row.drive_raw, row.drive_value, row.unit)
+            theirs = _in_unit(row.file_raw, row.file_value, row.unit)
+            print(f"{row.key}  {row.name}: drive {ours} → file {theirs}")
         else:
             words = f"{row.key}  {row.name}: {row.status.replace('_', ' ')} {row.problem}"
             print(words.rstrip())

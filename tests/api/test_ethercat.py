@@ -268,7 +268,11 @@ def test_command_line_compares_and_loads(
     command(station, "params", "set", URL, "2005:03=180", *at_b)
     shown = command(station, "params", "diff", URL, str(file), *at_b, code=1)
     assert "2005:03" in shown
-    assert "drive 1800 → file 1700" in shown
+    assert "drive 180.0 Hz  [raw 1800] → file 170.0 Hz  [raw 1700]" in shown
+    told = json.loads(command(station, "params", "diff", URL, str(file), "--json", *at_b, code=1))
+    assert [(row["key"], row["drive_value"], row["unit"]) for row in told] == [
+        ("2005:03", 180.0, "Hz")
+    ]
     done = command(station, "params", "load", URL, str(file), "--yes", *at_b)
     assert "written 1, failed 0" in done
     assert "the values before are in before load" in done
@@ -276,9 +280,9 @@ def test_command_line_compares_and_loads(
     assert "nothing to write" in command(station, "params", "load", URL, str(file), *at_b)
     other = tmp_path / "other.sdset"
     other.write_text(file.read_text().replace('profile = "mms7"', 'profile = "m6l"'))
-    refused = command(station, "params", "diff", URL, str(other), *at_b, code=1)
+    refused = command(station, "params", "diff", URL, str(other), *at_b, code=2)
     assert "is of a m6l drive, this is a mms7" in refused
-    refused = command(station, "params", "diff", URL, str(tmp_path / "none"), *at_b, code=1)
+    refused = command(station, "params", "diff", URL, str(tmp_path / "none"), *at_b, code=2)
     assert "cannot be read: No such file" in refused
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import io
+import json
 import signal
 import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -16,9 +18,11 @@ from backend import cli
 from backend.bench import Bench
 from backend.commands import session
 from backend.commands.serve import _tell_problems
-from backend.commands.values import assignment
+from backend.commands.values import assignment, line, show_readings
 from backend.drive import Drive
+from backend.readings import Reading
 from drivers.errors import NotAllowed
+from profiles import load_profile
 from tests.support.memory_link import MemoryLink
 
 
@@ -168,3 +172,30 @@ def test_a_service_managers_end_lets_go_of_everything() -> None:
     finally:
         signal.signal(signal.SIGTERM, before)
     assert let_go == ["folder"]
+
+
+def test_a_comparison_that_could_not_be_made_is_none_that_differs(
+    bus: MemoryLink, tmp_path: Path
+) -> None:
+    """A script that asks for 1, "they differ", must not take a failure for it."""
+    words = ["params", "diff", "mlink:///x", str(tmp_path / "none.sdset"), "--profile", "mms7"]
+    done = CliRunner().invoke(cli.app, words)
+    assert done.exit_code == 2
+    assert "cannot be read" in done.stderr
+
+
+def test_values_come_as_json_and_with_their_unit() -> None:
+    profile = load_profile("mms7")
+    speed, status = profile.by_key["2005:03"], profile.by_key["6041:00"]
+    read = [
+        (speed, Reading("2005:03", 1500, 150.0, 0.0)),
+        (status, Reading("6041:00", 0x0250, 0x0250, 0.0)),
+        (speed, Reading("2005:03", None, None, None, error="no answer")),
+    ]
+    out = io.StringIO()
+    with redirect_stdout(out):
+        assert not show_readings(read, as_json=True)
+    told = json.loads(out.getvalue())
+    assert (told[0]["value"], told[0]["unit"], told[0]["raw"]) == (150.0, "Hz", 1500)
+    assert (told[2]["value"], told[2]["error"]) == (None, "no answer")
+    assert line(status, read[1][1]) == "6041:00  Status word = 592 (0x0250)"

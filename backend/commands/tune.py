@@ -1,0 +1,207 @@
+"""``servodeck autotune``: from an unknown axis to a verified one, without the page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from backend.axis import Envelope
+from backend.commands.measure import (
+    AxisName,
+    Consent,
+    Cycle,
+    LoopName,
+    Profile,
+    Rated,
+    SchemeName,
+    Server,
+    Speed,
+    Station,
+    Torque,
+    Travel,
+    Url,
+    drive_of,
+    exchanging,
+    taught_ends,
+)
+from backend.commands.remote import remote
+from backend.commands.session import progress, run_in_order
+from backend.files import write_atomically
+from drivers.errors import NotAllowed
+
+Answer = Mapping[str, object]
+
+
+class MarkName(StrEnum):
+    """How fast the design shall be that is wanted."""
+
+    robust = "robust"
+    balanced = "balanced"
+    fast = "fast"
+
+
+class LoadName(StrEnum):
+    """What the axis drives."""
+
+    stiff = "stiff"
+    medium = "medium"
+    compliant = "compliant"
+
+
+def autotune(
+    url: Url = None,
+    station: Station = 1,
+    profile: Profile = None,
+    server: Server = None,
+    axis: AxisName = None,
+    mark: Annotated[MarkName, typer.Option(help="the design to apply")] = MarkName.balanced,
+    load: Annotated[
+        LoadName | None, typer.Option(help="judged from the response if not said")
+    ] = None,
+    apply: Annotated[
+        bool, typer.Option("--apply", help="write the design, verify it, and take it back")
+    ] = False,
+    keep: Annotated[
+        bool,
+        typer.Option(
+            "--keep", help="as --apply, but leave it in force; `servodeck params save` stores it"
+        ),
+    ] = False,
+    loop: Annotated[LoopName, typer.Option(help="closed meanwhile")] = LoopName.auto,
+    scheme: SchemeName = SchemeName.free,
+    end_low_rev: Annotated[float | None, typer.Option(help="taught end")] = None,
+    end_high_rev: Annotated[float | None, typer.Option(help="taught end")] = None,
+    cycle_ms: Cycle = 1.0,
+    travel_rev: Travel = 3.0,
+    speed_rpm: Speed = 1200.0,
+    torque_percent: Torque = 80.0,
+    rated_torque_nm: Rated = None,
+    motor_inertia_kgm2: Annotated[float | None, typer.Option(help="of the motor alone")] = None,
+    consent: Consent = False,
+    out: Annotated[Path | None, typer.Option(help="JSON file to write")] = None,
+) -> None:
+    """Measure, design and, with --apply or --keep, verify an axis's loop gains. The axis moves."""
+    ends = taught_ends(end_low_rev, end_high_rev)
+    writes = apply or keep
+    request: dict[str, object] = {
+        "travel_limit": travel_rev, "speed_limit": speed_rpm, "torque_limit": torque_percent,
+        "time_limit_s": 60.0, "consent": consent, "mark": mark.value,
+        "load": load.value if load else None, "loop": loop.value, "scheme": scheme.value,
+        "ends_rev": ends, "apply": writes, "rated_torque_nm": rated_torque_nm,
+        "motor_inertia_kgm2": motor_inertia_kgm2, "cycle_ms": cycle_ms,
+    }  # fmt: skip
+
+    async def here() -> Answer:
+        # The analysis takes seconds to import; no other command shall wait for it.
+        from backend.tools import autotune as tool
+        from backend.tools.tune_apply import take_back
+
+        envelope = Envelope(travel_rev, speed_rpm, torque_percent, 60.0)
+        settings = tool.AutotuneSettings(
+            envelope, mark.value, load.value if load else None, loop.value, scheme.value, ends,
+            writes, rated_torque_nm, motor_inertia_kgm2,
+        )  # fmt: skip
+        async with exchanging(url, station, profile, cycle_ms, envelope, consent) as (at, session):
+            found = await tool.autotune(at, session, settings, progress())
+            if not keep:
+                await take_back(at, found.before)
+            return tool.as_json(found)
+
+    async def there(address: str) -> Answer:
+        async with remote(address) as at:
+            drive = await drive_of(at, axis)
+            found = await at.result(f"/drives/{drive.id}/jobs/autotune", request)
+            if not keep and found["before"]:
+                body = {"before": found["before"]}
+                await at.raw("POST", f"/drives/{drive.id}/tune/undo", body=body)
+            return found
+
+    async def work() -> None:
+        if server is None and url is None:
+            raise NotAllowed("give a bus URL, or --server and --axis", remedy="see --help")
+        answer = await (here() if server is None else there(server))
+        if out is not None:
+            write_atomically(out, json.dumps(answer, indent=1).encode())
+        for line in told(answer, kept=keep):
+            print(line)
+        if out is not None:
+            print(f"written: {out}")
+
+    run_in_order(work)
+
+
+def told(answer: Answer, *, kept: bool) -> list[str]:
+    """The marked designs, what became of the chosen one, and what it does without."""
+    lines = [_HEAD, *(_row(each) for each in _maps(answer["candidates"]) if each["marks"])]
+    verified, applied = answer["verified"], answer["applied"]
+    if isinstance(verified, dict) and isinstance(applied, dict):
+        lines += ["", *_verified(applied, verified)]
+        changed = answer["before"]
+        count = len(changed) if isinstance(changed, dict) else 0
+        lines.append(
+            f"in force: {count} parameters were changed; they are not stored in the drive yet"
+            if kept
+            else "taken back: all parameters are as before"
+        )
+    else:
+        lines += ["", "nothing was written; --apply verifies a design, --keep leaves it in force"]
+    for name, word in (("tried", "not kept"), ("notes", "note")):
+        texts = answer[name]
+        lines += [f"{word}: {text}" for text in (texts if isinstance(texts, list) else [])]
+    return lines
+
+
+_HEAD = (
+    "design     speed loop  bandwidth  phase margin  gain margin    Ms   settling  overshoot  "
+    "notches"
+)
+
+
+def _row(each: Answer) -> str:
+    goals, gains = _map(each["promised"]), _map(each["gains"])
+    notches = [f"{_number(n['center_hz'], '.0f')} Hz" for n in _maps(each["notches"])]
+    settling = each["settling_s"]
+    marks = each["marks"]
+    names = ",".join(map(str, marks)) if isinstance(marks, list | tuple) else ""
+    return (
+        f"{names:9}  {_number(gains['speed_bandwidth_hz'], '7.1f')} Hz  "
+        f"{_number(each['bandwidth_hz'], '6.1f')} Hz  "
+        f"{_number(goals['phase_margin_deg'], '11.1f')}°  "
+        f"{_number(goals['gain_margin_db'], '8.1f')} dB  {_number(goals['ms'], '.2f')}  "
+        f"{_number(settling * 1e3 if isinstance(settling, float) else None, '6.1f')} ms  "
+        f"{_number(each['overshoot_percent'], '7.0f')} %  {', '.join(notches) or 'none'}"
+    )
+
+
+def _verified(applied: Answer, verified: Answer) -> list[str]:
+    goals = _map(applied["promised"])
+    margins = _map(_map(verified["sweep"])["margins"])
+    rows = (
+        ("bandwidth", verified["predicted_bandwidth_hz"], verified["measured_bandwidth_hz"], "Hz"),
+        ("phase margin, at least", goals["phase_margin_deg"], margins.get("phase_margin_deg"), "°"),
+        ("gain margin, at least", goals["gain_margin_db"], margins.get("gain_margin_db"), "dB"),
+        ("Ms, at most", goals["ms"], margins.get("ms"), ""),
+    )
+    head = f"{'':24}{'predicted':>10}{'verified':>10}"
+    return [head] + [
+        f"{name:24}{_number(promise, '10.2f'):>10}{_number(found, '10.2f'):>10} {unit}".rstrip()
+        for name, promise, found, unit in rows
+    ]
+
+
+def _number(value: object, form: str) -> str:
+    width = int(form.split(".")[0] or 0)
+    return format(value, form) if isinstance(value, float | int) else "–".rjust(width)
+
+
+def _map(value: object) -> Answer:
+    return value if isinstance(value, dict) else {}
+
+
+def _maps(value: object) -> Iterable[Answer]:
+    return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
