@@ -124,6 +124,8 @@ class Alarms:
     @property
     def error_code(self) -> int:
         """603Fh: the newest fault with a code, else the newest warning with one."""
+        if not self.active and not self.warnings:
+            return 0
         codes = [info.code for info in self.active.values() if info.code]
         if not codes:
             codes = [w.code_raw for w in self.warnings.values() if w.code_raw is not None]

@@ -101,7 +101,7 @@ class VirtualAxis:
     @property
     def events(self) -> int:
         """EV_* bits that ended the last run."""
-        return int(self.s[k.S_EVENTS]) & int(self.p[k.P_EVENT_MASK])
+        return int(self.s.item(k.S_EVENTS)) & int(self.p.item(k.P_EVENT_MASK))
 
     def listen(self, *events: int) -> None:
         """Events that end a run, besides fault, stop and alarm clock which always do."""
@@ -328,10 +328,10 @@ class VirtualAxis:
 
     def set_cyclic(self, angle_rad: float, speed: float, torque_nm: float, steps: int) -> None:
         """New cyclic set-points, reached linearly in ``steps`` of 50 µs (004:7618-7621)."""
-        s = self.s
-        s[k.S_IP_POSITION_INC] = (angle_rad - s[k.S_IP_POSITION]) / steps
-        s[k.S_IP_SPEED_INC] = (speed - s[k.S_IP_SPEED]) / steps
-        s[k.S_IP_TORQUE_INC] = (torque_nm - s[k.S_IP_TORQUE]) / steps
+        s, item = self.s, self.s.item
+        s[k.S_IP_POSITION_INC] = (angle_rad - item(k.S_IP_POSITION)) / steps
+        s[k.S_IP_SPEED_INC] = (speed - item(k.S_IP_SPEED)) / steps
+        s[k.S_IP_TORQUE_INC] = (torque_nm - item(k.S_IP_TORQUE)) / steps
         s[k.S_IP_LEFT] = float(steps)
 
     def stop_ramp(self, braking: float) -> None:

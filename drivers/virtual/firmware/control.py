@@ -342,9 +342,18 @@ class DeviceControl:
             word |= 1 << 7
         if self.identification.active:
             word |= 1 << 14
-        enabled = self.state in _OPERATING
-        stopping = self._halted or self.state is State.QUICK_STOP_ACTIVE
-        return word | self.modes.status_bits(stopping, enabled)
+        return word | self.modes.status_bits(self._stopping, self.state in _OPERATING)
+
+    @property
+    def _stopping(self) -> bool:
+        return self._halted or self.state is State.QUICK_STOP_ACTIVE
+
+    @property
+    def target_reached(self) -> bool:
+        """Bit 10 of the status word."""
+        if self._traits.status == "echo":
+            return bool(self._echo_status() & 1 << 10)
+        return self.state in _OPERATING and self.modes.reached(self._stopping)
 
     @property
     def homed(self) -> bool:

@@ -35,6 +35,9 @@ class Core:
         self.homed = False
         self.units: Units = family.units(od, axis.motor)
         self.schedule = Schedule(axis)
+        self._limits = od.cell("607D:01", _INT32[0]), od.cell("607D:02", _INT32[1])
+        self._modulo = od.cell("607B:01"), od.cell("607B:02")
+        self._swapped_limits = family.traits.positive_limit_first and "607D:01" in od.numbered
 
     def number(self, key: str, default: Number = 0) -> Number:
         """Effective value of a parameter."""
@@ -99,8 +102,8 @@ class Core:
             way = choice[1].get(int(self.number(choice[0])), "off")
             if way == "off" or (way == "homed" and not self.homed):
                 return _INT32
-        low, high = self.number("607D:01", _INT32[0]), self.number("607D:02", _INT32[1])
-        if self.family.traits.positive_limit_first and "607D:01" in self.od.numbered:
+        low, high = self._limits[0].active, self._limits[1].active
+        if self._swapped_limits:
             low, high = high, low
         return (low, high) if low < high else _INT32
 
@@ -109,7 +112,7 @@ class Core:
 
         The printed defaults are the whole 32-bit range (004:7210-7225).
         """
-        low, high = self.number("607B:01"), self.number("607B:02")
+        low, high = self._modulo[0].active, self._modulo[1].active
         span = high - low
         return (low, span) if 0 < span < 2**32 - 1 else None
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Protocol, cast
 
 from drivers.virtual.device import (
     ABORT_NO_OBJECT,
@@ -33,6 +35,21 @@ _STRUCT = {
     }.items()
 }  # fmt: skip
 Number = int | float
+
+
+class Cell(Protocol):
+    """The effective value of a number, for who looks at it in every cycle."""
+
+    @property
+    def active(self) -> Number:
+        """Its present value."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Constant:
+    """Stands for an entry that this drive does not have."""
+
+    active: Number
 
 
 def code_of(index: int, subindex: int) -> int:
@@ -223,6 +240,13 @@ class ObjectDictionary:
         if entry is None or isinstance(entry.active, str):
             return default
         return entry.active
+
+    def cell(self, key: str, default: Number = 0) -> Cell:
+        """What `number` tells, looked up once: numeric entries stay numeric for good."""
+        entry = self.numbered.get(key)
+        if entry is None or isinstance(entry.active, str):
+            return _Constant(default)
+        return cast("Cell", entry)
 
     def put(self, key: str, value: Raw) -> None:
         """The drive itself changes a value, in storage and in effect."""

@@ -47,6 +47,7 @@ class Faults:
         self.emergencies: list[Emergency] = []
         self.levels: Callable[[], tuple[int, int]] = lambda: (0, 0)
         """Levels of inputs and outputs, for the record of a fault."""
+        self._warns_of_limits = any(self._traits.limits.warnings)
         self._reported = 0
         self._since_s: dict[str, float] = {}
         self._retry_timer: Timer | None = None
@@ -174,13 +175,13 @@ class Faults:
     def warning(self) -> bool:
         """Over-temperature announced 20 °C early (004:4842-4846), or a warning of the table."""
         self._watch_limits()
-        threshold = float(self._axis.p[k.P_OTP_C])
-        hot = float(self._axis.s[k.S_TEMPERATURE])
+        threshold = self._axis.p.item(k.P_OTP_C)
+        hot = self._axis.s.item(k.S_TEMPERATURE)
         return bool(self.alarms.warnings) or (math.isfinite(threshold) and hot >= threshold - 20)
 
     def _watch_limits(self) -> None:
         """Warnings of the limit switches come and go with the switches."""
-        if not any(self._traits.limits.warnings):
+        if not self._warns_of_limits:
             return
         signals = int(self._axis.s[k.S_SIGNALS])
         for warning, switch in zip(

@@ -47,15 +47,10 @@ def live_values(
     def torque() -> int:
         return round(item(k.S_TORQUE) * core.units.torque_per_nm)
 
-    def status_word() -> int:
-        word = control.status_word()
-        if isinstance(panel, Panel):
-            panel.target_reached = bool(word & 1 << 10)
-            panel.alarm = control.state in (State.FAULT, State.FAULT_REACTION)
-        return word
-
     def digital_inputs() -> int:
-        status_word()
+        if isinstance(panel, Panel):
+            panel.target_reached = control.target_reached
+            panel.alarm = control.state in (State.FAULT, State.FAULT_REACTION)
         return panel.digital_inputs()
 
     def plain_inputs() -> int:
@@ -69,7 +64,7 @@ def live_values(
     values: dict[str, Callable[[], Number]] = {
         "1001:00": lambda: control.alarms.error_register,
         "603F:00": lambda: control.faults.error_code,
-        "6041:00": status_word,
+        "6041:00": control.status_word,
         "6061:00": lambda: control.modes.mode,
         "6062:00": demand,
         "6063:00": lambda: round((item(k.S_THETA) - core.zero_rad) * inc_per_rad),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from drivers.virtual.firmware import kernel as k
@@ -43,6 +42,11 @@ class Modes:
         self._cycle_step = 0
         self._cycle_steps = 0
         numbered = core.od.numbered
+        self._item = core.axis.s.item
+        self._following_ms = core.od.cell("6066:00", 10)
+        self._position_ms = core.od.cell("6068:00", 10)
+        self._speed_ms = core.od.cell("606E:00", 10)
+        self._zero_ms = core.od.cell("6070:00", 10)
         self._cyclic_entries = tuple(
             numbered.get(key)
             for key in ("607A:00", "60B0:00", "60FF:00", "60B1:00", "6071:00", "60B2:00")
@@ -177,7 +181,7 @@ class Modes:
         Where the cycles come on an exact grid that is finer than 60C2h can say (it has steps of
         100 µs at best, 004:7628), the drive interpolates over the grid's period.
         """
-        now = int(self._axis.s[k.S_STEP])
+        now = int(self._item(k.S_STEP))
         spacing, self._cycle_step = now - self._cycle_step, now
         steady, self._cycle_steps = spacing == self._cycle_steps, spacing
         self.on_cyclic(spacing if steady and 0 < spacing < self._steps else None)
@@ -216,25 +220,33 @@ class Modes:
 
     def status_bits(self, halted: bool, enabled: bool) -> int:
         """Bits 10 to 13 of the status word."""
-        core, s = self._core, self._axis.s
-        held = s[k.S_LIMIT_ACTIVE] > 0 or s[k.S_LIMIT_HELD] > 0
-        bits = 1 << 11 if self.limited or held else 0
-        following = s[k.S_FOLLOWING_T] > core.number("6066:00", 10) * 1e-3
-        reached: Callable[[], bool] = {
-            PP: lambda: bool(s[k.S_POSITION_T] >= core.number("6068:00", 10) * 1e-3),
-            PV: lambda: bool(s[k.S_SPEED_T] >= core.number("606E:00", 10) * 1e-3),
-            PT: lambda: bool(s[k.S_ARRIVED] > 0),
-            HM: lambda: not self.homing.active,
-        }.get(self.mode, lambda: False)
-        if enabled and (s[k.S_ZERO_T] > 0 if halted else reached()):
+        item, mode = self._item, self.mode
+        limited = self.limited or item(k.S_LIMIT_ACTIVE) > 0 or item(k.S_LIMIT_HELD) > 0
+        bits = 1 << 11 if limited else 0
+        if enabled and self.reached(halted):
             bits |= 1 << 10
-        if self.mode == PP:
-            bits |= self.acknowledged << 12 | (enabled and following) << 13
-        elif self.mode == PV:
-            bits |= (s[k.S_ZERO_T] >= core.number("6070:00", 10) * 1e-3) << 12
-        elif self.mode == HM:
+        if mode == PP:
+            bits |= self.acknowledged << 12 | (enabled and self._follows_badly()) << 13
+        elif mode == PV:
+            bits |= (item(k.S_ZERO_T) >= self._zero_ms.active * 1e-3) << 12
+        elif mode == HM:
             bits |= self.homing.attained << 12 | self.homing.failed << 13
-        elif self.mode in _CYCLIC_LOOP:
-            bits |= (enabled and self.running) << 12
-            bits |= (self.mode == CSP and enabled and following) << 13
-        return int(bits)
+        elif mode in _CYCLIC_LOOP and enabled:
+            bits |= self.running << 12 | (mode == CSP and self._follows_badly()) << 13
+        return bits
+
+    def reached(self, halted: bool) -> bool:
+        """Bit 10 of the status word with the power stage on: target reached, or at rest."""
+        item, mode = self._item, self.mode
+        if halted:
+            return item(k.S_ZERO_T) > 0
+        if mode == PP:
+            return item(k.S_POSITION_T) >= self._position_ms.active * 1e-3
+        if mode == PV:
+            return item(k.S_SPEED_T) >= self._speed_ms.active * 1e-3
+        if mode == PT:
+            return item(k.S_ARRIVED) > 0
+        return mode == HM and not self.homing.active
+
+    def _follows_badly(self) -> bool:
+        return self._item(k.S_FOLLOWING_T) > self._following_ms.active * 1e-3

@@ -5,9 +5,10 @@ from __future__ import annotations
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
 
-_INPUTS = 4
+_INPUTS, _OUTPUTS = 4, 2
 _PROBE_FUNCTION = 4  # of DI1 (probe 1) and DI2 (probe 2), 004:6480, 004:6492
 _ALARM_RESET = 4  # of DI3, 004:6500
+_SIGNALS = {1: k.SIG_NEGATIVE, 2: k.SIG_POSITIVE, 3: k.SIG_HOME}
 
 
 class Panel:
@@ -15,6 +16,11 @@ class Panel:
 
     def __init__(self, core: Core) -> None:
         self._core = core
+        cell = core.od.cell
+        self._functions = [cell(f"2030:{n:02X}") for n in range(1, _INPUTS + _OUTPUTS + 1)]
+        self._polarity = cell("2031:01")
+        self._simulated, self._simulation = cell("2031:02"), cell("2031:03")
+        self._forced, self._mask = cell("60FE:01"), cell("60FE:02")
         self.external = [False] * _INPUTS
         self.target_reached = False
         self.alarm = False
@@ -24,29 +30,30 @@ class Panel:
         self._probe_function = 0
         self._latched = {"60BA:00": 0, "60BB:00": 0, "60BC:00": 0, "60BD:00": 0}
 
-    def _number(self, key: str) -> int:
-        return int(self._core.number(key))
-
     def _function(self, terminal: int) -> int:
-        return self._number(f"2030:{terminal + 1:02X}")
+        return int(self._functions[terminal].active)
 
     def terminal_valid(self, terminal: int, *, simulated: bool) -> bool:
         """Logic of an input: after polarity and, if asked, after simulation (2031h)."""
-        if simulated and self._number("2031:02") >> terminal & 1:
-            return bool(self._number("2031:03") >> terminal & 1)
-        signal = {1: k.SIG_NEGATIVE, 2: k.SIG_POSITIVE, 3: k.SIG_HOME}.get(self._function(terminal))
+        if simulated and int(self._simulated.active) >> terminal & 1:
+            return bool(int(self._simulation.active) >> terminal & 1)
+        return self._level(terminal, self._function(terminal), self._physical())
+
+    def _level(self, terminal: int, function: int, physical: int) -> bool:
+        """Logic of an input after polarity, with the switches in ``physical``."""
+        signal = _SIGNALS.get(function)
         if signal is None:
             return self.external[terminal]
-        physical = self._physical() & signal != 0
-        return physical != bool(self._number("2031:01") >> terminal & 1)
+        inverted = int(self._polarity.active) >> terminal & 1
+        return (physical & signal != 0) != bool(inverted)
 
     def _physical(self) -> int:
         """Switches as the mechanics presses them."""
         axis = self._core.axis
-        angle = float(axis.s[k.S_THETA])
-        pressed = k.SIG_NEGATIVE if angle <= axis.p[k.P_LIMIT_NEGATIVE] else 0
-        pressed |= k.SIG_POSITIVE if angle >= axis.p[k.P_LIMIT_POSITIVE] else 0
-        inside = axis.p[k.P_HOME_FROM] <= angle <= axis.p[k.P_HOME_TO]
+        angle, limit = axis.s.item(k.S_THETA), axis.p.item
+        pressed = k.SIG_NEGATIVE if angle <= limit(k.P_LIMIT_NEGATIVE) else 0
+        pressed |= k.SIG_POSITIVE if angle >= limit(k.P_LIMIT_POSITIVE) else 0
+        inside = limit(k.P_HOME_FROM) <= angle <= limit(k.P_HOME_TO)
         return pressed | (k.SIG_HOME if inside else 0)
 
     def digital_inputs(self) -> int:
@@ -54,29 +61,27 @@ class Panel:
 
         Simulation does not show here (004:2014-2015).
         """
-        word = 0
+        word, physical = 0, self._physical()
         for terminal in range(_INPUTS):
-            if self.terminal_valid(terminal, simulated=False):
+            function = self._function(terminal)
+            if self._level(terminal, function, physical):
                 word |= 1 << (16 + terminal)
-                function = self._function(terminal)
                 if 1 <= function <= 3:
                     word |= 1 << (function - 1)
         return word | self.outputs() << 24
 
     def outputs(self) -> int:
         """Logic of DO1 and DO2: forced (60FEh), simulated (2031h) or by function (2030h)."""
-        forced, mask = self._number("60FE:01"), self._number("60FE:02")
-        simulated, values = self._number("2031:02"), self._number("2031:03")
+        forced, mask = int(self._forced.active), int(self._mask.active)
+        simulated, values = int(self._simulated.active), int(self._simulation.active)
         word = 0
-        for output in range(2):
+        for output in range(_OUTPUTS):
             if mask >> (16 + output) & 1:
                 on = bool(forced >> (16 + output) & 1)
             elif simulated >> (8 + output) & 1:
                 on = bool(values >> (8 + output) & 1)
             else:
-                on = self.alarm if self._number(f"2030:{5 + output:02X}") == 1 else (
-                    self.target_reached
-                )  # fmt: skip
+                on = self.alarm if self._function(_INPUTS + output) == 1 else self.target_reached
             word |= on << output
         return word
 

@@ -11,7 +11,6 @@ from drivers.virtual.device import (
     SdoAbort,
 )
 from drivers.virtual.firmware.dictionary import Entry, Number, ObjectDictionary
-from profiles.schema import Raw
 
 _FORMAT = {
     "BOOL": "B", "INT8": "b", "UINT8": "B", "INT16": "h", "UINT16": "H",
@@ -60,27 +59,22 @@ class InputImage:
     def __init__(self, parts: Sequence[Entry | int]) -> None:
         self._struct = _layout(parts)
         self.size = self._struct.size
-        self._readers = [_reader(part) for part in parts if isinstance(part, Entry)]
+        self._entries = [part for part in parts if isinstance(part, Entry)]
 
     def pack(self) -> bytes:
         """Current values."""
-        return self._struct.pack(*[read() for read in self._readers])
+        # The getters are looked up on every call: a restart of the firmware replaces them.
+        values = [
+            entry.value if entry.getter is None else entry.getter() for entry in self._entries
+        ]
+        try:
+            return self._struct.pack(*values)
+        except struct.error:  # a value beyond its type wraps around as a counter does
+            return self._struct.pack(*[entry.current() for entry in self._entries])
 
     def unpack(self, data: bytes) -> None:  # noqa: ARG002 - the seam's signature
         """Inputs cannot be written."""
         raise SdoAbort(ABORT_NOT_MAPPABLE)
-
-
-def _reader(entry: Entry) -> Callable[[], Raw]:
-    # The getter is looked up on every call: a restart of the firmware replaces it.
-    if entry.getter is None or entry.wrap is None:
-        return entry.current
-    low, span = entry.wrap
-
-    def read() -> int:
-        return (int(entry.getter()) - low) % span + low if entry.getter else 0
-
-    return read
 
 
 class OutputImage:
@@ -94,7 +88,7 @@ class OutputImage:
         self._entries = [part for part in parts if isinstance(part, Entry)]
         self._od = od
         self._arrived = arrived
-        self._last: tuple[Number, ...] | None = None
+        self._last: bytes | None = None
         self._writes = -1
 
     def pack(self) -> bytes:
@@ -103,11 +97,10 @@ class OutputImage:
 
     def unpack(self, data: bytes) -> None:
         """Take over one cycle's outputs; set-points first, the control word last."""
-        values = self._struct.unpack(data)
         # Process data overrule what another access wrote in between.
-        if values != self._last or self._writes != self._od.writes:
-            self._last, self._writes = values, self._od.writes
-            self._take(values)
+        if data != self._last or self._writes != self._od.writes:
+            self._last, self._writes = data, self._od.writes
+            self._take(self._struct.unpack(data))
         self._arrived()
 
     def _take(self, values: tuple[Number, ...]) -> None:

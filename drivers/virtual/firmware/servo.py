@@ -138,7 +138,7 @@ class VirtualServo:
 
     def _run_to(self, t_ns: int) -> None:
         axis = self.axis
-        left = (t_ns - (self._start_ns or 0)) // k.STEP_NS - int(axis.s[k.S_STEP])
+        left = (t_ns - (self._start_ns or 0)) // k.STEP_NS - int(axis.s.item(k.S_STEP))
         while left > 0:
             left -= axis.run(left)
             events = axis.events
@@ -305,8 +305,11 @@ class VirtualServo:
 
     def take_emergencies(self) -> list[Emergency]:
         """Emergencies since the last call."""
-        taken = list(self.control.faults.emergencies)
-        self.control.faults.emergencies.clear()
+        waiting = self.control.faults.emergencies
+        if not waiting:
+            return []
+        taken = list(waiting)
+        waiting.clear()
         return taken
 
     def inject(self, what: str, value: float = 1.0) -> None:

@@ -6,7 +6,7 @@ It knows no time of its own and no drive; what a write sets off is told to `Cont
 from __future__ import annotations
 
 import struct
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from drivers.virtual.wires.ethercat import registers as reg
 from drivers.virtual.wires.ethercat.dc import DistributedClock
@@ -16,6 +16,7 @@ from drivers.virtual.wires.ethercat.syncmanager import Fmmu, SyncManager, parse_
 _FMMUS, _SYNC_MANAGERS = 4, 4
 _FMMU_END = reg.FMMU + 16 * _FMMUS
 _SM_END = reg.SYNC_MANAGER + 8 * _SYNC_MANAGERS
+_REACHES = 64
 _DC_SUPPORTED = 0x000C  # bit 2: distributed clocks, bit 3: 64 bits wide
 
 
@@ -27,6 +28,18 @@ def _writable_mask() -> bytes:
 
 
 _WRITABLE = _writable_mask()
+
+
+class _Reach(NamedTuple):
+    """What of one slave a logical datagram reaches: bytes to write and to read, and single bits.
+
+    A pair of bytes is the place in the datagram and the physical address.
+    """
+
+    writes: tuple[tuple[slice, int], ...]
+    reads: tuple[tuple[slice, int], ...]
+    bit_writes: tuple[Fmmu, ...]
+    bit_reads: tuple[Fmmu, ...]
 
 
 class ControllerEvents(Protocol):
@@ -59,6 +72,7 @@ class Controller:
         self._events = events
         self._dc = dc
         self._fmmus: list[Fmmu] = []
+        self._reaches: dict[tuple[int, int], _Reach] = {}
         self._active: list[SyncManager] = []
 
     def power_on(self, has_dc: bool) -> None:
@@ -82,6 +96,7 @@ class Controller:
             sm.locked = True
         self.show_sync_managers()
         self._fmmus, self._active = [], []
+        self._reaches.clear()
         self._has_dc = has_dc
 
     # -- what the slave shows -------------------------------------------------------------------
@@ -164,10 +179,11 @@ class Controller:
         return True
 
     def _write_registers(self, address: int, data: bytes, now_ns: int) -> None:
-        for at, value in enumerate(data, address):
-            if at < reg.RAM and _WRITABLE[at]:
-                self.memory[at] = value
         end = address + len(data)
+        if _WRITABLE.find(1, address, end) >= 0:
+            for at, value in enumerate(data, address):
+                if at < reg.RAM and _WRITABLE[at]:
+                    self.memory[at] = value
         if end > reg.DC_RECEIVE_TIMES:
             self._clock_written(address, data, now_ns)
         if address >= reg.DC_RECEIVE_TIMES:
@@ -252,6 +268,7 @@ class Controller:
                 self.memory[at] = value
         raws = (bytes(self.memory[at : at + 16]) for at in range(reg.FMMU, _FMMU_END, 16))
         self._fmmus = [f for f in map(parse_fmmu, raws) if f]
+        self._reaches.clear()
 
     # -- logical access -------------------------------------------------------------------------
 
@@ -262,21 +279,48 @@ class Controller:
 
         Writes take the bytes as they came in; only then are inputs put into ``data``.
         """
-        end = address + len(data)
+        reach = self._reaches.get((address, len(data)))
+        if reach is None:
+            reach = self._reach(address, len(data))
         wrote = read = False
-        for fmmu in self._fmmus if writing else ():
-            if fmmu.writes and fmmu.start < end and fmmu.end > address:
-                wrote |= self._logical_write(fmmu, address, data, now_ns)
-        for fmmu in self._fmmus if reading else ():
-            if fmmu.reads and fmmu.start < end and fmmu.end > address:
-                read |= self._logical_read(fmmu, address, data, now_ns)
+        if writing:
+            for place, physical in reach.writes:
+                wrote |= self.write(physical, bytes(data[place]), now_ns)
+            for fmmu in reach.bit_writes:
+                wrote |= self._write_bits(fmmu, address, data, now_ns)
+        if reading:
+            for place, physical in reach.reads:
+                part = self.read(physical, place.stop - place.start, now_ns)
+                if part is not None:
+                    data[place] = part
+                    read = True
+            for fmmu in reach.bit_reads:
+                read |= self._read_bits(fmmu, address, data, now_ns)
         return read, wrote
 
-    def _logical_write(self, fmmu: Fmmu, address: int, data: bytearray, now_ns: int) -> bool:
-        if fmmu.bytewise:
-            low, high = max(address, fmmu.start), min(address + len(data), fmmu.end)
-            part = bytes(data[low - address : high - address])
-            return self.write(fmmu.physical + low - fmmu.start, part, now_ns)
+    def _reach(self, address: int, length: int) -> _Reach:
+        """What a logical datagram reaches here, worked out once for all its cycles."""
+        end = address + length
+        meant = [f for f in self._fmmus if f.start < end and f.end > address]
+
+        def place(fmmu: Fmmu) -> tuple[slice, int]:
+            low, high = max(address, fmmu.start), min(end, fmmu.end)
+            return slice(low - address, high - address), fmmu.physical + low - fmmu.start
+
+        whole = [f for f in meant if f.bytewise]
+        bits = [f for f in meant if not f.bytewise]
+        reach = _Reach(
+            tuple(place(f) for f in whole if f.writes),
+            tuple(place(f) for f in whole if f.reads),
+            tuple(f for f in bits if f.writes),
+            tuple(f for f in bits if f.reads),
+        )
+        if len(self._reaches) >= _REACHES:
+            self._reaches.clear()
+        self._reaches[address, length] = reach
+        return reach
+
+    def _write_bits(self, fmmu: Fmmu, address: int, data: bytearray, now_ns: int) -> bool:
         done = False
         for bit, place in fmmu.bits(address, len(data)):
             mask = 1 << place % 8
@@ -292,13 +336,7 @@ class Controller:
                 return sm.data[address - sm.start]
         return self.memory[address]
 
-    def _logical_read(self, fmmu: Fmmu, address: int, data: bytearray, now_ns: int) -> bool:
-        if fmmu.bytewise:
-            low, high = max(address, fmmu.start), min(address + len(data), fmmu.end)
-            part = self.read(fmmu.physical + low - fmmu.start, high - low, now_ns)
-            if part is not None:
-                data[low - address : high - address] = part
-            return part is not None
+    def _read_bits(self, fmmu: Fmmu, address: int, data: bytearray, now_ns: int) -> bool:
         done = False
         for bit, place in fmmu.bits(address, len(data)):
             if (byte := self.read(place // 8, 1, now_ns)) is not None:

@@ -15,6 +15,7 @@ HOP_NS = 600
 """Delay of one slave and its cable; the order of magnitude of real devices."""
 
 _ACTIVE, _SYNC0 = 0x01, 0x02
+_U32, _I64 = struct.Struct("<I"), struct.Struct("<q")
 
 
 class DistributedClock:
@@ -40,12 +41,14 @@ class DistributedClock:
     def local(self, now_ns: int) -> int:
         """Local time: runs since power-on, too fast by ``drift_ppm``, slewed by the master."""
         elapsed = now_ns - self._zero_ns
+        if not self.drift_ppm and not self._slewed_ns:
+            return elapsed
         return elapsed + int(elapsed * self.drift_ppm * 1e-6 + self._slewed_ns)
 
     def system(self, now_ns: int) -> int:
         """System time, modulo 2^64: local time plus the offset that the master has written."""
-        offset = struct.unpack_from("<q", self._memory, reg.DC_SYSTEM_OFFSET)[0]
-        return int(self.local(now_ns) + offset) & 0xFFFF_FFFF_FFFF_FFFF
+        offset: int = _I64.unpack_from(self._memory, reg.DC_SYSTEM_OFFSET)[0]
+        return (self.local(now_ns) + offset) & 0xFFFF_FFFF_FFFF_FFFF
 
     def refresh(self, now_ns: int) -> None:
         """Put the present system time into 910h before the master reads it."""
@@ -66,14 +69,14 @@ class DistributedClock:
 
     def compare(self, received: bytes, now_ns: int) -> None:
         """A write to 910h: the master distributes the reference time (low 32 bits)."""
-        theirs = int.from_bytes(received[:4].ljust(4, b"\0"), "little")
-        delay = struct.unpack_from("<I", self._memory, reg.DC_SYSTEM_DELAY)[0]
+        theirs = int.from_bytes(received[:4], "little")
+        delay = _U32.unpack_from(self._memory, reg.DC_SYSTEM_DELAY)[0]
         raw = (self.system(now_ns) - theirs - delay) & 0xFFFFFFFF
         difference = raw - (1 << 32) if raw & 0x80000000 else raw
         magnitude = min(abs(difference), 0x7FFFFFFF)
         # Bit 31 clear: the local copy is ahead (ETG.1000.4 table 65).
         value = magnitude | (0x80000000 if difference < 0 else 0)
-        struct.pack_into("<I", self._memory, reg.DC_DIFFERENCE, value)
+        _U32.pack_into(self._memory, reg.DC_DIFFERENCE, value)
         if self.drift_ppm and magnitude < 1_000_000:
             self._slewed_ns -= difference / 8.0
 

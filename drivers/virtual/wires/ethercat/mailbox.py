@@ -50,7 +50,8 @@ class Mailbox:
         """Trouble: no answer after this many segments of a segmented transfer."""
         self.open = False
         self._boot = False
-        self._due_ns: int | None = None
+        self.due_ns: int | None = None
+        """When a request under way will be answered."""
         self._request = b""
         self._queue: deque[bytes] = deque()
         self._last_sent = b""
@@ -59,11 +60,6 @@ class Mailbox:
         inbox.on_written = self._written
         outbox.on_read = self._send_next
         self._now_ns = 0
-
-    @property
-    def due_ns(self) -> int | None:
-        """When a request under way will be answered."""
-        return self._due_ns
 
     def start(self, *, boot: bool = False) -> None:
         """Pre-Op or Boot is entered from below: fresh counters, empty boxes."""
@@ -76,7 +72,7 @@ class Mailbox:
         self._outbox.reset()
         self._outbox.repeat_ack = self._outbox.repeat_request
         self._queue.clear()
-        self._due_ns = None
+        self.due_ns = None
         self._last_counter = self._counter = 0
         self._last_sent = b""
         self._coe.reset()
@@ -86,7 +82,7 @@ class Mailbox:
         self.open = False
         self._inbox.locked = self._outbox.locked = True
         self._inbox.full = self._outbox.full = False
-        self._due_ns = None
+        self.due_ns = None
         self._queue.clear()
 
     def at(self, now_ns: int) -> None:
@@ -96,8 +92,8 @@ class Mailbox:
     def run(self, now_ns: int) -> None:
         """Answer the request that is due, then take the next one."""
         self._now_ns = now_ns
-        while self._due_ns is not None and self._due_ns <= now_ns:
-            done_ns, self._due_ns = self._due_ns, None
+        while self.due_ns is not None and self.due_ns <= now_ns:
+            done_ns, self.due_ns = self.due_ns, None
             self._answer(self._request)
             self._take(done_ns)
 
@@ -117,7 +113,7 @@ class Mailbox:
     # -- requests -------------------------------------------------------------------------------
 
     def _written(self) -> None:
-        if self._due_ns is None:
+        if self.due_ns is None:
             self._take(self._now_ns)
 
     def _take(self, now_ns: int) -> None:
@@ -129,7 +125,7 @@ class Mailbox:
             return
         self._last_counter = counter
         self._request = message
-        self._due_ns = now_ns + self.delay_ns
+        self.due_ns = now_ns + self.delay_ns
         if not self.delay_ns:
             self.run(now_ns)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import heapq
 import os
-import selectors
+import select
 import socket
 import struct
 import time
@@ -95,18 +95,21 @@ class SegmentServer:
 
     def run(self) -> None:
         """Serve. Returns when told to stop."""
-        with selectors.DefaultSelector() as selector:
-            wire = selector.register(self._socket, selectors.EVENT_READ)
-            selector.register(self._commands, selectors.EVENT_READ)
+        with select.epoll() as waiting:
+            wire = self._socket.fileno()
+            waiting.register(wire, select.EPOLLIN)
+            waiting.register(self._commands, select.EPOLLIN)
             self._control.ready()
             while not self._control.stopped:
-                events = selector.select(self._wait_s())
-                for key, _ in events:
-                    if key.fd == wire.fd:
-                        self._drain()
+                events = waiting.poll(self._wait_s())
+                for descriptor, _ in events:
+                    if descriptor == wire:
+                        # One at a time: where one follows the other's answer none waits behind.
+                        self._answer()
                     elif not self._command():
                         return
-                self._finish_late()
+                if self._late:
+                    self._finish_late()
                 if not events:
                     self._segment.settle()
 
@@ -139,19 +142,23 @@ class SegmentServer:
     def _drain(self) -> None:
         """All frames that wait, at most a batch, so that commands are heard too."""
         for _ in range(64):
-            try:
-                frame, ancillary, _, _ = self._socket.recvmsg(_LONGEST, 64)
-            except BlockingIOError:
+            if not self._answer():
                 return
-            except OSError:
-                return  # the interface was switched off; it may come back
-            reply = self._segment.process_frame(frame, _age_ns(ancillary))
-            if self._segment.hold_ns:
-                self._postpone(self._segment.hold_ns, frame, is_reply=False)
-            elif reply is not None and self._segment.reply_delay_ns:
-                self._postpone(self._segment.reply_delay_ns, reply, is_reply=True)
-            elif reply is not None:
-                self._send(reply)
+
+    def _answer(self) -> bool:
+        """The next frame that waits; False if there is none."""
+        try:
+            frame, ancillary, _, _ = self._socket.recvmsg(_LONGEST, 64)
+        except OSError:
+            return False  # none, or the interface was switched off; it may come back
+        reply = self._segment.process_frame(frame, _age_ns(ancillary))
+        if self._segment.hold_ns:
+            self._postpone(self._segment.hold_ns, frame, is_reply=False)
+        elif reply is not None and self._segment.reply_delay_ns:
+            self._postpone(self._segment.reply_delay_ns, reply, is_reply=True)
+        elif reply is not None:
+            self._send(reply)
+        return True
 
     def _postpone(self, delay_ns: int, frame: bytes, is_reply: bool) -> None:
         self._sequence += 1

@@ -112,16 +112,13 @@ class Slave:
         """Let everything happen that is due up to ``now_ns``, in the order of time."""
         self.process.skip_to(now_ns)
         while True:
-            tick = self.process.next_tick_ns or _NEVER
-            mailbox = self.mailbox.due_ns
-            state = self.al.due_ns
-            dog = self._watchdog_due()
-            event = min(
-                tick,
-                _NEVER if mailbox is None else mailbox,
-                _NEVER if state is None else state,
-                dog,
-            )
+            event = tick = self.process.next_tick_ns or _NEVER
+            if (dog := self._watchdog_due()) < event:
+                event = dog
+            if (mailbox := self.mailbox.due_ns) is not None and mailbox < event:
+                event = mailbox
+            if (state := self.al.due_ns) is not None and state < event:
+                event = state
             due = min(event, self._housekeeping_ns)
             if due > now_ns:
                 break

@@ -38,32 +38,17 @@ class SyncManager:
     data: bytearray = field(default_factory=bytearray)
     on_written: Callable[[], None] = _ignore
     on_read: Callable[[], None] = _ignore
+    end: int = field(default=0, init=False)
+    """First address behind the buffer."""
+    enabled: bool = field(default=False, init=False)
+    """Switched on by the master."""
+    mailbox: bool = field(default=False, init=False)
+    """Mailbox mode rather than three buffers."""
+    writable: bool = field(default=False, init=False)
+    """The master writes, the slave reads."""
+    watches: bool = field(default=False, init=False)
+    """Writing triggers the process-data watchdog."""
     _opened: bool = False
-
-    @property
-    def end(self) -> int:
-        """First address behind the buffer."""
-        return self.start + self.length
-
-    @property
-    def enabled(self) -> bool:
-        """Switched on by the master."""
-        return bool(self.activate & _ENABLE) and self.length > 0
-
-    @property
-    def mailbox(self) -> bool:
-        """Mailbox mode rather than three buffers."""
-        return self.control & 0x03 == _MODE_MAILBOX
-
-    @property
-    def writable(self) -> bool:
-        """The master writes, the slave reads."""
-        return self.control & 0x0C == _DIRECTION_WRITE
-
-    @property
-    def watches(self) -> bool:
-        """Writing triggers the process-data watchdog."""
-        return bool(self.control & _WATCHDOG_TRIGGER)
 
     @property
     def repeat_request(self) -> bool:
@@ -75,6 +60,11 @@ class SyncManager:
         before = (self.start, self.length, self.control, self.activate & _ENABLE)
         self.start, self.length, self.control = struct.unpack_from("<HHB", raw)
         self.activate = raw[6]
+        self.end = self.start + self.length
+        self.enabled = bool(self.activate & _ENABLE) and self.length > 0
+        self.mailbox = self.control & 0x03 == _MODE_MAILBOX
+        self.writable = self.control & 0x0C == _DIRECTION_WRITE
+        self.watches = bool(self.control & _WATCHDOG_TRIGGER)
         if before != (self.start, self.length, self.control, self.activate & _ENABLE):
             self.reset()
 
@@ -146,17 +136,14 @@ class Fmmu:
 
     start: int
     length: int
+    end: int
+    """First logical byte address behind it."""
     start_bit: int
     stop_bit: int
     physical: int
     physical_bit: int
     reads: bool
     writes: bool
-
-    @property
-    def end(self) -> int:
-        """First logical byte address behind it."""
-        return self.start + self.length
 
     @property
     def bytewise(self) -> bool:
@@ -181,6 +168,6 @@ def parse_fmmu(raw: bytes) -> Fmmu | None:
     if not active & 1 or not length:
         return None
     return Fmmu(
-        start, length, start_bit & 7, stop_bit & 7, physical, physical_bit & 7,
+        start, length, start + length, start_bit & 7, stop_bit & 7, physical, physical_bit & 7,
         bool(kind & 1), bool(kind & 2),
     )  # fmt: skip
