@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from drivers.ethercat.gridphase import GridPhase
 from drivers.ethercat.mapping import Entry
 from drivers.ethercat.playback import AxisLoop, Phase
 from drivers.ethercat.ring import RESYNCED, VALID, Ring
@@ -104,7 +105,7 @@ class CyclicLoop:
         self._fd = segment.socket_fd
         self._distrust = max(round(DISTRUST_S * 1e9 / cycle_ns), _DISTRUST_CYCLES)
         self._invalid_run = 0
-        self._integral_ns = 0.0
+        self._phase = GridPhase(cycle_ns)
         self._late_ns = 0
         self._resynced = 0
         self._lockstep = lockstep
@@ -268,20 +269,12 @@ class CyclicLoop:
         return parts
 
     def _follow_clock(self) -> int:
-        """Correction of the grid so that frames pass half a cycle before SYNC0.
-
-        A PI controller on the reference clock's time in the frame, limited to 2 % of a cycle.
-        """
-        cycle = self.cycle_ns
-        phase = (self._master.dc_time - cycle // 2) % cycle
-        error = phase - cycle if phase > cycle // 2 else phase
+        """Correction of the grid so that frames pass half a cycle before SYNC0."""
+        error = self._phase.error_ns(self._master.dc_time, self._late_ns)
         self.counters.dc_deviation_ns = error
         if abs(error) > self.counters.dc_deviation_max_ns and self.number > 2000:
             self.counters.dc_deviation_max_ns = abs(error)
-        limit = cycle / 50
-        self._integral_ns = min(max(self._integral_ns + error * 0.0005, -limit), limit)
-        correction: float = min(max(error * 0.05 + self._integral_ns, -limit), limit)
-        return -round(correction)
+        return self._phase.correction_ns(error)
 
 
 def percentile_us(late: list[int], fraction: float) -> int:

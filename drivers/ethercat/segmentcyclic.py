@@ -24,7 +24,7 @@ from drivers.link import CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
 from profiles.schema import Profile
 
 _ANSWER_S, _CONFIGURE_S, _START_S, _STOP_S = 5.0, 60.0, 25.0, 15.0
-_DRAIN_S = 0.025
+_DRAIN_S = 0.04
 _RENEW_S, _PATIENCE = 0.05, 10
 WATCHDOG_MS = 50.0
 """Process-data watchdog in the slaves: with braking well below the 200 ms that are allowed."""
@@ -334,21 +334,23 @@ class EthercatCyclic:
 
     async def _drain(self, reader: RingReader) -> None:
         names = tuple(self._fields)
-        dropped = 0
+        lost = 0
         expected = -1
         try:
             while True:
                 await asyncio.sleep(_DRAIN_S)
-                taken, lost = reader.drain()
-                dropped += lost
+                taken, overwritten = reader.drain()
+                lost += overwritten
                 for part in contiguous(taken):
                     first = int(part["cycle"][0])
-                    if expected >= 0 and not lost:
-                        dropped += max(first - expected, 0)
-                    elif expected < 0 and self._last_ns:
-                        dropped += self._missed(int(part["time_ns"][0]))
+                    if expected >= 0:
+                        # Overwritten ones are among them, and what the bus left out between them.
+                        dropped = max(first - expected, 0)
+                    else:
+                        before = self._missed(int(part["time_ns"][0])) if self._last_ns else 0
+                        dropped = max(lost, before)
                     self._deliver(names, part, dropped)
-                    expected, dropped, lost = int(part["cycle"][-1]) + 1, 0, 0
+                    expected, lost = int(part["cycle"][-1]) + 1, 0
                     self._last_ns = int(part["time_ns"][-1])
         finally:
             reader.release()
