@@ -14,6 +14,7 @@ import {
   type Page,
   useRoute,
 } from './router'
+import { FaultElsewhere } from './FaultElsewhere'
 import { LeaseControl, LeaseNotices } from './LeaseControl'
 import { PointerLayer } from './PointerLayer'
 import { Preferences } from './Preferences'
@@ -69,6 +70,7 @@ export function Frame({ children }: { children: ReactNode }) {
         <AxisPicker />
         <div className="top-status">
           <StateBadge />
+          <FaultElsewhere chosen={chosen} />
           <LinkBadge />
           <LeaseControl drive={chosen} />
         </div>

@@ -1,5 +1,6 @@
 import { axis } from './texts/axis'
 import { bench } from './texts/bench'
+import { drive } from './texts/drive'
 import { frame } from './texts/frame'
 import { functions } from './texts/functions'
 import { library } from './texts/library'
@@ -18,6 +19,7 @@ export const catalogue = {
   ...frame,
   ...bench,
   ...axis,
+  ...drive,
   ...functions,
   ...parameters,
   ...people,

@@ -2,7 +2,7 @@ import { Button, Checkbox, Modal } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../api/client'
 import type { JobInfo, ProcedureInfo } from '../api/schema'
-import { useT } from '../i18n'
+import { known, useT } from '../i18n'
 import { setJob, useLink } from '../live/store'
 import { JobNote, useJobEnd } from './JobNote'
 import { Panel } from './Panel'
@@ -41,7 +41,7 @@ export function Procedures({ drive }: { drive: string }) {
       <div className="row wrap">
         {list.map((each) => (
           <Button key={each.name} onClick={() => setChosen(each)}>
-            {each.title}
+            {known(t, 'procedure', each.title)}
           </Button>
         ))}
       </div>
@@ -87,7 +87,7 @@ export function ProcedureDialog({
     if (ok) onClose()
   }
   return (
-    <Modal opened onClose={onClose} title={procedure.title}>
+    <Modal opened onClose={onClose} title={known(t, 'procedure', procedure.title)}>
       <p>{procedure.help}</p>
       {procedure.warning && <p className="note warn">{procedure.warning}</p>}
       {procedure.requires_stop && <p>{t('procedures.stopped')}</p>}

@@ -2,6 +2,7 @@ import type { Texts } from '../types'
 
 /** Frame, states, and words used everywhere. */
 export const frame = {
+  'frame.faultElsewhere': ['Fault on {names}: show it', '{names} 有故障：查看'],
   'stop.label': ['STOP', '停止'],
   'stop.help': ['Stop all axes (Esc)', '停止所有轴（Esc）'],
   'stop.sent': ['STOP sent. Waiting for the answer…', '已发送停止命令，等待应答…'],

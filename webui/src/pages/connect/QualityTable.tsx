@@ -1,5 +1,6 @@
 import type { Quality } from '../../api/schema'
-import { useT } from '../../i18n'
+import { known, useT } from '../../i18n'
+import { figures } from './figures'
 
 const COUNTERS = [
   'transactions',
@@ -14,11 +15,12 @@ const COUNTERS = [
 /** Counters of a link since it was opened; what is wrong stands out. */
 export function QualityTable({ quality }: { quality: Quality }) {
   const t = useT()
+  const state = quality.state || (quality.connected ? 'open' : 'not open')
   return (
     <dl className="counters">
       <div>
         <dt>{t('quality.state')}</dt>
-        <dd>{quality.state}</dd>
+        <dd>{known(t, 'quality.is', state)}</dd>
       </div>
       {COUNTERS.map((name) => (
         <div key={name} className={name !== 'transactions' && quality[name] > 0 ? 'warn-text' : ''}>
@@ -26,18 +28,48 @@ export function QualityTable({ quality }: { quality: Quality }) {
           <dd className="num">{quality[name]}</dd>
         </div>
       ))}
-      <div>
-        <dt>{t('quality.round_trip')}</dt>
-        <dd className="num">
-          {quality.round_trip_ms === null ? '—' : `${quality.round_trip_ms.toFixed(2)} ms`}
-        </dd>
-      </div>
-      {Object.entries(quality.details).map(([name, value]) => (
+      {quality.round_trip_ms !== null && (
+        <div>
+          <dt>{t('quality.round_trip')}</dt>
+          <dd className="num">{quality.round_trip_ms.toFixed(2)} ms</dd>
+        </div>
+      )}
+      {figures(quality.details).map(({ name, words, value, unit }) => (
         <div key={name}>
-          <dt>{name}</dt>
-          <dd className="num">{value}</dd>
+          <dt>{name in NAMED ? t(NAMED[name as keyof typeof NAMED]) : words}</dt>
+          <dd className="num">
+            {known(t, 'quality.is', value)} {unit}
+          </dd>
         </div>
       ))}
     </dl>
   )
 }
+
+/** What only some links count. */
+const NAMED = {
+  baudrate: 'quality.baudrate',
+  parity: 'quality.parity',
+  echo: 'quality.echo',
+  losses: 'quality.losses',
+  refusals: 'quality.refusals',
+  late_checks: 'quality.lateChecks',
+  late_answers: 'quality.lateAnswers',
+  stray_answers: 'quality.strayAnswers',
+  host_restarts: 'quality.hostRestarts',
+  late_frames: 'quality.lateFrames',
+  frames_received: 'quality.framesReceived',
+  frames_sent: 'quality.framesSent',
+  error_frames: 'quality.errorFrames',
+  bus_offs: 'quality.busOffs',
+  reopened: 'quality.reopened',
+  boots: 'quality.boots',
+  emergencies: 'quality.emergencies',
+  cycles: 'quality.cycles',
+  skipped_cycles: 'quality.skippedCycles',
+  incomplete_samples: 'quality.incompleteSamples',
+  sync_late_p50_us: 'quality.syncLate50',
+  sync_late_p99_us: 'quality.syncLate99',
+  sync_late_max_us: 'quality.syncLateMax',
+  cyclic_bus_load_percent: 'quality.busLoad',
+} as const

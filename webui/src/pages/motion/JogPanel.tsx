@@ -1,7 +1,7 @@
 import { type KeyboardEvent, type PointerEvent, useRef } from 'react'
 import type { AxisState } from '../../api/schema'
 import { known, useT } from '../../i18n'
-import { useLink } from '../../live/store'
+import { useJob, useLink } from '../../live/store'
 import { quantity } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
@@ -31,9 +31,10 @@ export function JogPanel({
     speed !== null && acceleration !== null && travel !== null && torque !== null
       ? { speed, acceleration, travel_limit: travel, torque_limit: torque, unit: unit.name }
       : null
-  const { direction, ended, hold, press } = useJog(drive, settings)
+  const { direction, ended, ending, hold, press } = useJog(drive, settings)
   const running = direction !== null
   const taken = !running && state?.moving_job != null
+  const job = useJob(state?.moving_job ?? null)
   const ready = settings !== null && link.open && (state?.fresh ?? false) && !taken
   const pad = useRef<HTMLDivElement>(null)
   const keys: Record<string, -1 | 1> = { ArrowLeft: -1, ArrowRight: 1 }
@@ -99,7 +100,12 @@ export function JogPanel({
         />
       </div>
       <p className="dim keys-help">{t('jog.keys')}</p>
-      {taken && <p className="warn-text">{t('jog.taken')}</p>}
+      {taken && (
+        // A jog that was let go needs a moment to brake and tidy up, on a slow bus a long one.
+        <p className={ending ? 'dim' : 'warn-text'} role="status">
+          {ending ? t('jog.ending') : t('jog.taken', { title: job?.title ?? '…' })}
+        </p>
+      )}
       {!settings && <p className="warn-text">{t('jog.invalid')}</p>}
       {ended && !ended.problem && (
         <p className="note" role="status">

@@ -17,6 +17,8 @@ export interface JogSettings {
 export function useJog(drive: string, settings: JogSettings | null) {
   const [direction, setDirection] = useState<-1 | 1 | null>(null)
   const [ended, setEnded] = useState<JogEnded | null>(null)
+  /** From the press until the server says that the jog has ended. */
+  const [begun, setBegun] = useState(false)
   const latest = useRef(settings)
   latest.current = settings
   const hold = useMemo(
@@ -26,6 +28,7 @@ export function useJog(drive: string, settings: JogSettings | null) {
           start: (towards) => {
             setEnded(null)
             if (latest.current) {
+              setBegun(true)
               live.jogStart({ type: 'jog_start', drive, direction: towards, ...latest.current })
             }
           },
@@ -53,10 +56,13 @@ export function useJog(drive: string, settings: JogSettings | null) {
     const over = subscribe('jogEnded', () => {
       if (contents.jogEnded?.drive !== drive) return
       setEnded(contents.jogEnded)
+      setBegun(false)
       hold.release('released')
     })
     const turnedDown = subscribe('refused', () => {
-      if (contents.refused?.request === 'jog_start') hold.release('released')
+      if (contents.refused?.request !== 'jog_start') return
+      setBegun(false)
+      hold.release('released')
     })
     document.addEventListener('visibilitychange', hidden)
     window.addEventListener('blur', blur)
@@ -65,6 +71,7 @@ export function useJog(drive: string, settings: JogSettings | null) {
     window.addEventListener('keydown', key, { capture: true })
     return () => {
       hold.release('axis changed')
+      setBegun(false)
       for (const end of [lost, refused, over, turnedDown]) end()
       document.removeEventListener('visibilitychange', hidden)
       window.removeEventListener('blur', blur)
@@ -76,6 +83,7 @@ export function useJog(drive: string, settings: JogSettings | null) {
   return {
     direction,
     ended,
+    ending: begun && direction === null,
     hold,
     press: (to: -1 | 1) => latest.current !== null && hold.press(to),
   }

@@ -2,7 +2,7 @@ import { Button, Checkbox, NativeSelect, TextInput } from '@mantine/core'
 import { useCallback, useDeferredValue, useMemo, useRef, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { DriveSummary, JobInfo, ParameterRow } from '../../api/schema'
-import { useT } from '../../i18n'
+import { known, useT } from '../../i18n'
 import { setJob, useJobs, useReadings } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -64,7 +64,10 @@ export function ParameterTable({
           onChange={(event) => setGroup(event.currentTarget.value || null)}
           data={[
             { value: '', label: t('parameters.allGroups', { count: rows.length }) },
-            ...byGroup.map(([name, count]) => ({ value: name, label: `${name} (${count})` })),
+            ...byGroup.map(([name, count]) => ({
+              value: name,
+              label: `${known(t, 'group', name)} (${count})`,
+            })),
           ]}
         />
         <fieldset className="chips" aria-label={t('parameters.filter')}>

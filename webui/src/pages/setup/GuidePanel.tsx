@@ -2,7 +2,7 @@ import { Button, Checkbox } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { Guide, ProcedureInfo } from '../../api/schema'
-import { useT } from '../../i18n'
+import { known, useT } from '../../i18n'
 import { setJob, useAxisState } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
 import { NumberField } from '../../widgets/NumberField'
@@ -42,7 +42,7 @@ export function GuidePanel({ drive, guide }: { drive: string; guide: Guide }) {
               {step.identifies && <Identify drive={drive} onStarted={setShown} />}
               {procedure && (
                 <Button variant="filled" onClick={() => setChosen(procedure)}>
-                  {procedure.title}: {t('guide.run')}
+                  {known(t, 'procedure', procedure.title)}: {t('guide.run')}
                 </Button>
               )}
             </li>
