@@ -22,6 +22,7 @@ from backend.journal import Journal
 from backend.matching import profile_for
 from backend.measurements import MeasurementStore
 from backend.monitor import Monitor, Snapshot
+from backend.people.identity import by_itself
 from backend.ports import Port
 from backend.readings import Reading
 from backend.records import Records
@@ -97,7 +98,7 @@ class Bench:
                 make = self.wires.get(url)
                 link = make() if make is not None else link_for(url)
                 await link.open()
-                link.listen(lambda event: self._bus_event(url, event))
+                link.listen(lambda event: by_itself().run(self._bus_event, url, event))
                 self.links[url] = link
                 self.journal.add(f"opened {url}")
                 self._drives_changed()

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from backend.axis import Axis
 from backend.faults import active_faults, fault_keys, integer
 from backend.journal import Journal, Level
+from backend.people.identity import by_itself
 from backend.readings import Reading
 from backend.units import AxisUnits
 from drivers import cia402
@@ -82,7 +83,8 @@ class Monitor:
 
     def start(self) -> None:
         """Begin to poll."""
-        self._task = asyncio.create_task(self._run(), name=f"monitor-{self.axis.drive.id}")
+        name = f"monitor-{self.axis.drive.id}"
+        self._task = asyncio.create_task(self._run(), name=name, context=by_itself())
 
     async def close(self) -> None:
         """End polling."""

@@ -221,7 +221,7 @@ class Gate:
             return WrongMethod(f"{method} is not for {path}", methods)
         return NotFound(
             f"there is nothing at {path}",
-            remedy="see /api/v1/openapi.json; a new route must stand in backend/api/rights.py",
+            remedy="check the address; /api/v1/openapi.json lists those that there are",
         )
 
     def _require_csrf(self, scope: Scope, identity: Identity | None, brought: Credentials) -> None:

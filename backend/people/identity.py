@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextvars import ContextVar
+from contextvars import Context, ContextVar, copy_context
 from dataclasses import dataclass
 from typing import Literal
 
@@ -45,6 +45,16 @@ class Actor:
 
 #: The gate sets it; tasks that a request starts inherit it, so a job knows whose it is.
 acting: ContextVar[Actor | None] = ContextVar("acting", default=None)
+
+
+def by_itself() -> Context:
+    """A context of work that outlives the request that began it: nobody is named for what it does.
+
+    Else what a drive does hours later is told of the person who connected it.
+    """
+    context = copy_context()
+    context.run(acting.set, None)
+    return context
 
 
 def acting_person() -> str:
