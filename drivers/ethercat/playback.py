@@ -284,12 +284,25 @@ class AxisLoop:
         ):
             value = self._value(values, index)
             if limit is not None and value is not None and abs(value) > limit:
+                if name == "torque":
+                    self._no_faster_than_it_turns(values)
                 self.stop(_beyond(name, value, limit))
                 return
         if limits.following_error_max is not None:
             error = self._following_error(values)
             if abs(error) > limits.following_error_max:
                 self.stop(_beyond("following error", error, limits.following_error_max))
+
+    def _no_faster_than_it_turns(self, values: Sequence[int]) -> None:
+        """What does not follow (a blocked axis) is braked from its own speed, not from the told.
+
+        Else its loop would push on, and with more and more torque, for as long as it brakes.
+        """
+        assert self._motion is not None
+        actual = self._value(values, _ACTUAL_VELOCITY)
+        if actual is not None and self._motion.target == _VELOCITY:
+            low, high = sorted((0.0, float(self._setpoint)))
+            self._setpoint = min(max(actual, low), high)
 
     def _following_error(self, values: Sequence[int]) -> float:
         told = self._value(values, _FOLLOWING)

@@ -203,6 +203,34 @@ def test_velocity_ramps_down_to_zero() -> None:
     assert bench.axis.outputs[2] == 0
 
 
+@pytest.mark.parametrize(
+    ("turns", "told"),
+    [
+        # Blocked: nothing is left to push with; turned back by its load: as well.
+        (0, 0), (-300, 0),
+        # It lags: braked from where it is. It overtakes: braked from what it was told.
+        (400, 400), (2500, 1000),
+    ],
+)  # fmt: skip
+def test_an_axis_that_takes_too_much_torque_is_braked_from_its_own_speed(
+    turns: int, told: int
+) -> None:
+    bench = Bench().enabled(mode=9)
+    bench.play([1000] * 500, target=0x60FF, limits=Limits(torque_max=300))
+    bench.speed = turns
+    bench.step(3)
+    assert bench.axis.outputs[2] == 1000
+    bench.torque = 301
+    bench.step()
+    assert "torque 301 is beyond the limit of 300" in bench.axis.halted
+    assert bench.axis.phase is Phase.BRAKING
+    cycles = round(STOP_S / CYCLE_S)
+    # The first step of the ramp that ends at standstill.
+    assert bench.axis.outputs[2] == round(told - told / cycles)
+    bench.step(cycles)
+    assert bench.axis.outputs[2] == 0
+
+
 def test_torque_ends_with_a_quick_stop_because_no_torque_does_not_stop_an_axis() -> None:
     bench = Bench().enabled(mode=10)
     bench.play([100] * 1000, target=0x6071)
