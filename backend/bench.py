@@ -17,8 +17,8 @@ from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.drive_list import DriveList, SavedDrive, SavedPort
 from backend.files import StorageFailed
-from backend.jobs import Job, JobRunner, Progress
-from backend.journal import Journal
+from backend.jobs import Job, JobRunner
+from backend.journal import Journal, Level
 from backend.matching import profile_for
 from backend.measurements import MeasurementStore
 from backend.monitor import Monitor, Snapshot
@@ -26,6 +26,7 @@ from backend.people.identity import by_itself
 from backend.ports import Port
 from backend.readings import Reading
 from backend.records import Records
+from backend.returning import Returning
 from backend.scope import ScopeHub
 from drivers.errors import Busy, DriveError, NotAllowed
 from drivers.link import Found, Link, LinkEvent, NeedsProfile
@@ -78,6 +79,7 @@ class Bench:
         self.leases = Leases(self._lease_changed)
         self._witness = Witness(self.audit, self.name_of)
         self.on_job.append(self._witness.job_changed)
+        self.returning = Returning(self)
         self.scope = ScopeHub(lambda drive: self.member(drive).axis)
         self.state_folder = state_folder
         self.axis_records = AxisStore(state_folder / "axes")
@@ -168,7 +170,7 @@ class Bench:
             drive=drive.id if drive else None,
         )
         if drive is not None and event.kind in ("boot", "back"):
-            self._returned(drive.id)
+            self.returning.returned(drive.id)
 
     # --- cyclic exchange --------------------------------------------------------------
 
@@ -331,13 +333,14 @@ class Bench:
             axis,
             self.journal,
             lambda snapshot: self._snapshot(drive_id, snapshot),
-            lambda: self._returned(drive_id),
+            lambda: self.returning.returned(drive_id),
         )
         member = Member(drive, axis, monitor)
         self.members[drive_id] = member
         drive.listen(lambda readings: self._readings(drive_id, readings))
         drive.listen_writes(self._witness.wrote)
         drive.listen_commands(self._witness.commanded)
+        drive.owed.listen(self._drives_changed)
         monitor.start()
         self._remember()
         self.journal.add(f"connected {drive.name} ({drive.profile.title})", drive=drive_id)
@@ -464,6 +467,11 @@ class Bench:
         self._witness.lease_changed(drive_id, self.leases.holder(drive_id))
         self._drives_changed()
 
+    def tell(self, text: str, member: Member, level: Level = "info") -> None:
+        """A line of the journal about a drive; the list of drives may have changed with it."""
+        self.journal.add(text, level=level, drive=member.drive.id)
+        self._drives_changed()
+
     def name_of(self, drive_id: str) -> str:
         """Name of a drive, or its id where it is not on the bench."""
         member = self.members.get(drive_id)
@@ -473,37 +481,6 @@ class Bench:
         for listener in self.on_drives:
             listener()
 
-    def _returned(self, drive_id: str) -> None:
-        """A drive answers again: it may have restarted, so everything is read anew."""
-        member = self.members.get(drive_id)
-        if member is None:
-            return
-        keys = [key for key, r in member.drive.readings.items() if r.raw is not None]
-        member.drive.forget()
-        member.axis.forget()
-
-        async def reread(progress: Progress) -> dict[str, object]:
-            await self._check_identity(member)
-            await member.drive.read_many(keys, progress)
-            return {"parameters": len(keys)}
-
-        self.jobs.start("reread", f"Read {member.drive.name} anew", reread, drive=drive_id)
-
-    async def _check_identity(self, member: Member) -> None:
-        """Notice another drive at this place before anything is written to it."""
-        drive = member.drive
-        known = drive.found.serial if drive.found else None
-        if known is None:
-            return
-        try:
-            await drive.confirm_identity()
-        except NotAllowed:
-            pass
-        else:
-            return
-        self.journal.add(drive.identity_warning, level="error", drive=drive.id)
-        self._drives_changed()
-
     async def accept_identity(self, drive_id: str) -> Member:
         """The user says that the drive at this place is the right one."""
         member = self.member(drive_id)
@@ -511,6 +488,8 @@ class Bench:
         serial = await drive.read_serial()
         drive.found = replace(drive.found or Found(drive.ports[0].station), serial=serial)
         drive.identity_warning = ""
+        # What was left in the drive that was here before is no matter of this one.
+        drive.owed.settle([debt.key for debt in drive.owed.debts])
         self.journal.add(f"{drive.name}: serial number {serial} accepted", drive=drive.id)
         self._remember()
         self._drives_changed()
@@ -556,7 +535,7 @@ class Bench:
                 continue
             if item.serial is not None:
                 member.drive.found = Found(first.station, serial=item.serial)
-                self._returned(member.drive.id)
+                self.returning.returned(member.drive.id)
 
     async def close(self) -> None:
         """Stop what moves, then let go of every bus."""

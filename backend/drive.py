@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
+from backend.owed import Owed
 from backend.ports import Port, address_of, carries
 from backend.readings import CommandRecord, Reading, WriteRecord
 from backend.rest import Rest, Resting
@@ -52,6 +53,7 @@ class Drive:
         self.id = drive_id
         self.name = name
         self.rest = Rest(name)
+        self.owed = Owed()
         self.notes = ""
         self.profile = profile
         self.ports = tuple(ports)
@@ -306,6 +308,7 @@ class Drive:
     def _store(self, readings: list[Reading]) -> None:
         for reading in readings:
             self.readings[reading.key] = reading
+        self.owed.seen(readings)
         self._announce(readings)
 
     # --- writing ---------------------------------------------------------------------
@@ -422,6 +425,7 @@ class Drive:
         after: Raw | None,
         problem: str = "",
     ) -> None:
+        self.owed.sent(parameter.key, wanted, after)
         record = WriteRecord(
             self.id, self.name, parameter.key, parameter.name, before, wanted, after, problem
         )

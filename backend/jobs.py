@@ -111,8 +111,12 @@ class JobRunner:
         motion: bool = False,
         person: str = "",
         stoppable: bool = True,
+        by_person: bool = True,
     ) -> Job:
         """Start work.
+
+        Motion that is not begun ``by_person`` does not ask ``permit``: it takes back no STOP, so
+        it must leave the axis where it is.
 
         Raises:
             Busy: a motion job already holds this axis, or its bus is being changed.
@@ -123,7 +127,7 @@ class JobRunner:
                 drive=drive,
                 remedy="wait for it to end, or stop it",
             )
-        if motion and drive is not None:
+        if motion and by_person and drive is not None:
             self._permit(drive)
         job = Job(
             id=f"{kind}-{self._run_mark}-{next(self._numbers)}",

@@ -15,6 +15,13 @@ from profiles.schema import Raw
 CLEANUP_TIMEOUT_S = 5.0
 
 
+#: What to do about values that could not be put back.
+PUT_BACK_LATER = (
+    "once the drive answers again they are put back while it stands, or offered on its pages; "
+    "look at them before the next motion"
+)
+
+
 class RestoreFailed(DriveError):
     """A cleanup could not put something back; the message lists what."""
 
@@ -61,22 +68,27 @@ async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException
 
 async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
     failed: list[str] = []
+    left = dict(before)
     same = False
-    for key, raw in before.items():
-        try:
-            if (await drive.read(key)).raw != raw:
-                if not same:
-                    # The link may have been lost in between, and another drive be there now.
-                    await drive.confirm_identity()
-                    same = True
-                await drive.write(key, raw)
-        except DriveError as error:
-            failed.append(f"{key} (was {raw}): {error.message}")
+    try:
+        for key, raw in before.items():
+            try:
+                if (await drive.read(key)).raw != raw:
+                    if not same:
+                        # The link may have been lost meanwhile, and another drive be there now.
+                        await drive.confirm_identity()
+                        same = True
+                    await drive.write(key, raw)
+                del left[key]
+            except DriveError as error:
+                failed.append(f"{key} (was {raw}): {error.message}")
+    finally:
+        drive.owed.add(left)
     if failed:
         raise RestoreFailed(
             f"{drive.name}: not restored: {'; '.join(failed)}",
             drive=drive.name,
-            remedy="write these values by hand before the next motion",
+            remedy=PUT_BACK_LATER,
         )
 
 

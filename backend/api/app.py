@@ -24,6 +24,7 @@ from backend.api import (
     routes_io,
     routes_library,
     routes_lists,
+    routes_owed,
     routes_people,
     routes_recordings,
     routes_rerun,
@@ -132,6 +133,7 @@ def make_app(
     for part in (
         routes_bench,
         routes_drive,
+        routes_owed,
         routes_ethercat,
         routes_lists,
         routes_sets,

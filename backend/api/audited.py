@@ -36,6 +36,7 @@ TOLD_THERE = frozenset(
             f"{_DRIVE}/jobs/sequence", f"{_DRIVE}/jobs/generate", f"{_DRIVE}/jobs/home",
             f"{_DRIVE}/jobs/identify", f"{_DRIVE}/jobs/sweep", f"{_DRIVE}/jobs/inertia",
             f"{_DRIVE}/jobs/step", f"{_DRIVE}/jobs/autotune", f"{_DRIVE}/jobs/firmware",
+            f"{_DRIVE}/jobs/put-back",
             f"{_DRIVE}/io/forcing/{{name}}", f"{_DRIVE}/tune/undo",
         ),
         "PUT": (

@@ -111,6 +111,15 @@ def drive_summary(
         identity_warning=drive.identity_warning,
         unsaved=len(drive.unsaved),
         pending=len(drive.pending),
+        owed=[
+            models.OwedValue(
+                key=debt.key,
+                name=drive.parameter(debt.key).name,
+                raw=debt.raw,
+                unapplied=debt.unapplied,
+            )
+            for debt in drive.owed.debts
+        ],
         lease=lease(bench, drive.id, connection),
         quality=quality(drive.quality()),
     )

@@ -211,6 +211,15 @@ class Lease(Message):
     )
 
 
+class OwedValue(Message):
+    """A parameter that a motion changed and could not put back, as the link was lost."""
+
+    key: str
+    name: str
+    raw: float | str = Field(description="what it was before; writing it puts it back")
+    unapplied: bool = Field(description="it is back, but does not act yet")
+
+
 class DriveSummary(Message):
     """A drive of the bench."""
 
@@ -228,6 +237,7 @@ class DriveSummary(Message):
     identity_warning: str = Field(description="non-empty when another drive answers here")
     unsaved: int = Field(description="parameters in the drive but not in its memory")
     pending: int = Field(description="parameters waiting for write-settings, enable or power-off")
+    owed: list[OwedValue] = Field(description="what a motion could not put back")
     lease: Lease
     quality: Quality
 

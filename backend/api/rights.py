@@ -114,6 +114,8 @@ _API: dict[str, Need] = {
     "PUT /drives/{drive_id}/parameters": _PARAMETERS,
     "GET /drives/{drive_id}/parameters/{key}": _LOOK,
     "PUT /drives/{drive_id}/parameters/{key}": _PARAMETERS,
+    "POST /drives/{drive_id}/jobs/put-back": _PARAMETERS,
+    "DELETE /drives/{drive_id}/owed": _PARAMETERS,
     "GET /drives/{drive_id}/procedures": _LOOK,
     "POST /drives/{drive_id}/procedures/{name}": _MOTION,
     "GET /drives/{drive_id}/homing-methods": _LOOK,

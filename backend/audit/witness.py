@@ -14,7 +14,7 @@ from backend.readings import CommandRecord, WriteRecord
 
 #: Jobs that only read what the pages show anyway.
 _UNREMARKABLE = frozenset({"reread", "read_all"})
-_KINDS: dict[str, Kind] = {"procedure": "procedure", "load_set": "job"}
+_KINDS: dict[str, Kind] = {"procedure": "procedure", "load_set": "job", "put-back": "job"}
 
 
 @dataclass(slots=True)

@@ -7,10 +7,11 @@ from contextlib import asynccontextmanager
 
 from backend.axis import Axis
 from backend.jobs import Progress
-from backend.restoring import CLEANUP_TIMEOUT_S, RestoreFailed, shielded
+from backend.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
 from backend.tools.procedures import run_procedure
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
+from profiles.schema import Raw
 
 
 async def make_effective(axis: Axis) -> None:
@@ -59,7 +60,7 @@ async def write_settings(axis: Axis, values: Mapping[str, int]) -> dict[str, int
     return before
 
 
-async def put_back(axis: Axis, before: Mapping[str, int]) -> None:
+async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
     """Write these raw values where they differ, and make them act.
 
     Raises:
@@ -67,24 +68,36 @@ async def put_back(axis: Axis, before: Mapping[str, int]) -> None:
     """
     drive = axis.drive
     failed: list[str] = []
-    changed = False
-    for key, raw in before.items():
-        try:
-            if await drive.raw(key) != raw:
-                await drive.write(key, raw)
-                changed = True
-        except DriveError as error:
-            failed.append(f"{key} (was {raw}): {error.message}")
+    left = dict(before)
+    changed = drive.owed.unapplied
+    try:
+        for key, raw in before.items():
+            try:
+                if (await drive.read(key)).raw != raw:
+                    await drive.write(key, raw)
+                    changed = True
+                del left[key]
+            except DriveError as error:
+                failed.append(f"{key} (was {raw}): {error.message}")
+    finally:
+        # When this is cut off in the middle, too, it is known what is missing.
+        drive.owed.add(left)
+    back = {key: raw for key, raw in before.items() if key not in left}
     if changed or drive.pending:
         try:
             await make_effective(axis)
-        except DriveError as error:
+        except BaseException as error:
+            drive.owed.add(back, unapplied=True)
+            back = {}
+            if not isinstance(error, DriveError):
+                raise
             failed.append(f"write settings: {error.message}")
+    drive.owed.settle(back)
     if failed:
         raise RestoreFailed(
             f"{drive.name}: not restored: {'; '.join(failed)}",
             drive=drive.name,
-            remedy="write these values by hand before the next motion",
+            remedy=PUT_BACK_LATER,
         )
 
 

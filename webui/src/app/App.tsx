@@ -3,6 +3,7 @@ import { Component, type ReactNode, Suspense, useEffect } from 'react'
 import { useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useDrives, useLink } from '../live/store'
+import { OwedNote } from '../widgets/OwedNote'
 import { Frame } from './Frame'
 import { AXIS, BENCH, fetchAhead } from './pages'
 import { isAxisPage, useRoute } from './router'
@@ -61,6 +62,7 @@ function Page() {
   const Shown = AXIS[page]
   return (
     <Guard key={`${page} ${drive}`}>
+      <OwedNote drive={drive} />
       <Shown drive={drive} />
     </Guard>
   )

@@ -1,0 +1,85 @@
+"""What was changed for the length of a motion and could not be put back: owed to the drive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+
+from backend.readings import Reading
+from profiles.schema import Raw
+
+
+@dataclass(frozen=True, slots=True)
+class Debt:
+    """One parameter that may still hold what was meant for a while; raw values.
+
+    ``left`` is what it holds if nobody changed it since: empty where that is not known.
+    ``unapplied``: the value is back, but the drive has not been told to act on it.
+    """
+
+    key: str
+    raw: Raw
+    left: frozenset[Raw]
+    unapplied: bool = False
+
+
+class Owed:
+    """The debts to one drive, in the order in which they arose. For the event loop."""
+
+    def __init__(self) -> None:
+        self._debts: dict[str, Debt] = {}
+        self._sent: dict[str, frozenset[Raw]] = {}
+        self._listeners: list[Callable[[], None]] = []
+
+    def __bool__(self) -> bool:
+        return bool(self._debts)
+
+    def listen(self, listener: Callable[[], None]) -> None:
+        """Call ``listener`` after every change of the list."""
+        self._listeners.append(listener)
+
+    @property
+    def debts(self) -> tuple[Debt, ...]:
+        """All that is owed."""
+        return tuple(self._debts.values())
+
+    @property
+    def unapplied(self) -> bool:
+        """Something that is back does not act yet."""
+        return any(debt.unapplied for debt in self._debts.values())
+
+    def add(self, values: Mapping[str, Raw], *, unapplied: bool = False) -> None:
+        """These raw values could not be put back, or (``unapplied``) not made to act."""
+        for key, raw in values.items():
+            known = self._debts.get(key)
+            left = self._sent.get(key, frozenset())
+            self._debts[key] = Debt(key, raw, left | (known.left if known else left), unapplied)
+        if values:
+            self._changed()
+
+    def sent(self, key: str, wanted: Raw, after: Raw | None) -> None:
+        """A write went out; ``after`` is what was read back, None where that is not known.
+
+        Whoever writes something else to what is owed has other plans: it is offered, not done.
+        """
+        earlier = self._sent.get(key, frozenset())
+        self._sent[key] = earlier | {wanted} if after is None else frozenset({after})
+        debt = self._debts.get(key)
+        if debt is not None and wanted != debt.raw:
+            self._debts[key] = replace(debt, left=frozenset())
+
+    def seen(self, readings: Iterable[Reading]) -> None:
+        """What a drive holds as it should is owed no longer."""
+        debts = self._debts
+        gone = [r.key for r in readings if r.key in debts and r.raw == debts[r.key].raw]
+        self.settle([key for key in gone if not debts[key].unapplied])
+
+    def settle(self, keys: Iterable[str]) -> None:
+        """These are back, or shall stay as they are."""
+        gone = [key for key in keys if self._debts.pop(key, None) is not None]
+        if gone:
+            self._changed()
+
+    def _changed(self) -> None:
+        for listener in self._listeners:
+            listener()

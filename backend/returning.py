@@ -1,0 +1,78 @@
+"""What is done when a drive answers again: nothing that was known of it may be believed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from backend.jobs import Job, JobResult, Progress
+from backend.tools.settling import settle
+from drivers.errors import NotAllowed
+
+if TYPE_CHECKING:
+    from backend.bench import Bench, Member
+
+
+class Returning:
+    """For the drives of one bench."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+
+    def returned(self, drive_id: str) -> None:
+        """It may have restarted, so everything is read anew, and what is owed to it is put back."""
+        member = self._bench.members.get(drive_id)
+        if member is None:
+            return
+        drive = member.drive
+        keys = [key for key, r in drive.readings.items() if r.raw is not None]
+        drive.forget()
+        member.axis.forget()
+
+        async def reread(progress: Progress) -> JobResult:
+            if await self._is_the_same(member) and drive.owed:
+                await self._settled(member)
+            await drive.read_many(keys, progress)
+            return {"parameters": len(keys)}
+
+        self._bench.jobs.start("reread", f"Read {drive.name} anew", reread, drive=drive_id)
+
+    async def _is_the_same(self, member: Member) -> bool:
+        """Notice another drive at this place before anything is written to it."""
+        drive = member.drive
+        known = drive.found.serial if drive.found else None
+        if known is None:
+            return True
+        try:
+            await drive.confirm_identity()
+        except NotAllowed:
+            self._bench.tell(drive.identity_warning, member, "error")
+            return False
+        return True
+
+    async def _settled(self, member: Member) -> None:
+        """Put back by itself, unless something else has the axis; then it stays on offer."""
+        if self._bench.jobs.moving(member.drive.id) is not None:
+            return
+        await self.start(member, asked=False).wait()
+
+    def start(self, member: Member, *, asked: bool) -> Job:
+        """Put back what is owed, as a job that holds the axis where it is.
+
+        Raises:
+            Busy: something moves the axis.
+        """
+        bench, drive = self._bench, member.drive
+
+        async def work(_progress: Progress) -> JobResult:
+            found = await settle(member.axis, asked=asked)
+            for what, how in (("back", "put back"), ("left", "not put back")):
+                values = found[what]
+                if isinstance(values, dict) and values:
+                    words = ", ".join(f"{key} = {value}" for key, value in values.items())
+                    bench.tell(f"{drive.name}: {how}: {words}", member, "warning")
+            return found
+
+        return bench.jobs.start(
+            "put-back", f"Put back what a motion left in {drive.name}", work, drive=drive.id,
+            motion=True, stoppable=False, by_person=asked,
+        )  # fmt: skip

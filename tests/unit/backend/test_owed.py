@@ -1,0 +1,201 @@
+"""What a motion left in a drive that was lost: named, kept, and put back when it answers again."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from backend.api.app import make_app
+from backend.bench import Bench, Member
+from backend.restoring import RestoreFailed
+from backend.tools.temporary import temporary
+from drivers.errors import LinkLost
+from tests.support.servo import CONTROL, Servo, bench_with
+
+#: Largest torque, and the bandwidth of the speed loop, which acts after "write settings".
+TORQUE, SPEED = "6072:00", "2005:03"
+WRITE_SETTINGS = (0x200D, 0)
+WAS = {TORQUE: 3000, SPEED: 400}
+
+
+@pytest.fixture
+async def servo() -> Servo:
+    servo = Servo()
+    for key, raw in WAS.items():
+        servo.set(place(key), raw)
+    return servo
+
+
+@pytest.fixture
+async def bench(servo: Servo, tmp_path: Path) -> AsyncIterator[Bench]:
+    bench, _ = await bench_with(servo, tmp_path)
+    yield bench
+    servo.mute = False
+    await bench.close()
+
+
+@pytest.fixture
+def x(bench: Bench) -> Member:
+    return bench.member("x")
+
+
+@pytest.fixture
+async def http(bench: Bench) -> AsyncIterator[httpx.AsyncClient]:
+    transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
+    async with httpx.AsyncClient(transport=transport, base_url="http://test/api/v1") as client:
+        yield client
+
+
+def place(key: str) -> tuple[int, int]:
+    index, _, sub = key.partition(":")
+    return int(index, 16), int(sub, 16)
+
+
+def held(servo: Servo) -> dict[str, int]:
+    return {key: servo.number(place(key)) for key in WAS}
+
+
+async def lost_in_the_middle(x: Member, servo: Servo) -> RestoreFailed:
+    """Two ways of changing something for a while, and a line that goes dead meanwhile."""
+
+    async def motion() -> None:
+        async with x.axis.restoring(TORQUE), temporary(x.axis, {SPEED: 200}):
+            await x.drive.write(TORQUE, 800)
+            servo.mute = True
+
+    with pytest.raises(RestoreFailed) as told:
+        await motion()
+    assert held(servo) == {TORQUE: 800, SPEED: 200}
+    return told.value
+
+
+async def back(bench: Bench, servo: Servo) -> None:
+    """The drive answers again, and everything that this brings about is over."""
+    servo.mute = False
+    servo.written.clear()
+    bench.returning.returned("x")
+    await asyncio.gather(*(job.wait() for job in bench.jobs.all()))
+
+
+async def test_it_is_named_and_put_back_by_itself(bench: Bench, x: Member, servo: Servo) -> None:
+    told = await lost_in_the_middle(x, servo)
+    for key, raw in WAS.items():
+        assert f"{key} (was {raw})" in told.message
+    assert {debt.key: debt.raw for debt in x.drive.owed.debts} == WAS
+    await back(bench, servo)
+    assert held(servo) == WAS
+    assert not x.drive.owed
+    assert CONTROL not in dict(servo.written), "nothing is enabled or disabled by it"
+    lines = [entry.text for entry in bench.journal.entries("x")]
+    assert any("put back: " in line and f"{TORQUE} = 3000" in line for line in lines)
+
+
+async def test_a_drive_that_restarted_with_its_stored_values_owes_nothing(
+    bench: Bench, x: Member, servo: Servo
+) -> None:
+    await lost_in_the_middle(x, servo)
+    for key, raw in WAS.items():
+        servo.set(place(key), raw)
+    await back(bench, servo)
+    assert not x.drive.owed
+    assert place(TORQUE) not in dict(servo.written)
+
+
+async def test_what_somebody_else_has_changed_is_offered_not_done(
+    bench: Bench, x: Member, servo: Servo, http: httpx.AsyncClient
+) -> None:
+    await lost_in_the_middle(x, servo)
+    servo.set(place(TORQUE), 1234)  # at the panel
+    await back(bench, servo)
+    assert held(servo) == {TORQUE: 1234, SPEED: 400}
+    summary = (await http.get("/drives/x")).json()
+    assert [(each["key"], each["raw"]) for each in summary["owed"]] == [(TORQUE, 3000)]
+    assert (await http.post("/drives/x/jobs/put-back")).status_code == 202
+    await asyncio.gather(*(job.wait() for job in bench.jobs.all()))
+    assert held(servo) == WAS
+    assert (await http.get("/drives/x")).json()["owed"] == []
+    assert (await http.post("/drives/x/jobs/put-back")).status_code == 409
+
+
+async def test_it_may_stay_as_it_is(
+    bench: Bench, x: Member, servo: Servo, http: httpx.AsyncClient
+) -> None:
+    await lost_in_the_middle(x, servo)
+    servo.set(place(TORQUE), 1234)
+    await back(bench, servo)
+    assert (await http.delete("/drives/x/owed")).json()["owed"] == []
+    await back(bench, servo)
+    assert held(servo) == {TORQUE: 1234, SPEED: 400}
+
+
+async def test_stop_stands_until_a_person_takes_it_back(
+    bench: Bench, x: Member, servo: Servo
+) -> None:
+    await lost_in_the_middle(x, servo)
+    x.axis.stopped = True
+    await back(bench, servo)
+    # Settings move nothing.
+    assert held(servo) == WAS
+    assert x.axis.stopped
+
+
+@pytest.mark.parametrize("how", ["enabled", "moving", "held by a job"])
+async def test_an_axis_that_does_not_stand_free_is_left_alone(
+    bench: Bench, x: Member, servo: Servo, how: str
+) -> None:
+    await lost_in_the_middle(x, servo)
+    other = None
+    if how == "enabled":
+        servo.enable()
+    if how == "moving":
+        servo.speed_inc = 5000
+    if how == "held by a job":
+        never = asyncio.Event()
+
+        async def work(_progress: object) -> None:
+            await never.wait()
+
+        other = bench.jobs.start("jog", "Jog", work, drive="x", motion=True)
+    servo.mute = False
+    servo.written.clear()
+    bench.returning.returned("x")
+    ends = [job.wait() for job in bench.jobs.all() if job is not other]
+    await asyncio.gather(*ends)
+    assert held(servo) == {TORQUE: 800, SPEED: 200}
+    assert {debt.key for debt in x.drive.owed.debts} == set(WAS)
+
+
+async def test_another_drive_at_its_place_gets_nothing(
+    bench: Bench, x: Member, servo: Servo
+) -> None:
+    await bench.accept_identity("x")
+    await lost_in_the_middle(x, servo)
+    servo.set((0x1018, 4), 8)
+    await back(bench, servo)
+    assert held(servo) == {TORQUE: 800, SPEED: 200}
+    # Once it is accepted, what was in the other one is no matter of this one.
+    await bench.accept_identity("x")
+    assert not x.drive.owed
+
+
+async def test_what_is_back_but_does_not_act_is_owed_too(
+    bench: Bench, x: Member, servo: Servo
+) -> None:
+    def lose_the_next(at: tuple[int, int], _value: int) -> None:
+        if at == place(SPEED):
+            servo.write_errors.append(LinkLost("the cable is pulled"))
+
+    with pytest.raises(RestoreFailed, match="write settings: "):
+        async with temporary(x.axis, {SPEED: 200}):
+            servo.on_write = lose_the_next
+    assert held(servo) == WAS
+    assert [(debt.key, debt.unapplied) for debt in x.drive.owed.debts] == [(SPEED, True)]
+    await x.drive.read(SPEED)
+    assert x.drive.owed
+    await back(bench, servo)
+    assert [at for at, _data in servo.written] == [WRITE_SETTINGS]
+    assert not x.drive.owed
