@@ -50,6 +50,10 @@ COMMANDS = {
         "measure:inertia",
         "Measure inertia and friction and write them as JSON. The axis moves.",
     ),
+    "autotune": (
+        "tune:autotune",
+        "Measure, design and, with --apply or --keep, verify an axis's loop gains. The axis moves.",
+    ),
     "recompute": (
         "report:recompute",
         "Evaluate a stored measurement anew from its raw signals. Nothing moves.",

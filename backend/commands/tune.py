@@ -195,7 +195,7 @@ def _verified(applied: Answer, verified: Answer) -> list[str]:
 
 
 def _number(value: object, form: str) -> str:
-    width = int(form.split(".")[0] or 0)
+    width = int(form.split(".", maxsplit=1)[0] or 0)
     return format(value, form) if isinstance(value, float | int) else "–".rjust(width)
 
 

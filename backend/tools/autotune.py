@@ -210,7 +210,7 @@ async def _learn_notches(
     outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
     progress: Progress,
 ) -> str:  # fmt: skip
-    """Measure what no manual prints, where the axis turns freely and it is worth it.
+    """Measure what no manual prints, where no load pulls the axis and it is worth it.
 
     Returns why the design goes without notches; empty where it does not.
     """
@@ -220,16 +220,24 @@ async def _learn_notches(
         return ""
     found = outcome.result
     held = abs(found.gravity_nm.value) > PULLED * facts.rated_torque_nm
-    if held or settings.scheme != "free" or settings.loop not in ("auto", "none"):
+    if held or settings.loop not in ("auto", "none"):
         return (
-            "designed without notches: what they do is measured only on an axis that turns freely"
+            "designed without notches: what they do is measured only without a loop, on an axis "
+            + ("that no load pulls" if held else "that needs none")
         )
+    envelope: Envelope | None = settings.envelope
+    still = settings.scheme != "free"
+    if still:
+        at_rev = (await axis.units()).position(await axis.position_raw())
+        envelope = notch_effect.room_to_tremble(settings.envelope, at_rev, outcome.ends_rev)
+    if envelope is None:
+        return "designed without notches: it stands too near to an end to measure what they do"
     rigid = excite.Rigid(found.inertia_kgm2.value, found.coulomb_nm.value)
     rate = 1.0 / cycle_s(session)
     path = notch_effect.path_of(rate, facts, mechanics.hold, mechanics.delay_s)
     try:
         meaning = await notch_effect.measure_meaning(
-            axis, session, settings.envelope, facts, rigid, path, progress
+            axis, session, envelope, facts, rigid, path, progress, still=still
         )
     except NotAllowed as error:
         if await axis.state() in (State.FAULT, State.FAULT_REACTION):

@@ -38,6 +38,10 @@ _PLACE, _LOWEST_HZ, _HIGHEST_HZ = 0.12, 55.0, 400.0
 #: Widths in shares of the centre (Hz), or level pairs (width, depth).
 _WIDTHS = (0.5, 0.2)
 _SHARE_OF_TORQUE = 0.35
+#: An axis that only trembles: its lines begin here, and it may go so far and so fast.
+_STILL_FROM_HZ, _STILL_REV, _STILL_RPM = 30.0, 0.1, 150.0
+#: Less than this to the nearest end is too little for it.
+_LEAST_ROOM_REV = 0.02
 
 
 @dataclass(frozen=True)
@@ -62,10 +66,14 @@ async def measure_meaning(
     rigid: excite.Rigid,
     path: SignalPath,
     progress: Progress,
+    *,
+    still: bool = False,
 ) -> NotchMeaning:
-    """Try values of the first notch on an axis that turns freely.
+    """Try values of the first notch on an axis that no load pulls, without a loop.
 
-    ``path`` lies between set-point and torque, as a measurement of the mechanics found it.
+    ``path`` lies between set-point and torque, as a measurement of the mechanics found it. With
+    ``still`` the axis only trembles where it stands: what a notch does to the torque shows
+    without any travel, and friction is no part of it.
 
     Raises:
         NotAllowed: the axis cannot be measured so, or the notch does nothing that can be seen.
@@ -81,7 +89,7 @@ async def measure_meaning(
     slot = spec.slots[0]
     trials = _trials(drive, slot, centre)
     home = await axis.position_raw()
-    sequence = await asyncio.to_thread(_sequence, rate, envelope, facts, rigid)
+    sequence = await asyncio.to_thread(_sequence, rate, envelope, facts, rigid, still)
     effects: list[tuple[_Trial, NotchEffect | None]] = []
     off = await plan_notches(drive, [])
     plain: ComplexArray | None = None
@@ -97,6 +105,18 @@ async def measure_meaning(
             continue
         effects.append((trial, _effect(sequence, seen / plain, path)))
     return _meaning(drive, centre, effects)
+
+
+def room_to_tremble(
+    envelope: Envelope, at_rev: float, ends_rev: tuple[float, float] | None
+) -> Envelope | None:
+    """The envelope of an axis that stays where it stands; None too near to an end for it."""
+    to_end = _STILL_REV if ends_rev is None else min(at_rev - ends_rev[0], ends_rev[1] - at_rev)
+    room_rev = min(_STILL_REV, envelope.travel_rev, 0.8 * to_end)
+    if room_rev < _LEAST_ROOM_REV:
+        return None
+    speed_rpm = min(envelope.speed_rpm, _STILL_RPM)
+    return replace(envelope, travel_rev=room_rev, speed_rpm=speed_rpm)
 
 
 def _trials(drive: Drive, slot: NotchSlot, centre: int) -> list[_Trial]:
@@ -125,7 +145,7 @@ def _raw(slot: NotchSlot, centre: int, trial: _Trial) -> dict[str, int]:
 
 
 def _sequence(
-    rate: float, envelope: Envelope, facts: AxisFacts, rigid: excite.Rigid
+    rate: float, envelope: Envelope, facts: AxisFacts, rigid: excite.Rigid, still: bool
 ) -> excite.Sequence:
     """The excitation of a frequency response, one realisation of it."""
     rated = facts.rated_torque_nm
@@ -133,10 +153,10 @@ def _sequence(
         envelope.torque_percent / 100.0 * rated, envelope.speed_rpm * _TURN / 60.0,
         envelope.travel_rev * _TURN,
     )  # fmt: skip
-    band = excite.band_for(rate, 5.0, None)
+    band = excite.band_for(rate, _STILL_FROM_HZ if still else 5.0, None)
     try:
         made = excite.torque_mode(
-            rate, band, room, rigid, 0.0, share=_SHARE_OF_TORQUE, realisations=1
+            rate, band, room, rigid, 0.0, share=_SHARE_OF_TORQUE, realisations=1, base=not still
         )
     except ValueError as error:
         raise NotAllowed(

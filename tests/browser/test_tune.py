@@ -63,15 +63,16 @@ def gains_of(station: Station, axis: str) -> tuple[float, float]:
     return gains["speed_hz"], gains["inertia_kgm2"]
 
 
-def step_of(page: Page, name: str) -> str:
-    """done, next or open, as the path tells it."""
+def expect_step(page: Page, name: str, told: str) -> None:
+    """What the path tells of a step: done, next or open."""
     path = page.get_by_role("navigation", name="Steps of commissioning")
-    return path.get_by_role("link", name=re.compile(name)).locator("small").inner_text()
+    step = path.get_by_role("link", name=re.compile(name)).locator("small")
+    expect(step).to_have_text(re.compile(f"^(?:{told})$"))
 
 
 def test_identify(page: Page, axis: str, station: Station) -> None:
-    assert step_of(page, "Pre-checks") == "done"
-    assert step_of(page, "Inertia") == "next"
+    expect_step(page, "Pre-checks", "done")
+    expect_step(page, "Inertia", "next")
     page.get_by_label("Repetitions").fill("2")
     tuning.run_job(page, station, axis, "Measure the inertia")
     table = page.get_by_role("table", name="Inertia and friction")
@@ -82,8 +83,7 @@ def test_identify(page: Page, axis: str, station: Station) -> None:
     assert inertia == pytest.approx(INERTIA, rel=0.02)
     friction = tuning.number_in(row(table, "Coulomb").inner_text(), "N·m")
     assert friction == pytest.approx(COULOMB, rel=0.1)
-    expect(page.get_by_role("navigation", name="Steps of commissioning")).to_be_visible()
-    assert step_of(page, "Inertia") == "done"
+    expect_step(page, "Inertia", "done")
 
 
 def test_measure_before(page: Page, axis: str, station: Station) -> None:
@@ -136,7 +136,7 @@ def test_design_and_apply(page: Page, axis: str, station: Station) -> None:
     assert now == pytest.approx(speed, rel=0.01)
     # The drive's gains mean what they should only with the true inertia.
     assert inertia == pytest.approx(INERTIA, rel=0.03)
-    assert step_of(page, "Verify") != "done"
+    expect_step(page, "Verify", "next|open")
 
 
 def test_verify_over_the_measurement_of_before(page: Page, axis: str, station: Station) -> None:
@@ -155,8 +155,7 @@ def test_verify_over_the_measurement_of_before(page: Page, axis: str, station: S
     assert float(margin[0]) > 30
 
     open_axis(page, axis, "tune")
-    expect(page.get_by_role("navigation", name="Steps of commissioning")).to_be_visible()
-    assert step_of(page, "Verify") == "done"
+    expect_step(page, "Verify", "done")
     tuning.run_job(page, station, axis, "Start the step")
     head = page.get_by_role("table", name="Numbers of the step")
     expect(head).to_contain_text("before", timeout=MEASURED_MS)
@@ -176,7 +175,7 @@ def test_report(page: Page, axis: str) -> None:
     text = "\n".join(p.extract_text() for p in PdfReader(io.BytesIO(data)).pages)
     for part in ("Press <4>", "Ann", "调试报告", "2005:03", "速度环频率响应"):
         assert part in text
-    assert step_of(page, "Report") == "done"
+    expect_step(page, "Report", "done")
 
 
 def test_take_everything_back(page: Page, axis: str, station: Station) -> None:

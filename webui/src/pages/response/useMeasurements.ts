@@ -4,11 +4,15 @@ import type { MeasurementContent, MeasurementInfo, Problem } from '../../api/sch
 import { useLink } from '../../live/store'
 import { asSweep } from './results'
 
-/** Stored measurements (of a kind), newest first; those that cannot be used are among them. */
+/**
+ * Stored measurements (of a kind), newest first; those that cannot be used are among them.
+ * `asked`: the list, or the problem, is an answer.
+ */
 export function useMeasurements(kind: 'sweep-' | '' = 'sweep-') {
   const { open } = useLink()
   const [list, setList] = useState<MeasurementInfo[]>([])
   const [problem, setProblem] = useState<Problem | null>(null)
+  const [asked, setAsked] = useState(false)
   const refresh = useCallback(async () => {
     try {
       const all = await ask(api.GET('/api/v1/measurements'))
@@ -17,11 +21,12 @@ export function useMeasurements(kind: 'sweep-' | '' = 'sweep-') {
     } catch (error) {
       setProblem(problemOf(error))
     }
+    setAsked(true)
   }, [kind])
   useEffect(() => {
     if (open) void refresh()
   }, [open, refresh])
-  return { list, problem, refresh }
+  return { list, problem, refresh, asked }
 }
 
 /** One stored measurement, evaluated anew by the server; null while it is not there. */

@@ -17,6 +17,7 @@ const LANGUAGES = ['en', 'zh'] as const
 export function useReports() {
   const [list, setList] = useState<ReportInfo[]>([])
   const [problem, setProblem] = useState<Problem | null>(null)
+  const [asked, setAsked] = useState(false)
   const refresh = useCallback(async () => {
     try {
       setList(await ask(api.GET('/api/v1/reports')))
@@ -24,11 +25,12 @@ export function useReports() {
     } catch (error) {
       setProblem(problemOf(error))
     }
+    setAsked(true)
   }, [])
   useEffect(() => {
     void refresh()
   }, [refresh])
-  return { list, problem, refresh }
+  return { list, problem, refresh, asked }
 }
 
 /** The commissioning report: what was measured and changed, to keep and to sign. */

@@ -73,7 +73,7 @@ export function TunePage({ drive }: { drive: string }) {
       <h1>
         {t('page.tune')} <small className="dim">{summary.name}</small>
       </h1>
-      {possible && <PathNav drive={drive} known={path} />}
+      {possible && measured.asked && reports.asked && <PathNav drive={drive} known={path} />}
       {state && !possible && <p className="note info">{t('tune.needsCyclic')}</p>}
       <div className="columns">
         <div className="stack">

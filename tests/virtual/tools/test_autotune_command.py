@@ -1,0 +1,150 @@
+"""``servodeck autotune``: in virtual time, by itself and by a server in the same process."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+from typer.testing import CliRunner
+
+from backend import cli
+from backend.api.app import make_app
+from backend.axis import Axis
+from backend.bench import Bench
+from backend.commands import tune
+from backend.commands.remote import Remote
+from backend.cyclic import CyclicSession
+from backend.jobs import Progress
+from drivers.cia402 import State
+from drivers.virtual.firmware.factory import make_device
+from profiles.loader import load_profile
+from tests.virtual.tools.direct import DirectLink, direct
+from tests.virtual.tools.rig import mechanics
+
+ONE = mechanics((1e-4, 60.0, 0.006))
+URL = "ethercat://virtual7"
+#: Bandwidth of the speed loop and inertia, which every design changes.
+GAINS = ("2005:03", "2001:06")
+
+
+def run(*arguments: str) -> tuple[int, str]:
+    done = CliRunner().invoke(cli.app, ["autotune", *arguments])
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done.exit_code, done.output
+
+
+class Alone:
+    """The command with a virtual drive in the place of a bus, and what it leaves behind."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.before: dict[str, int] = {}
+        self.after: dict[str, int] = {}
+        self.state: State | None = None
+        monkeypatch.setattr(tune, "exchanging", self.exchanging)
+
+    @asynccontextmanager
+    async def exchanging(self, *_where: object) -> AsyncIterator[tuple[Axis, CyclicSession]]:
+        async with direct(ONE) as bench:
+            drive = bench.axis.drive
+            self.before = {key: await drive.raw(key) for key in GAINS}
+            try:
+                yield bench.axis, bench.session
+            finally:
+                self.after = {key: await drive.raw(key) for key in GAINS}
+                self.state = await bench.axis.state()
+
+
+def test_a_kept_design_is_verified_and_in_force(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    alone, file = Alone(monkeypatch), tmp_path / "tuned.json"
+    code, told = run(URL, "--keep", "--mark", "robust", "--out", str(file))
+    assert code == 0, told
+    answer = json.loads(file.read_text())
+    for mark in ("robust", "balanced", "fast"):
+        assert re.search(rf"^\S*{mark}\S* .* Hz .* Hz", told, re.MULTILINE), told
+    shown = re.search(r"^bandwidth +([\d.]+) +([\d.]+) Hz$", told, re.MULTILINE)
+    assert shown, told
+    verified = answer["verified"]
+    assert float(shown[1]) == pytest.approx(verified["predicted_bandwidth_hz"], abs=0.01)
+    assert float(shown[2]) == pytest.approx(verified["measured_bandwidth_hz"], abs=0.01)
+    assert "they are not stored in the drive yet" in told
+    assert alone.after != alone.before
+    assert {key: answer["before"][key] for key in GAINS} == alone.before
+    assert alone.state is not State.OPERATION_ENABLED
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_and_a_termination_leave_everything_as_it_was(
+    monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    alone = Alone(monkeypatch)
+    before = signal.getsignal(signal.SIGTERM)
+
+    def ending() -> Progress:
+        def changed() -> None:
+            if shown.step.startswith("3 of 6") and shown.fraction > 0.35 and not sent:
+                sent.append(True)
+                signal.raise_signal(number)
+
+        sent: list[bool] = []
+        shown = Progress(changed)
+        return shown
+
+    monkeypatch.setattr(tune, "progress", ending)
+    code, told = run(URL, "--apply")
+    assert code == 130
+    assert "as before" in told
+    assert alone.after == alone.before
+    assert alone.state is not State.OPERATION_ENABLED
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+def test_by_a_server_a_design_is_verified_and_taken_back(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    seen: dict[str, dict[str, int]] = {}
+
+    @asynccontextmanager
+    async def remote(address: str) -> AsyncIterator[Remote]:
+        link = DirectLink(make_device("mms7", ONE), load_profile("mms7"))
+        bench = Bench(tmp_path, {URL: lambda: link})
+        drive = (await bench.connect(URL, 1, "mms7", "Spindle")).drive
+        seen["before"] = {key: await drive.raw(key) for key in GAINS}
+        transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
+        async with httpx.AsyncClient(transport=transport, base_url=f"{address}/api/v1") as http:
+            yield Remote(address, http)
+        seen["after"] = {key: await drive.raw(key) for key in GAINS}
+        assert not bench.sessions, "the exchange that it started is ended"
+        await bench.close()
+
+    monkeypatch.setattr(tune, "remote", remote)
+    code, told = run("--server", "http://test", "--axis", "Spindle", "--apply")
+    assert code == 0, told
+    assert re.search(r"^bandwidth +[\d.]+ +[\d.]+ Hz$", told, re.MULTILINE), told
+    assert "taken back: all parameters are as before" in told
+    assert seen["after"] == seen["before"]
+    code, told = run("--server", "http://test", "--axis", "Table")
+    assert code == 1
+    assert "http://test has no drive 'Table'" in told
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ([], 1, "give a bus URL, or --server and --axis"),
+        ([URL, "--end-low-rev", "0.5"], 2, "give both --end-low-rev and --end-high-rev"),
+        ([URL, "--mark", "quick"], 2, "'quick' is not one of"),
+    ],
+)
+def test_wrong_words(words: list[str], code: int, said: str) -> None:
+    done = CliRunner().invoke(cli.app, ["autotune", *words])
+    assert done.exit_code == code
+    assert said in re.sub(r"[\s│]+", " ", done.output)
