@@ -5,7 +5,9 @@
 
 Against the analytic response of the chain; the limits are those of the design (tuning.md,
 sections 2, 3 and 5). *lockstep* and *real-time* go over EtherCAT frames; *none* plays the
-product's own cycle beside the firmware, which no busy computer disturbs. ``--random`` adds
+product's own cycle beside the firmware, which no busy computer disturbs. An axis with play is held
+to its best linear approximation under the excitation that was played (`benchmarks._best_linear`);
+how far it is from the chain without play is printed beside it. ``--random`` adds
 mechanics drawn by their number. DS_C and the drive of CiA 402 alone go over CANopen frames with
 SYNC in virtual time, DS_C with the encoder that it has.
 """
@@ -15,11 +17,12 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
@@ -29,6 +32,7 @@ from backend.tools.inertia import inertia
 from backend.tools.inertia_evaluation import InertiaOutcome, InertiaSettings, Scheme
 from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import Loop, SweepResult, SweepSettings
+from benchmarks._best_linear import Raw, best_linear, played_of
 from benchmarks._tune_figures import marked, true_modes
 from benchmarks.autotune_accuracy import tuned
 from drivers.cia402 import State
@@ -176,21 +180,36 @@ async def _frequency(rig: Rig, spec: MechanicsSpec) -> str:
     async with rig.axis(spec) as (axis, session):
         await _ready(axis)
         settings = SweepSettings(envelope, loop=loop, rated_torque_nm=_rated(rig, spec))
-        found = await sweep(axis, session, settings, _silent())
+        kept: list[Raw] = []
+        found = await sweep(
+            axis, session, settings, _silent(), lambda _name, *raw: kept.append(raw)
+        )  # fmt: skip
     free = found.loop == "none"
+    truth = _truth(spec, kept[0]) if free and any(w.backlash_rad for w in spec.load) else None
     if rig.khz >= 4:
-        parts = _told("direct", errors(found.direct, spec, 5, 1000), (0.3, 3.0))
-    elif free:
-        parts = _told("direct", errors(found.direct, spec, 5, 250 * rig.khz), (0.3, 2.0))
+        top, limits = 1000.0, (0.3, 3.0)
     else:
-        parts = _told("direct", errors(found.direct, spec, 5, 200 * rig.khz), (0.4, 3.0))
+        top, limits = (250 * rig.khz, (0.3, 2.0)) if free else (200 * rig.khz, (0.4, 3.0))
+    parts = _told("direct", errors(found.direct, spec, 5, top, truth), limits)
     if rig.khz < 4:
-        above = errors(found.frf, spec, 250 * rig.khz, 400 * rig.khz)
+        above = errors(found.frf, spec, 250 * rig.khz, 400 * rig.khz, truth)
         parts += " " + _told("model above", above, (0.6, 4.0))
+    if truth is not None:
+        closed = errors(found.direct, spec, 5, top)
+        parts += f" (without play {closed.magnitude_db:.2f} dB {closed.phase_deg:.2f}°)"
     top = min(1200.0, 400 * rig.khz)
     took = marked(found.motion_s, 10.0, "4.1f")
     model = "" if found.trusted else " no model"
     return f"{found.loop:8} {parts} {_modes(found, spec, top)} {took}s{model}"
+
+
+def _truth(
+    spec: MechanicsSpec, raw: Raw
+) -> Callable[[npt.NDArray[np.float64]], npt.NDArray[np.complex128]]:
+    """The best linear approximation under what was played, by frequency."""
+    played = played_of(*raw)
+    lines_hz, response = played[0].line_hz, best_linear(spec, played)
+    return lambda f: response[np.searchsorted(lines_hz, f - 1e-6)]
 
 
 async def _inertia(rig: Rig, spec: MechanicsSpec) -> str:

@@ -3,7 +3,8 @@
 On a linear axis nothing but noise lies on the empty bins of a multisine. Coulomb friction puts
 some there, of which its torque by the direction of motion tells how much; what is left is play in
 the mechanics, or friction of another kind (Pintelon & Schoukens, *System Identification*, 2012,
-section 4.4).
+section 4.4). The two act at other times: friction that is not simply Coulomb's (sticking, a
+bristle's bend) does so where the speed reverses, play where the torque in the coupling does.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray, neighbour_mean
+from backend.analysis.arrays import ComplexArray, FloatArray, IntArray, neighbour_mean
 from backend.analysis.frf import Frf
 from backend.analysis.line_spectra import (
     Quantity,
@@ -21,6 +22,7 @@ from backend.analysis.line_spectra import (
     good_periods,
     own_torque,
     period_spectra,
+    speed_lag_s,
 )
 from backend.analysis.sampling import SignalPath, reported_response
 
@@ -32,6 +34,10 @@ _SILENT = 1e-3
 _LOWEST = 0.1
 #: So much of the motion is too much, in any case or where friction explains none of it.
 _MUCH, _SOME, _UNEXPLAINED = 0.17, 0.1, 0.9
+#: About standstill: speed below this share of its deviation, and so long before and after.
+_SLOW, _ABOUT_S = 0.1, 0.002
+#: What is so much stronger there than elsewhere is friction; so little of the time says nothing.
+_AT_REVERSALS, _LEAST_TIME = 1.4, 0.01
 #: Power on the empty bins over that of the noise in it, from which on it tells of play.
 _ABOVE_NOISE = 4.0
 
@@ -41,16 +47,20 @@ class Distortion:
     """Motion on empty bins relative to that on the lines around; noise is taken out.
 
     ``share`` [lines] is what friction does not explain; ``level`` its median in the upper band,
-    ``before`` the same with friction. All zero where there are no empty bins.
+    ``before`` the same with friction. ``at_reversals`` is how much of it, as torque, falls on
+    reversals of the speed, over their share of the time. All zero where there are no empty bins.
     """
 
     share: FloatArray
     level: float = 0.0
     before: float = 0.0
+    at_reversals: float = 0.0
 
     @property
     def play(self) -> bool:
         """Whether the axis is no linear one, beyond friction: it seems to have play."""
+        if self.at_reversals > _AT_REVERSALS:
+            return False
         left = self.level > _UNEXPLAINED * self.before
         return self.level > _MUCH or (self.level > _SOME and left)
 
@@ -75,8 +85,8 @@ def distortion(
         np.interp(f, frf.frequency_hz, np.log(np.abs(frf.response)))
         + 1j * np.interp(f, frf.frequency_hz, np.unwrap(np.angle(frf.response)))
     )
-    late = reported_response(f, path)
-    rest, before, noise, lines = [], [], [], []
+    late, lag_s = reported_response(f, path), speed_lag_s(records, path)
+    rest, before, noise, lines, falls = [], [], [], [], []
     for record in records:
         good, _ = good_periods(record)
         if len(good) < 2:
@@ -87,10 +97,13 @@ def distortion(
             own = period_spectra(own_torque(record, path), between, good)
             moved = moved - plant * late * own
         mean = moved.mean(axis=0)
-        by_friction = frf.coulomb_nm * plant * friction_direction(record, between, good)
+        direction = friction_direction(record, between, good, path, lag_s)
+        by_friction = frf.coulomb_nm * plant * late * direction
         noise.append(np.sum(np.abs(moved - mean) ** 2, axis=0) / (len(good) * (len(good) - 1)))
         before.append(np.abs(mean) ** 2)
-        rest.append(np.abs(mean + by_friction.mean(axis=0)) ** 2)
+        left = mean + by_friction.mean(axis=0)
+        rest.append(np.abs(left) ** 2)
+        falls.append(_at_reversals(record, good, empty, left / plant))
         lines.append(np.abs(period_spectra(record.response, record.excitation, good).mean(axis=0)))
     if not rest:
         return none
@@ -111,5 +124,28 @@ def distortion(
     return Distortion(
         # What lies below the first empty bins is told by all of them, not by one beside a valley.
         np.asarray(np.interp(frf.frequency_hz, f, share, left=float(np.median(share)))),
-        float(np.median(share[upper])), float(np.median(plain[upper])),
+        float(np.median(share[upper])), float(np.median(plain[upper])), _ratio(falls),
     )  # fmt: skip
+
+
+def _at_reversals(
+    record: Record, good: list[int], bins: IntArray, torque: ComplexArray
+) -> tuple[float, float]:
+    """Shares of the power of a torque on these bins, and of the time, about reversals of speed."""
+    e = record.excitation
+    n = e.period_samples
+    speed = np.mean([record.response[e.first_sample + p * n :][:n] for p in good], axis=0)
+    reach = 2 * round(_ABOUT_S * e.sample_rate_hz) + 1
+    slow = np.abs(speed) < _SLOW * np.std(speed)
+    # The period closes upon itself.
+    about = np.convolve(np.pad(slow, reach // 2, mode="wrap"), np.ones(reach), "valid") > 0.5
+    spectrum = np.zeros(n // 2 + 1, dtype=np.complex128)
+    spectrum[bins] = torque
+    power = np.fft.irfft(spectrum, n) ** 2
+    return float(np.sum(power[about]) / max(float(np.sum(power)), 1e-300)), float(np.mean(about))
+
+
+def _ratio(falls: list[tuple[float, float]]) -> float:
+    """Of power to time, over all records; zero where the speed hardly ever reverses."""
+    power, time = np.mean(falls, axis=0)
+    return float(power / time) if time > _LEAST_TIME else 0.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -273,12 +273,21 @@ def _chain_bounds(x: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]
 def _chain_prior(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Couplings with an ordinary damping ratio d / 2√(kJ)."""
     logs = x[RIGID_PARAMETERS:].reshape(-1, LOAD_PARAMETERS)
-    ratio = logs[:, 2] - 0.5 * (logs[:, 0] + logs[:, 1]) - np.log(2 * USUAL_DAMPING)
-    slopes = np.zeros((len(logs), x.size))
-    for i in range(len(logs)):
-        place = RIGID_PARAMETERS + LOAD_PARAMETERS * i
-        slopes[i, place : place + LOAD_PARAMETERS] = np.array([-0.5, -0.5, 1.0]) / _DAMPING_SPREAD
-    return ratio / _DAMPING_SPREAD, slopes
+    ratio = logs @ _RATIO - np.log(2 * USUAL_DAMPING)
+    return ratio / _DAMPING_SPREAD, _chain_prior_slopes(x.size)
+
+
+#: Logarithm of a coupling's damping ratio by those of its J, k and d.
+_RATIO = np.array([-0.5, -0.5, 1.0])
+
+
+@lru_cache(maxsize=32)
+def _chain_prior_slopes(size: int) -> FloatArray:
+    """They depend on nothing but how many parameters there are; not to be written."""
+    loads = (size - RIGID_PARAMETERS) // LOAD_PARAMETERS
+    slopes = np.zeros((loads, size))
+    slopes[:, RIGID_PARAMETERS:] = np.kron(np.eye(loads), _RATIO / _DAMPING_SPREAD)
+    return slopes
 
 
 CHAIN = Form(chain_response_and_slopes, model_of_chain, _chain_bounds, _chain_prior)

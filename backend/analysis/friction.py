@@ -12,10 +12,12 @@ from backend.analysis.line_spectra import (
     continuous_input,
     instrument_estimate,
 )
-from backend.analysis.sampling import SignalPath
+from backend.analysis.sampling import SignalPath, reported_response
 
 #: No line is weighed as if its noise were less than this share of an ordinary line's.
 _LEAST_NOISE = 0.1
+#: Lines up to this multiple of the lowest are where friction rules, whatever else is nonlinear.
+_LOWEST = 4.0
 #: Friction is taken out where that leaves less than this share of the scatter.
 _WORTH_TAKING = 0.9
 
@@ -30,25 +32,29 @@ def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> fl
     if len(s.sent) < 2:
         return 0.0
     plain = continuous_input(s, path, quantity)
+    late = reported_response(s.frequency_hz, path)
+    turned: list[ComplexArray] = [d * late for d in s.direction]
     limit = float(
         max(np.median(np.abs(u)) for u in plain) / s.samples * 2.0 * np.sqrt(s.lines.size)
     )
     # Alike first, since friction shows best where its lines are many; behind a coarse encoder
-    # the upper lines are mostly noise, and drown it.
-    for weight in (np.ones(s.frequency_hz.size), _torque_weight(s, plain)):
+    # the upper lines are mostly noise, and drown it, and so does what play does there.
+    low = np.asarray(s.frequency_hz <= _LOWEST * s.frequency_hz[0], dtype=np.float64)
+    for weight in (np.ones(s.frequency_hz.size), _torque_weight(s, plain), low):
         found = minimize_scalar(
-            _scatter, bounds=(0.0, limit), method="bounded", args=(s, plain, weight)
+            _scatter, bounds=(0.0, limit), method="bounded", args=(s, plain, turned, weight)
         )
-        if found.fun < _WORTH_TAKING * _scatter(0.0, s, plain, weight):
+        if found.fun < _WORTH_TAKING * _scatter(0.0, s, plain, turned, weight):
             return float(found.x)
     return 0.0
 
 
 def _scatter(
-    coulomb_nm: float, s: LineSpectra, plain: list[ComplexArray], weight: FloatArray
-) -> float:
+    coulomb_nm: float, s: LineSpectra, plain: list[ComplexArray], turned: list[ComplexArray],
+    weight: FloatArray,
+) -> float:  # fmt: skip
     """What no linear mechanics explain with this friction taken out, as torque."""
-    inputs = [u - coulomb_nm * d for u, d in zip(plain, s.direction, strict=True)]
+    inputs = [u - coulomb_nm * d for u, d in zip(plain, turned, strict=True)]
     g, _, _ = instrument_estimate(s, inputs)
     errors = np.array(
         [y.mean(axis=0) / g - u.mean(axis=0) for y, u in zip(s.response, inputs, strict=True)]

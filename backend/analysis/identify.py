@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.arrays import ComplexArray, FloatArray, neighbour_mean
 from backend.analysis.distortion import Distortion, distortion
 from backend.analysis.doubt import Doubt, Shifted
 from backend.analysis.doubt import doubt as joint_doubt
@@ -23,7 +23,13 @@ from backend.analysis.loop_fit import fit_loop
 from backend.analysis.model_fit import Solution, fit_sampled_model, views_of
 from backend.analysis.path_fit import find_paths, moved_path, path_covariance
 from backend.analysis.sampled_model import LoopModel, SampledFit
-from backend.analysis.sampling import STEP_LEAD_S, SignalPath, delay_response, lag_response
+from backend.analysis.sampling import (
+    STEP_LEAD_S,
+    SignalPath,
+    delay_response,
+    hold_response,
+    lag_response,
+)
 from backend.analysis.settling import settled
 
 #: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
@@ -32,6 +38,10 @@ SYSTEMATIC_DEG = 0.35
 
 #: A model whose median relative misfit is larger, and larger than the noise, corrects nothing.
 TRUSTED_ERROR = 0.03
+
+#: What no model explains is shown to this share of the sample rate; its misfit is a mean over so
+#: many lines to each side.
+_UNTRUSTED_SHARE, _AROUND = 0.1, 6
 
 #: At most this many rounds of refining loop, path and mechanics against each other.
 _PASSES = 4
@@ -234,10 +244,7 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
     views, path, fit = trial.views, trial.path, trial.fit
     spoilt = distortion(task.records, path, task.quantity, views.velocity)
     if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
-        # No model explains what was sampled, so neither delay nor images are known.
-        raw = views.velocity
-        low, high = raw.valid_band_hz
-        plain = replace(raw, valid_band_hz=(low, min(high, 0.1 * raw.sample_rate_hz)))
+        plain = _unexplained(views.velocity, trial.solution)
         return Identification(plain, plain, fit, False, spoilt)
     direct, corrected = [], []
     ways = [(views.velocity, fit.delay_s, False)]
@@ -259,6 +266,27 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
         lines = lines.cut(lines.valid_band_hz[1])
         return Identification(lines, lines, fit, False, spoilt)
     return Identification(lines, best, fit, True, spoilt)
+
+
+def _unexplained(raw: Frf, solution: Solution) -> Frf:
+    """Lines that no model explains: neither hold and delay nor images are known of them.
+
+    What the best model leaves is charged to them, and that another hold may be the right one.
+    """
+    f, rate = raw.frequency_hz, raw.sample_rate_hz
+    misfit = solution.problem.logs(solution.x)[0][0]
+    hold = np.log(hold_response(f, rate, "zero"))
+    size, turn = (
+        np.hypot(neighbour_mean(np.abs(left), _AROUND), known)
+        for left, known in ((misfit.real, hold.real), (misfit.imag, hold.imag))
+    )
+    low, high = raw.valid_band_hz
+    return replace(
+        raw,
+        std_db=np.hypot(raw.std_db, 20 / np.log(10) * size),
+        std_deg=np.hypot(raw.std_deg, np.degrees(turn)),
+        valid_band_hz=(low, min(high, _UNTRUSTED_SHARE * rate)),
+    )
 
 
 def _distorted(frf: Frf, share: FloatArray) -> Frf:

@@ -26,6 +26,9 @@ from backend.analysis.sampling import (
 #: loop adds its own torque. *closed_loop*: from the loop's reference to the response.
 Quantity = Literal["torque_mode", "torque_injection", "closed_loop"]
 
+#: The lag of the speed is read below this share of the sample rate, and is no longer than this.
+_TELLING, _LATEST_S = 0.2, 2e-3
+
 
 @dataclass(frozen=True)
 class Record:
@@ -54,7 +57,7 @@ class LineSpectra:
     """Line spectra of all good periods: arrays [m realisations][p periods, lines].
 
     ``torque`` is the loop's own torque, ``direction`` the direction of motion (-1 to 1) that
-    Coulomb friction follows.
+    Coulomb friction follows, when it does (the speed is reported late).
     """
 
     frequency_hz: FloatArray
@@ -178,6 +181,7 @@ def collect(
     sent, response, torque, direction = [], [], [], []
     realisation: list[int] = []
     used = dropped = 0
+    lag_s = speed_lag_s(records, path)
     for record in records:
         e = record.excitation
         if e.period_samples != first.period_samples or not np.array_equal(e.lines, first.lines):
@@ -193,7 +197,7 @@ def collect(
             if position
             else period_spectra(record.response, e, good)
         )
-        direction.append(friction_direction(record, e, good))
+        direction.append(friction_direction(record, e, good, path, lag_s))
         if quantity == "torque_injection":
             torque.append(period_spectra(own_torque(record, path), e, good))
     if not sent:
@@ -211,10 +215,45 @@ def own_torque(record: Record, path: SignalPath) -> FloatArray:
     return record.torque - sampled_command(record.excitation.samples, path)
 
 
-def friction_direction(record: Record, e: Excitation, periods: list[int]) -> ComplexArray:
-    """Spectra [periods, lines] of the direction of motion, on the lines of ``e``."""
-    spectra = period_spectra(_direction(record.response), e, periods)
-    return np.asarray(spectra * _centre_of_interval(e.line_hz, e.sample_rate_hz))
+def speed_lag_s(records: tuple[Record, ...], path: SignalPath) -> float:
+    """How much later the speed is reported than the position, in s: a filter, or a mean.
+
+    Without positions it is what ``path`` tells of a filter.
+    """
+    told = path.response_bandwidth_hz
+    known = 0.0 if told is None else 1.0 / (2 * np.pi * told)
+    if any(record.position is None for record in records):
+        return known
+    turned = weights = 0.0
+    for record in records:
+        e = record.excitation
+        good, _ = good_periods(record)
+        if not good:
+            continue
+        use = e.line_hz <= _TELLING * path.sample_rate_hz
+        w = 2 * np.pi * e.line_hz[use]
+        seen = period_spectra(record.response, e, good).mean(axis=0)[use]
+        moved = _velocity_from_position(record, e, good, path.sample_rate_hz).mean(axis=0)[use]
+        weight = np.abs(seen) * np.abs(moved)
+        turned -= float(np.sum(weight * w * np.angle(seen * moved.conj())))
+        weights += float(np.sum(weight * w**2))
+    return float(np.clip(turned / weights, 0.0, _LATEST_S)) if weights > 0 else known
+
+
+def friction_direction(
+    record: Record, e: Excitation, periods: list[int], path: SignalPath, lag_s: float
+) -> ComplexArray:
+    """Spectra [periods, lines] of the true direction of motion, on the lines of ``e``.
+
+    A filtered speed changes its sign late, and what it then does is not the filtered sign; so
+    the lag of the speed is taken out of it before (as of a first-order filter).
+    """
+    speed = record.response
+    if lag_s > 0:
+        speed = speed + lag_s * e.sample_rate_hz * np.gradient(speed)
+    spectra = period_spectra(_direction(np.asarray(speed)), e, periods)
+    centre = _centre_of_interval(e.line_hz, e.sample_rate_hz)
+    return np.asarray(spectra * centre / delay_response(e.line_hz, path.response_delay_s))
 
 
 def _direction(velocity: FloatArray) -> FloatArray:
@@ -251,9 +290,7 @@ def continuous_input(
     if quantity == "torque_injection":
         inputs = [u + own * late for u, own in zip(inputs, s.torque, strict=True)]
     if coulomb_nm:
-        # The direction comes from the reported velocity and is late already.
-        ahead = late / reported_response(f, path)
-        inputs = [u - coulomb_nm * ahead * d for u, d in zip(inputs, s.direction, strict=True)]
+        inputs = [u - coulomb_nm * late * d for u, d in zip(inputs, s.direction, strict=True)]
     return inputs
 
 

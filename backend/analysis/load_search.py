@@ -72,18 +72,14 @@ def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
         )
         error = np.abs(rest) * weight
         costs = np.sum(np.sqrt(1.0 + error**2 / 9.0) - 1.0, axis=1)
-        for i in np.argsort(costs)[:150]:
-            kept, inertia, stiffness, damping = (float(v) for v in new[i])
-            trials.append(
-                _Trial(
-                    float(costs[i]), place, np.log(stiffness / inertia) / 2,
-                    np.log(inertia / kept),
-                    _adjusted(
-                        with_load(found.x, place, (kept, inertia, stiffness, damping)),
-                        float(gain[i]), float(cycles[i]),
-                    ),
-                )
-            )  # fmt: skip
+        best = np.argsort(costs)[:150]
+        kept, inertia, stiffness, _ = new[best].T
+        frequencies, ratios = np.log(stiffness / inertia) / 2, np.log(inertia / kept)
+        trials += [
+            _Trial(float(costs[i]), place, frequency, ratio, new[i], float(gain[i]),
+                   float(cycles[i]))
+            for i, frequency, ratio in zip(best, frequencies, ratios, strict=True)
+        ]  # fmt: skip
     ranked = sorted(trials, key=lambda t: t.cost)
     edges = np.log(TURN * np.array([0.0, 0.3 * top, 0.7 * top, np.inf]) + 1e-12)
     chosen = ranked[:1]
@@ -91,7 +87,7 @@ def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
         here = [t for t in ranked if low <= t.frequency < high]
         apart = _APART if count == 1 else _APART_FOLDED
         chosen += _different(here, chosen, count, apart)
-    return [t.x for t in chosen + _different(ranked, chosen, 1)]
+    return [t.start(found.x) for t in chosen + _different(ranked, chosen, 1)]
 
 
 def _without_gain_and_delay(
@@ -166,13 +162,25 @@ def with_one_more_mode(problem: Problem, found: Found) -> list[FloatArray]:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A way to add a load: where, logarithms of its antiresonance and of its share, parameters."""
+    """A way to add a load: where, logarithms of its antiresonance and of its share, and how.
+
+    ``new`` [4] as in `responses_with_load`; the common gain (logarithm) and delay (cycles) that
+    it would fit better with.
+    """
 
     cost: float
     place: int
     frequency: float
     ratio: float
-    x: FloatArray
+    new: FloatArray
+    gain: float
+    cycles: float
+
+    def start(self, x: FloatArray) -> FloatArray:
+        """Parameters to begin with, from those of the chain that it is added to."""
+        kept, inertia, stiffness, damping = (float(v) for v in self.new)
+        more = with_load(x, self.place, (kept, inertia, stiffness, damping))
+        return _adjusted(more, self.gain, self.cycles)
 
     def like(self, other: _Trial, apart: float) -> bool:
         """Whether both lead to the same place: frequencies less ``apart`` (logarithm)."""

@@ -35,6 +35,8 @@ _WORTHWHILE, _MODES_GAIN = 10.0, 60.0
 _COARSE_LINES, _COARSE_STEPS, _FINISHED = 40, 12, 4
 #: Lines with less coherence take no part, and none is believed to be more accurate than this.
 _LEAST_COHERENCE, _FLOOR = 0.6, 0.01
+#: Ends that are worse by so much are not followed; below this misfit nothing more is hidden.
+_WORSE, _EXPLAINED = 60.0, 0.003
 #: Below this misfit mechanics are there, and delays and filter are free.
 _FREED = 0.1
 
@@ -178,7 +180,8 @@ def _grown(problem: Problem, start: FloatArray, max_modes: int) -> Found:
             best, misses = now, 0
         else:
             misses += 1
-        if misses == 2 or best.error < 0.0004:
+        # What is explained this well hides nothing behind a load that alone gains little.
+        if misses == 2 or (misses and best.error < _EXPLAINED) or best.error < 0.0004:
             break
     return problem.solve(best.x)
 
@@ -190,4 +193,8 @@ def _best_end(problem: Problem, now: Found, starts: list[FloatArray]) -> Found:
         (coarse.solve(x, _COARSE_STEPS, bound=True) for x in starts), key=lambda t: t.score
     )
     ends = [problem.solve(t.x, bound=True) for t in looked[:_FINISHED]]
-    return min((problem.solve(e.x, bound=e.error > _FREED) for e in ends), key=lambda t: t.score)
+    least = min(e.score for e in ends)
+    followed = (e for e in ends if e.score < least + _WORSE)
+    return min(
+        (problem.solve(e.x, bound=e.error > _FREED) for e in followed), key=lambda t: t.score
+    )

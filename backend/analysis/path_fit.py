@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize_scalar
 
 from backend.analysis.arrays import ComplexArray, FloatArray
 from backend.analysis.line_spectra import Record, mean_spectra
@@ -25,6 +25,8 @@ from backend.analysis.sampling import (
 
 #: Set-points are in force after this many cycles at most.
 _MOST_CYCLES = 3.5
+#: Parts of a cycle that a search begins with.
+_PARTS = (0.0, 0.25, 0.5, 0.75, 0.88, 0.94)
 #: Ordinary current loops, in Hz: log of the middle.
 _USUAL_CORNER = float(np.log(1000.0))
 _SLOWEST, _FASTEST = float(np.log(80.0)), float(np.log(6000.0))
@@ -38,6 +40,8 @@ _SCALE = 1e4
 _OWN_SHARE = 0.15
 #: Another hold is worth a trial when it leaves less than this multiple unexplained.
 _ALIKE = 3.0
+#: A delay of whole cycles that leaves less than this multiple of what a fraction does is taken.
+_NEARLY = 1.5
 #: A delay so near to whole cycles is one of whole cycles.
 _WHOLE = 0.06
 #: Deviations of delays (cycles) and of corners (logarithm) where nothing but habit tells them.
@@ -130,11 +134,22 @@ def moved_path(path: SignalPath, cycles: float, log_corner: float) -> SignalPath
 
 
 def _ranked(fit: _Fit, holds: tuple[Hold, ...]) -> tuple[SignalPath, ...]:
-    """The best path of each hold as far as they explain alike, those of whole cycles first."""
+    """The best path of each hold as far as they explain alike, those of whole cycles first.
+
+    Noise and the samples of a stiff loop's torque make a fraction of a cycle look better than the
+    truth; so of every hold its best whole cycles stand for trial, too.
+    """
     found = sorted((fit.best(hold) for hold in holds), key=lambda t: t[1])
     least = max(found[0][1], _ROUNDING)
-    alike = tuple(p for p, cost in found if cost < _ALIKE * least)
-    return tuple(p for p in alike if _at_whole_cycles(p)) or alike
+    alike = [t for t in found if t[1] < _ALIKE * least]
+    whole = [t for t in alike if _at_whole_cycles(t[0])]
+    there = {p.hold for p, _ in whole}
+    pinned = [fit.best_whole(hold) for hold in holds if hold not in there]
+    pinned = sorted((t for t in pinned if t[1] < _ALIKE * least), key=lambda t: t[1])
+    if whole:
+        return tuple(p for p, _ in sorted([*whole, *pinned], key=lambda t: t[1]))
+    nearly = [t for t in pinned if t[1] < _NEARLY * least]
+    return tuple(p for p, _ in [*nearly, *alike, *(t for t in pinned if t not in nearly)])
 
 
 def _at_whole_cycles(path: SignalPath) -> bool:
@@ -171,7 +186,8 @@ class _Fit:
 
     def best(self, hold: Hold) -> tuple[SignalPath, float]:
         """The best delay and corner with this hold, and what they leave unexplained."""
-        cycles = np.arange(0.0, _MOST_CYCLES, 0.25)
+        # A sample just behind a step tells most of the delay, and only if a start is near.
+        cycles = np.sort([n + part for n in range(4) for part in _PARTS if n + part < _MOST_CYCLES])
         corners = _CORNERS_HZ if self.path.current_bandwidth_hz is None else [None]
         starts = []
         for late in cycles:
@@ -180,9 +196,26 @@ class _Fit:
             starts.append((min(costs), row[int(np.argmin(costs))]))
         order = sorted(range(cycles.size), key=lambda n: starts[n][0])
         whole = [n for n in order if cycles[n] % 1.0 == 0.0]
-        ends = [self._refined(starts[n][1], hold) for n in {*order[:2], *whole[:1]}]
+        ends = [self._refined(starts[n][1], hold) for n in {*order[:3], *whole[:1]}]
         x, cost = min(ends, key=lambda end: end[1])
         return self._path_of(x, hold), cost
+
+    def best_whole(self, hold: Hold) -> tuple[SignalPath, float]:
+        """The best delay of whole cycles with this hold, and what it leaves unexplained."""
+        tried = []
+        for late in np.arange(0.0, _MOST_CYCLES):
+            corners = _CORNERS_HZ if self.path.current_bandwidth_hz is None else [None]
+            row = [np.array([late] if c is None else [late, np.log(c)]) for c in corners]
+            costs = [float(np.sum(self._rows(x, hold) ** 2)) for x in row]
+            tried.append((min(costs), row[int(np.argmin(costs))]))
+        cost, x = min(tried, key=lambda t: t[0])
+        if x.size == 1:
+            return self._path_of(x, hold), cost
+        end = minimize_scalar(
+            lambda corner: float(np.sum(self._rows(np.array([x[0], corner]), hold) ** 2)),
+            bounds=(x[1] - 0.5, x[1] + 0.5), method="bounded", options={"maxiter": 12},
+        )  # fmt: skip
+        return self._path_of(np.array([x[0], end.x]), hold), min(cost, float(end.fun))
 
     def _refined(self, x0: FloatArray, hold: Hold) -> tuple[FloatArray, float]:
         low = np.array([max(x0[0] - 0.4, 0.0) - 1e-9, _SLOWEST])[: x0.size]

@@ -55,7 +55,7 @@ def minimise(
         hessian = weighted.T @ slopes
         # What a bound holds, and would be pushed through it, takes no part.
         free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
-        if not np.any(free):
+        if not free.any():
             break
         step = _step(hessian, gradient, free, damping)
         tried = np.clip(x + step, low, high)
@@ -89,5 +89,8 @@ def _step(
     diagonal = np.diag(part)
     part = part + np.diag(damping * np.maximum(diagonal, 1e-9 * float(np.max(diagonal)) + 1e-300))
     step = np.zeros(gradient.size)
-    step[free] = np.linalg.lstsq(part, -gradient[free], rcond=None)[0]
+    try:
+        step[free] = np.linalg.solve(part, -gradient[free])
+    except np.linalg.LinAlgError:
+        step[free] = np.linalg.lstsq(part, -gradient[free], rcond=None)[0]
     return step

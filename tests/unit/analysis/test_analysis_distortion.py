@@ -10,7 +10,7 @@ from backend.analysis.distortion import distortion
 from backend.analysis.excitation import BaseMotion, choose_lines, multisine, scaled
 from backend.analysis.frf import estimate_periodic
 from backend.analysis.identify import identify_with_path
-from backend.analysis.line_spectra import Record
+from backend.analysis.line_spectra import Record, speed_lag_s
 from backend.analysis.sampling import SignalPath
 
 RATE, PERIOD = 1000.0, 650
@@ -69,3 +69,46 @@ def test_an_axis_with_play_gets_no_model_and_no_lines_beyond_the_direct_band():
     assert found.corrected.response.size == found.corrected.std_db.size
     # The band admits what was added, relative to the lines.
     assert np.median(found.corrected.std_db) > 0.25 * 8.686
+
+
+@pytest.mark.parametrize("filter_hz", [0.0, 400.0])
+def test_friction_is_what_it_is_however_late_the_speed_is_reported(filter_hz):
+    """The lag of a filtered speed shows against the position; nobody tells the filter."""
+    mechanics = Mechanics(loads=((1e-4, 20.0, 0.002),), coulomb_nm=0.06)
+    drive = Drive(current_hz=1000.0, speed_filter_hz=filter_hz)
+    records = []
+    for e in excitations():
+        run = simulate(mechanics, drive, RATE, torque=e.samples)
+        records.append(Record(e, run.velocity, run.torque, position=run.position))
+    lag_s = 1.0 / (TURN * filter_hz) if filter_hz else 0.0
+    assert speed_lag_s(tuple(records), PATH) == pytest.approx(lag_s, abs=60e-6)
+    frf = estimate_periodic(tuple(records), PATH, "torque_mode", coulomb_nm=None)
+    assert frf.coulomb_nm == pytest.approx(0.06, rel=0.06)
+
+
+def _distorted_at(where):
+    """Distortion of a linear axis to which a torque is added where ``where`` (speed) says."""
+    rng = np.random.default_rng(7)
+    mechanics = Mechanics(loads=(), coulomb_nm=0.0)
+    records = []
+    for e in excitations():
+        plain = simulate(mechanics, Drive(current_hz=1000.0), RATE, torque=e.samples).velocity
+        first = e.first_sample + PERIOD
+        around = where(plain[first : first + PERIOD])
+        kicks = rng.normal(0.0, 0.15, PERIOD) * around
+        own = replace(
+            e, samples=e.samples + np.roll(np.resize(kicks, e.samples.size), first % PERIOD)
+        )
+        run = simulate(mechanics, Drive(current_hz=1000.0), RATE, torque=own.samples)
+        records.append(Record(e, run.velocity, run.torque))
+    frf = estimate_periodic(tuple(records), PATH, "torque_mode", coulomb_nm=0.0)
+    return distortion(tuple(records), PATH, "torque_mode", frf)
+
+
+def test_what_happens_where_the_speed_reverses_is_friction_and_elsewhere_play():
+    slow = _distorted_at(lambda v: np.abs(v) < 0.1 * np.std(v))
+    fast = _distorted_at(lambda v: np.abs(v) > 0.1 * np.std(v))
+    assert slow.at_reversals > 2.0
+    assert fast.at_reversals < 1.0
+    assert fast.play
+    assert not slow.play

@@ -66,6 +66,33 @@ def test_a_straight_line_is_told_from_a_staircase(interpolates):
         assert best.current_bandwidth_hz == pytest.approx(1000.0, rel=0.03)
 
 
+def test_a_delay_just_short_of_whole_cycles_is_found():
+    """Two samples tell it: beyond the whole cycle the misfit hardly changes any more."""
+    path = SignalPath(1000.0, current_bandwidth_hz=700.0)
+    best = find_paths(
+        records_of(case_of(1000.0, late_steps=39)), path, loop_closed=False, hold_known=False
+    )[0]
+    assert best.hold == "zero"
+    assert best.command_delay_s == pytest.approx(39 * 50e-6, abs=5e-6)
+
+
+def test_a_noisy_loop_leaves_no_doubt_of_whole_cycles():
+    """A quarter of the torque is the loop's answer to noise, which looks like other paths, too."""
+    case = case_of(1000.0, late_steps=0, current_hz=1400.0, loop_hz=30.0, counts_per_rev=2**20,
+                   noise_counts=8.0)  # fmt: skip
+    path = SignalPath(1000.0, current_bandwidth_hz=1400.0)
+    records = records_of(case)
+    holds = {p.hold for p in find_paths(records, path, loop_closed=True, hold_known=False)}
+    assert "zero" in holds
+    found = identify_with_path(records, path, "torque_injection", hold_known=False)
+    assert found.fit.path.hold == "zero"
+    # The filter, which nobody tells, takes the rest of what the fit finds.
+    assert found.fit.path.command_delay_s == pytest.approx(0.0, abs=60e-6)
+    e = errors(found.corrected, ONE, 5.0, 200.0)
+    assert e.magnitude_db < 0.4
+    assert e.phase_deg < 3.0
+
+
 @pytest.mark.parametrize("late_steps", [20, 36])
 def test_beside_a_closed_loop_path_and_mechanics_find_each_other(late_steps):
     case = case_of(1000.0, late_steps=late_steps, loop_hz=15.0)

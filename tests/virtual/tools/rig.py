@@ -126,13 +126,14 @@ class Errors:
     lines: int
 
 
-def errors(frf, spec: MechanicsSpec, low_hz: float, high_hz: float) -> Errors:
-    """Median errors against the analytic response over coherent lines of a band."""
+def errors(frf, spec: MechanicsSpec, low_hz: float, high_hz: float, truth=None) -> Errors:
+    """Median errors over coherent lines of a band, against the analytic response or ``truth``."""
     f = np.asarray(frf.frequency_hz)
     use = (f >= low_hz) & (f <= high_hz) & (frf.coherence >= 0.9)
     if not np.any(use):
         return Errors(np.nan, np.nan, np.nan, 0)
-    ratio = frf.response[use] / analytic_response(spec, f[use])
+    true = analytic_response(spec, f[use]) if truth is None else truth(f[use])
+    ratio = frf.response[use] / true
     db, deg = np.abs(20 * np.log10(np.abs(ratio))), np.abs(np.degrees(np.angle(ratio)))
     inside = (db <= 1.96 * frf.std_db[use]) & (deg <= 1.96 * frf.std_deg[use])
     return Errors(
