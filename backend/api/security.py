@@ -27,7 +27,7 @@ from backend.people.identity import Actor, Identity, acting
 from backend.people.rights import Right
 from backend.people.station import People
 from backend.people.throttle import Bucket
-from drivers.errors import DriveError
+from drivers.errors import DriveError, NotAllowed
 
 log = logging.getLogger(__name__)
 
@@ -178,6 +178,7 @@ class Gate:
         if not needs:
             raise self._undeclared(method, path, identity)
         connection = self._own_connection(scope, identity)
+        named = header(scope["headers"], CONNECTION_HEADER.encode())
         if connection is None:
             # Routes believe the header, so one that is not true does not reach them.
             scope["headers"] = [
@@ -187,6 +188,8 @@ class Gate:
             if matched.need.right == "stop" and identity is None:
                 identity = self._people.may_stop(brought.cookie)
             self._require(matched, identity, connection)
+        if method not in _SAFE and any(m.need.lease == "drive" for m in needs):
+            self._require_present(named)
         if method not in _SAFE and all(m.need.right != "stop" for m in needs):
             self._require_csrf(scope, identity, brought)
         limit = min(m.need.body_bytes for m in needs)
@@ -246,6 +249,21 @@ class Gate:
         if named is None or identity is None:
             return None
         return named if self._sockets.owner(named) == identity.session else None
+
+    def _require_present(self, named: str | None) -> None:
+        """What a page asked is not done when it arrives after the page has gone.
+
+        A network that hangs delivers a request half a minute late, when the person who pressed
+        may already stand at the machine. Programs name no connection.
+
+        Raises:
+            NotAllowed: the live connection that the request names has ended.
+        """
+        if named is not None and self._sockets.owner(named) is None:
+            raise NotAllowed(
+                "the connection of the page that asked for this has ended since: nothing was done",
+                remedy="wait until the page is connected again, look at the axis, and ask again",
+            )
 
     def _dress(self, scope: Scope, message: Message) -> None:
         headers = MutableHeaders(scope=message)

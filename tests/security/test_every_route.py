@@ -16,6 +16,7 @@ from backend.people.rights import RIGHTS, Right, Role
 from tests.security.conftest import Cast
 from tests.support.guarded import PASSWORD, Caller, GuardedServer, Page
 from tests.support.servo import URL
+from tests.support.station import until
 
 #: For each placeholder something that is not there, so that what is allowed changes nothing.
 NOWHERE = {"account_id": "999999", "number": "1"}
@@ -237,6 +238,28 @@ def test_a_connection_of_somebody_else_is_not_believed(server: GuardedServer, ca
         assert other.status_code == 409
         own = cast.administrator.ask("PATCH", "/drives/x", json=body, headers=named)
         assert own.status_code == 200, own.text
+
+
+def test_what_a_page_asked_is_not_done_after_its_connection_ended(
+    server: GuardedServer, cast: Cast
+) -> None:
+    """As when the network hung: a move must not begin half a minute after it was asked for."""
+    with cast.administrator.live() as page:
+        page.refused(type="ping", n=0)
+        named = {"X-Servodeck-Connection": page.connection}
+        assert rename(cast, named).status_code == 200
+    late = until(lambda: refused(rename(cast, named)), 5, "the connection has ended")
+    assert "has ended since: nothing was done" in late.json()["detail"]
+    assert cast.administrator.ask("POST", "/stop", json={}, headers=named).status_code == 200
+    assert rename(cast, {}).status_code == 200, "programs name no connection"
+
+
+def rename(cast: Cast, headers: dict[str, str]) -> httpx.Response:
+    return cast.administrator.ask("PATCH", "/drives/x", json={"name": "X"}, headers=headers)
+
+
+def refused(answer: httpx.Response) -> httpx.Response | None:
+    return answer if answer.status_code == 409 else None
 
 
 # --- default deny ---------------------------------------------------------------------

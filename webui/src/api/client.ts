@@ -8,8 +8,12 @@ export const API_ROOT = new URL('.', document.baseURI).pathname.replace(/\/$/, '
 
 let connection: string | null = null
 
-/** The websocket's name: the server lets changes through for the holder of the control lease. */
-export function setConnection(id: string | null): void {
+/**
+ * The websocket's name: the server lets changes through for the holder of the control lease.
+ * A lost one stays until the next: what is pressed meanwhile must not be done whenever the network
+ * delivers it, and the server refuses what comes in the name of a connection that has ended.
+ */
+export function setConnection(id: string): void {
   connection = id
 }
 

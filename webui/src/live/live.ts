@@ -141,7 +141,6 @@ worker.onmessage = (event: MessageEvent<FromWorker>) => {
   const answer = event.data
   switch (answer.kind) {
     case 'link':
-      if (!answer.state.open) setConnection(null)
       if (!answer.state.open && answer.state.attempt > 0) onRefused()
       store.setLink(answer.state, Date.now())
       break
