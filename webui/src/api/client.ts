@@ -1,4 +1,5 @@
 import createClient from 'openapi-fetch'
+import { patient } from './patience'
 import type { components, paths } from './schema'
 
 export type Problem = components['schemas']['Problem']
@@ -30,7 +31,7 @@ export function whenUnknown(act: () => void): void {
   onUnknown = act
 }
 
-export const api = createClient<paths>({ baseUrl: API_ROOT })
+export const api = createClient<paths>({ baseUrl: API_ROOT, fetch: (request) => patient(request) })
 api.use({
   onRequest({ request }) {
     if (connection !== null) request.headers.set('X-Servodeck-Connection', connection)

@@ -42,7 +42,6 @@ export const functions = {
   'bundle.make': ['Make a bundle now', '立即生成'],
   'bundle.armed': ['A fault makes one by itself.', '发生故障时自动生成。'],
   'bundle.notArmed': ['Faults make none: that is switched off.', '故障时不自动生成（已关闭）。'],
-  'bundle.size': ['size {kib} KiB', '大小 {kib} KiB'],
   'bundle.none': ['There is none yet.', '尚无支持包。'],
 
   'io.inputs': ['Inputs', '输入'],

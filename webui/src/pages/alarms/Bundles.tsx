@@ -8,6 +8,7 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { useFetched } from '../../widgets/useFunctions'
+import { size } from '../rerun/viewer'
 
 const SHOWN = 5
 
@@ -45,8 +46,7 @@ export function Bundles() {
               <Icon name="download" /> {bundle.name}
             </a>{' '}
             <span className="dim num">
-              {dateTime(bundle.created)} ·{' '}
-              {t('bundle.size', { kib: Math.ceil(bundle.bytes / 1024) })}
+              {dateTime(bundle.created)} · {size(bundle.bytes)}
             </span>
           </li>
         ))}
