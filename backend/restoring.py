@@ -17,8 +17,8 @@ CLEANUP_TIMEOUT_S = 5.0
 
 #: What to do about values that could not be put back.
 PUT_BACK_LATER = (
-    "once the drive answers again they are put back while it stands, or offered on its pages; "
-    "look at them before the next motion"
+    "a running server puts them back, or offers to, when the drive answers again and its axis "
+    "stands; without one write these values by hand before the next motion"
 )
 
 

@@ -200,6 +200,6 @@ async def start_autotune(bench: TheBench, member: Controlled, request: AutotuneR
         change_log(bench).add(
             member.drive.id, Change(datetime.now(UTC), "autotune", found.before, after)
         )
-        return autotune.as_json(found)
+        return autotune.as_json(found) | {"after": after}
 
     return await _start(bench, member, request, "autotune", "Tune", tool)

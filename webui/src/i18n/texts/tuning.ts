@@ -487,7 +487,15 @@ export const tuning = {
   'autotune.step.4': ['Design', '设计'],
   'autotune.step.5': ['Apply', '应用'],
   'autotune.step.6': ['Verify', '验证'],
-  'autotune.applied': ['Written and verified: {mark}.', '已写入并验证：{mark}。'],
+  'autotune.force.acts': ['Written and verified: {mark}.', '已写入并验证：{mark}。'],
+  'autotune.force.takenBack': [
+    'It was verified ({mark}) and taken back: the gains are as before.',
+    '已验证（{mark}），随后撤销：增益与之前相同。',
+  ],
+  'autotune.force.changed': [
+    'It was written and verified ({mark}). Gains have been changed since: what was verified is no longer what acts.',
+    '已写入并验证（{mark}）。此后增益已被更改：当前生效的不再是已验证的设置。',
+  ],
   'autotune.save': [
     'It acts until power-off. Save the parameters in the drive to keep it.',
     '断电前有效。如需保留，请将参数保存到驱动器。',

@@ -110,6 +110,8 @@ export interface Autotune {
   } | null
   step: Step | null
   before: Record<string, number>
+  /** Raw values of what was applied; absent in jobs of an older server. */
+  after?: Record<string, number>
   tried: string[]
   /** Absent in jobs of an older server. */
   notes?: string[]

@@ -26,12 +26,15 @@ export function AutotunePanel({
   state,
   limits,
   able,
+  now,
   onChanged,
 }: {
   drive: string
   state: AxisState | null
   limits: Limits | null
   able: boolean
+  /** Gains that the drive holds now, raw. */
+  now: Record<string, number> | null
   onChanged: () => void
 }) {
   const t = useT()
@@ -131,7 +134,13 @@ export function AutotunePanel({
       )}
       <JobNote id={note} onClose={dismiss} />
       {result && job && (
-        <AutotuneReport drive={drive} job={job.id} result={result} onChanged={onChanged} />
+        <AutotuneReport
+          drive={drive}
+          job={job.id}
+          result={result}
+          now={now}
+          onChanged={onChanged}
+        />
       )}
     </Panel>
   )

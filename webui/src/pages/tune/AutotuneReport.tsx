@@ -12,6 +12,7 @@ import { type Autotune, filesOf } from '../response/results'
 import { usePrediction } from '../response/usePrediction'
 import { TRACE_COLORS } from '../scope/channels'
 import { CandidateTable } from './CandidateTable'
+import { forceOf } from './force'
 import { InertiaResult } from './InertiaPanel'
 import { StepNumbers } from './StepNumbers'
 
@@ -22,15 +23,18 @@ export function AutotuneReport({
   drive,
   job,
   result,
+  now,
   onChanged,
 }: {
   drive: string
   job: string
   result: Autotune
+  /** Gains that the drive holds now, raw; null where they are not known. */
+  now: Record<string, number> | null
   onChanged: () => void
 }) {
   const t = useT()
-  const [back, setBack] = useState(undone.has(job))
+  const [pressed, setPressed] = useState(undone.has(job))
   const undo = useAction()
   const applied = result.applied
   const go = () =>
@@ -42,28 +46,28 @@ export function AutotuneReport({
         }),
       )
       undone.add(job)
-      setBack(true)
+      setPressed(true)
       onChanged()
     })
+  const told = now === null ? 'acts' : forceOf(result.before, result.after ?? {}, now)
+  const force = pressed ? 'takenBack' : told
   return (
     <>
       {applied && (
-        <div className={`note ${back ? 'info' : 'good'}`}>
+        <div className={`note ${force === 'acts' ? 'good' : 'info'}`}>
           <div className="row wrap middle">
             <span className="grow">
-              {back
-                ? t('undo.undo')
-                : t('autotune.applied', {
-                    mark: applied.marks.map((mark) => known(t, 'mark', mark)).join(', '),
-                  })}
+              {t(`autotune.force.${force}`, {
+                mark: applied.marks.map((mark) => known(t, 'mark', mark)).join(', '),
+              })}
             </span>
-            {!back && (
+            {force !== 'takenBack' && (
               <Button loading={undo.busy} onClick={() => void go()}>
                 {t('undo.button')}
               </Button>
             )}
           </div>
-          {!back && <p>{t('autotune.save')}</p>}
+          {force === 'acts' && <p>{t('autotune.save')}</p>}
         </div>
       )}
       <ProblemNote problem={undo.problem} onClose={undo.clear} />

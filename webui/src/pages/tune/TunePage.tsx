@@ -107,6 +107,7 @@ export function TunePage({ drive }: { drive: string }) {
               state={state}
               limits={limits.agreed ? limits.limits : null}
               able={able}
+              now={gains.gains?.raw ?? null}
               onChanged={() => void gains.read()}
             />
           )}
