@@ -37,10 +37,10 @@ def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> fl
     limit = float(
         max(np.median(np.abs(u)) for u in plain) / s.samples * 2.0 * np.sqrt(s.lines.size)
     )
-    # Alike first, since friction shows best where its lines are many; behind a coarse encoder
-    # the upper lines are mostly noise, and drown it, and so does what play does there.
+    # By their noise first: behind a coarse encoder the upper lines drown friction, and elsewhere
+    # the lower ones tell it best. What play does drowns it in all but the lowest.
     low = np.asarray(s.frequency_hz <= _LOWEST * s.frequency_hz[0], dtype=np.float64)
-    for weight in (np.ones(s.frequency_hz.size), _torque_weight(s, plain), low):
+    for weight in (_torque_weight(s, plain), np.ones(s.frequency_hz.size), low):
         found = minimize_scalar(
             _scatter, bounds=(0.0, limit), method="bounded", args=(s, plain, turned, weight)
         )

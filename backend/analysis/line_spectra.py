@@ -6,10 +6,11 @@ What the torque was between two bus cycles is reconstructed from the sent sequen
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
+from scipy.signal import resample_poly
 
 from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from backend.analysis.excitation import Excitation, Segment
@@ -28,6 +29,8 @@ Quantity = Literal["torque_mode", "torque_injection", "closed_loop"]
 
 #: The lag of the speed is read below this share of the sample rate, and is no longer than this.
 _TELLING, _LATEST_S = 0.2, 2e-3
+#: Points between samples at which the direction of motion is looked at.
+_FINER = 4
 
 
 @dataclass(frozen=True)
@@ -44,12 +47,26 @@ class Record:
     torque: FloatArray | None = None
     valid: BoolArray | None = None
     position: FloatArray | None = None
+    _directions: dict[float, FloatArray] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         n = self.excitation.samples.size
         for signal in (self.response, self.torque, self.valid, self.position):
             if signal is not None and signal.shape != (n,):
                 raise ValueError(f"signals must have {n} samples, as the excitation has")
+
+    def direction(self, lag_s: float) -> FloatArray:
+        """Mean direction of motion between each sample and the next [n], -1 to 1.
+
+        ``lag_s`` is how late the response is, a velocity. It is asked for again and again.
+        """
+        key = round(lag_s, 7)
+        if key not in self._directions:
+            rate = self.excitation.sample_rate_hz
+            self._directions[key] = _direction(self.response, key, rate)
+        return self._directions[key]
 
 
 @dataclass(frozen=True)
@@ -245,24 +262,28 @@ def friction_direction(
 ) -> ComplexArray:
     """Spectra [periods, lines] of the true direction of motion, on the lines of ``e``.
 
-    A filtered speed changes its sign late, and what it then does is not the filtered sign; so
-    the lag of the speed is taken out of it before (as of a first-order filter).
+    ``lag_s`` as from :func:`speed_lag_s`.
     """
-    speed = record.response
-    if lag_s > 0:
-        speed = speed + lag_s * e.sample_rate_hz * np.gradient(speed)
-    spectra = period_spectra(_direction(np.asarray(speed)), e, periods)
+    spectra = period_spectra(record.direction(lag_s), e, periods)
     centre = _centre_of_interval(e.line_hz, e.sample_rate_hz)
     return np.asarray(spectra * centre / delay_response(e.line_hz, path.response_delay_s))
 
 
-def _direction(velocity: FloatArray) -> FloatArray:
-    """Mean sign of the velocity between each sample and the next, linear in between."""
-    after = np.append(velocity[1:], velocity[-1])
-    rise = after - velocity
+def _direction(velocity: FloatArray, lag_s: float, rate_hz: float) -> FloatArray:
+    """Mean sign of the velocity between each sample and the next.
+
+    A filtered speed changes its sign late, and what it then does is not the filtered sign: its
+    lag is taken out of it before (as of a first-order filter). What swings near half the sample
+    rate is no straight line from sample to sample; it is interpolated as the band allows.
+    """
+    fine = resample_poly(velocity, _FINER, 1, window=("kaiser", 8.0))
+    fine = fine + lag_s * rate_hz * _FINER * np.gradient(fine)
+    after = np.append(fine[1:], fine[-1])
+    rise = after - fine
     moving = np.abs(rise) > 1e-12
     safe = np.where(moving, rise, 1.0)
-    return np.where(moving, (np.abs(after) - np.abs(velocity)) / safe, np.sign(velocity))
+    mean = np.where(moving, (np.abs(after) - np.abs(fine)) / safe, np.sign(fine))
+    return np.asarray(mean.reshape(-1, _FINER).mean(axis=1))
 
 
 def _centre_of_interval(frequency_hz: FloatArray, sample_rate_hz: float) -> ComplexArray:
