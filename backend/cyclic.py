@@ -151,8 +151,14 @@ class CyclicSession:
         scale = np.array([p.scale for p in parameters])
         offset = np.array([p.offset for p in parameters])
 
+        known: tuple[str, ...] = ()
+        columns: list[int] = []
+
         def take(block: ScopeBlock) -> None:
-            columns = [block.channels.index(name) for name in names if name in block.channels]
+            nonlocal known, columns
+            if block.channels != known:
+                known = block.channels
+                columns = [known.index(name) for name in names if name in known]
             if len(columns) != len(names):
                 return
             deliver(

@@ -34,7 +34,7 @@ RETRY_S = 0.25
 
 @dataclass(eq=False, slots=True)
 class Subscription:
-    """One stream of one drive's channels. ``wanted`` wakes the consumer."""
+    """One stream of one drive's channels. ``ready`` wakes the consumer, who empties ``queue``."""
 
     drive: str
     keys: tuple[str, ...]
@@ -83,13 +83,6 @@ class Subscription:
             return
         self.queue.append(block)
         self.ready.set()
-
-    async def next(self) -> ScopeBlock:
-        """The next block, waiting for it."""
-        while not self.queue:
-            self.ready.clear()
-            await self.ready.wait()
-        return self.queue.popleft()
 
 
 class ScopeHub:

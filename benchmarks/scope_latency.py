@@ -68,8 +68,13 @@ LISTEN = """([url, channels, ms]) => new Promise((done) => {
       if (typeof data === 'string') return
       const now = performance.timeOrigin + performance.now()
       const head = new DataView(data)
-      const rows = head.getUint16(16, true)
-      seen.push([now, head.getFloat64(24, true) + head.getFloat64(32, true) * (rows - 1)])
+      for (let at = 0; at < data.byteLength;) {
+        const [rows, columns] = [head.getUint16(at + 16, true), head.getUint16(at + 18, true)]
+        const flags = head.getUint32(at + 20, true)
+        const dt = head.getFloat64(at + 32, true)
+        seen.push([now, head.getFloat64(at + 24, true) + dt * (rows - 1)])
+        at += 40 + 4 * rows * columns + (flags & 1) * 8 * rows + ((flags >> 1) & 1) * 8 * columns
+      }
     }
     setTimeout(() => { socket.close(); postMessage(seen) }, ${ms})
   }`

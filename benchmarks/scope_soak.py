@@ -24,7 +24,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +128,29 @@ def cpu_s(pid: int) -> float:
     """Processor time of a process so far."""
     fields = Path(f"/proc/{pid}/stat").read_text("ascii").rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def fieldbus(server: int) -> dict[str, int]:
+    """The processes beneath a station's that serve the bus: part to process id."""
+    parents, lines = {}, {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with suppress(OSError, IndexError):  # it has ended meanwhile
+                stat = (entry / "stat").read_text("ascii").rpartition(")")[2].split()
+                parents[int(entry.name)] = int(stat[1])
+                lines[int(entry.name)] = (entry / "cmdline").read_bytes().split(b"\0")
+    beneath = {server}
+    while more := {pid for pid, parent in parents.items() if parent in beneath} - beneath:
+        beneath |= more
+    modules = {
+        "virtual segment": b"drivers.virtual.wires.ethercat", "host": b"drivers.ethercat.host",
+    }  # fmt: skip
+    return {
+        part: pid
+        for part, module in modules.items()
+        for pid in beneath
+        if lines[pid][1:3] == [b"-m", module]
+    }
 
 
 def prepare(http: httpx.Client) -> list[str]:
@@ -257,7 +280,8 @@ def soak(http: httpx.Client, server: int, url: str, folder: Path, browsers: list
     http.post("/recordings", json={"name": "soak", "channels": channels}).raise_for_status()
     poller = Poller(url)
     poller.start()
-    began, used = time.monotonic(), cpu_s(server)
+    parts = {"server": server} | fieldbus(server)
+    began, used = time.monotonic(), {part: cpu_s(pid) for part, pid in parts.items()}
     memory = []
     stopped = False
     while (now := time.monotonic() - began) < SECONDS:
@@ -269,7 +293,7 @@ def soak(http: httpx.Client, server: int, url: str, folder: Path, browsers: list
         memory.append(memory_mib(server))
         time.sleep(1)
     took = time.monotonic() - began
-    server_cpu = cpu_s(server) - used
+    spent = {part: cpu_s(pid) - used[part] for part, pid in parts.items()}
     poller.stop.set()
     poller.join()
     after, views = [], []
@@ -290,10 +314,9 @@ def soak(http: httpx.Client, server: int, url: str, folder: Path, browsers: list
     settled = memory[int(min(SETTLING_S, took * SETTLING_PART) / took * len(memory)) :]
     tenth = max(1, len(settled) // 10)
     grown = float(np.median(settled[-tenth:]) - np.median(settled[:tenth]))
-    print(
-        f"server: {100 * server_cpu / took:.0f} % of a core, memory {settled[0]:.0f} MiB after "
-        f"the first minutes, {settled[-1]:.0f} MiB at the end, {max(memory):.0f} at most"
-    )
+    by_part = ", ".join(f"{part} {100 * s / took:.0f} %" for part, s in spent.items())
+    print(f"of a core: {by_part}; memory of the server {settled[0]:.0f} MiB settled, "
+          f"{settled[-1]:.0f} MiB at the end, {max(memory):.0f} at most")  # fmt: skip
     shares = [100 * (b - a) / took for a, b in zip(before, after, strict=True)]
     print(f"browsers: {shares[0]:.0f} % and {shares[1]:.0f} % of a core")
     for name, figures in (("alone", quiet), ("with all", busy)):

@@ -1,6 +1,6 @@
 """Messages of the websocket ``/api/v1/live``. Text frames are JSON of these types.
 
-Binary frames carry scope blocks, little endian::
+Binary frames carry one scope block or several, one behind the other, little endian::
 
     u32 magic 0x424B4353 ("SCKB")   u32 subscription   u32 sequence   u32 dropped samples
     u16 n rows   u16 k channels   u32 flags (bit 0: true times follow, bit 1: bases follow,

@@ -29,6 +29,8 @@ MOST_SUBSCRIPTIONS = 32
 MOST_REQUESTS = 200
 #: A page that takes no block for this long is cut off; what it missed is counted until then.
 SEND_TIMEOUT_S = 10.0
+#: Bytes of blocks that one frame carries at most, but for its last block.
+FRAME_BYTES = 256 * 1024
 #: The gearing of a mute drive must not keep the samples of the others waiting.
 UNITS_TIMEOUT_S = 2.0
 
@@ -43,7 +45,6 @@ class _Running:
     request: ScopeStart
     signature: object
     streams: _Streams
-    pumps: list[asyncio.Task[None]]
 
 
 class ScopeStreams:
@@ -58,6 +59,8 @@ class ScopeStreams:
         self._running: dict[int, _Running] = {}
         #: Ending a poll may take as long as a mute drive; STOP and jog never wait for that.
         self._requests: asyncio.Queue[ScopeStart | ScopeStop | None] = asyncio.Queue(MOST_REQUESTS)
+        #: A block of any stream waits to be sent.
+        self._ready = asyncio.Event()
         self._stuck = False
         self._changed = False
 
@@ -85,21 +88,22 @@ class ScopeStreams:
 
     async def run(self) -> None:
         """Serve requests until cancelled; returns when the page takes no more samples."""
-        while not self._stuck:
-            request = await self._requests.get()
-            if isinstance(request, ScopeStart):
-                await self._start(request)
-            elif isinstance(request, ScopeStop):
-                await self._stop(request.subscription)
-            if self._changed:
-                self._changed = False
-                await self._renew()
+        pump = asyncio.create_task(self._pump(), name=f"scope-{self._name}")
+        try:
+            while not self._stuck:
+                request = await self._requests.get()
+                if isinstance(request, ScopeStart):
+                    await self._start(request)
+                elif isinstance(request, ScopeStop):
+                    await self._stop(request.subscription)
+                if self._changed:
+                    self._changed = False
+                    await self._renew()
+        finally:
+            pump.cancel()
 
     async def close(self) -> None:
         """End all; nothing more is sent, however long the ends take."""
-        for running in self._running.values():
-            for pump in running.pumps:
-                pump.cancel()
         for subscription in list(self._running):
             await self._stop(subscription)
 
@@ -119,19 +123,14 @@ class ScopeStreams:
         except DriveError as error:
             self._refuse(request, error)
             # It is tried again when the bench changes: a drive may come back.
-            self._running[request.subscription] = _Running(request, signature, [], [])
+            self._running[request.subscription] = _Running(request, signature, [])
             return
         described = await self._described(request, streams)
         self._tell(ScopeInfo(subscription=request.subscription, channels=described))
-        count = len(request.channels)
-        pumps = [
-            asyncio.create_task(
-                self._pump(request.subscription, place, stream, numbers, count),
-                name=f"scope-{self._name}-{request.subscription}-{place}",
-            )
-            for place, (stream, numbers) in enumerate(streams)
-        ]
-        self._running[request.subscription] = _Running(request, signature, streams, pumps)
+        for stream, _ in streams:
+            stream.ready = self._ready
+        self._running[request.subscription] = _Running(request, signature, streams)
+        self._ready.set()
 
     def _refuse(self, request: ScopeStart, error: DriveError) -> None:
         problem = problem_of(error)
@@ -177,8 +176,6 @@ class ScopeStreams:
         running = self._running.pop(subscription, None)
         if running is None:
             return
-        for pump in running.pumps:
-            pump.cancel()
         for stream, _ in running.streams:
             await self._bench.scope.unsubscribe(stream)
 
@@ -214,16 +211,33 @@ class ScopeStreams:
 
     # --- samples ----------------------------------------------------------------------
 
-    async def _pump(self, subscription: int, place: int, stream: Subscription,
-                    numbers: tuple[int, ...], count: int) -> None:  # fmt: skip
+    async def _pump(self) -> None:
+        """Send what has come of all streams, together: a frame costs more than what is in it."""
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             while True:
-                block = await stream.next()
-                frame = encode_block(subscription, block, numbers, count, place)
-                try:
-                    async with asyncio.timeout(SEND_TIMEOUT_S):
-                        await self._send(frame)
-                except TimeoutError:
-                    self._stuck = True
-                    self.bench_changed()  # wakes `run`, which ends the connection
-                    return
+                await self._ready.wait()
+                self._ready.clear()
+                while frame := self._waiting():
+                    try:
+                        async with asyncio.timeout(SEND_TIMEOUT_S):
+                            await self._send(frame)
+                    except TimeoutError:
+                        self._stuck = True
+                        self.bench_changed()  # wakes `run`, which ends the connection
+                        return
+                    # A send that need not wait gives nobody else a turn: without this one all
+                    # that is queued would go to a line that broke, before anyone is told.
+                    await asyncio.sleep(0)
+
+    def _waiting(self) -> bytes:
+        """Blocks that wait, oldest of each stream first; empty without any."""
+        blocks: list[bytes] = []
+        size = 0
+        for subscription, running in self._running.items():
+            count = len(running.request.channels)
+            for place, (stream, numbers) in enumerate(running.streams):
+                while stream.queue and size < FRAME_BYTES:
+                    block = stream.queue.popleft()
+                    blocks.append(encode_block(subscription, block, numbers, count, place))
+                    size += len(blocks[-1])
+        return b"".join(blocks)

@@ -234,7 +234,8 @@ async def _record(
         async with asyncio.timeout(seconds) as clock:
             async for message in page:
                 if isinstance(message, bytes):
-                    into.add(decode(message))
+                    for block in decode(message):
+                        into.add(block)
                     continue
                 try:
                     news = _News.validate_json(message)

@@ -21,15 +21,27 @@ class Samples:
     dropped: int
 
 
-def decode(frame: bytes) -> Samples:
-    """One binary frame.
+def decode(frame: bytes) -> list[Samples]:
+    """The blocks of one binary frame.
 
     Raises:
-        ProtocolError: it is no scope block.
+        ProtocolError: these are no scope blocks.
     """
+    blocks: list[Samples] = []
+    at = 0
+    while at < len(frame) or not blocks:
+        block, at = _decode(frame, at)
+        blocks.append(block)
+    return blocks
+
+
+def _decode(frame: bytes, begin: int) -> tuple[Samples, int]:
+    """The block at ``begin``, and where the next one begins."""
     try:
-        magic, _sub, _seq, dropped, rows, columns, flags, t0_s, dt_s = HEADER.unpack_from(frame)
-        at = HEADER.size if magic == MAGIC else len(frame) + 1
+        magic, _sub, _seq, dropped, rows, columns, flags, t0_s, dt_s = HEADER.unpack_from(
+            frame, begin
+        )
+        at = begin + HEADER.size if magic == MAGIC else len(frame) + 1
         times = t0_s + dt_s * np.arange(rows, dtype=np.float64)
         if flags & TRUE_TIMES:
             times, at = np.frombuffer(frame, "<f8", rows, at), at + 8 * rows
@@ -41,4 +53,5 @@ def decode(frame: bytes) -> Samples:
         raise ProtocolError(
             f"the server sent something that is no scope block ({error})"
         ) from error
-    return Samples(times, values.astype(np.float64) + bases, dropped)
+    at += 4 * rows * columns
+    return Samples(times, values.astype(np.float64) + bases, dropped), at

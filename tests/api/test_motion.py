@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.api.test_scope_streams import blocks
 from tests.support.station import Live, Station, until
 
 JOG = {"speed": 300.0, "acceleration": 3000.0, "travel_limit": 20.0, "torque_limit": 150.0}
@@ -281,13 +282,11 @@ def test_scope_delivers_samples_with_their_times(station: Station, x: str, page:
     import struct
 
     sequences = []
-    for block in page.binary:
-        magic, subscription, sequence, dropped, rows, count, flags, _t0, dt = struct.unpack_from(
-            "<IIIIHHIdd", block
-        )
+    for head, rest in (block for frame in page.binary for block in blocks(frame)):
+        magic, subscription, sequence, dropped, rows, count, flags, _t0, dt = head
         assert (magic, subscription, dropped, count, flags) == (0x424B4353, 5, 0, 2, 1)
-        assert len(block) == 40 + 8 * rows + 4 * rows * count
-        times = struct.unpack_from(f"<{rows}d", block, 40)
+        assert len(rest) == 8 * rows + 4 * rows * count
+        times = struct.unpack_from(f"<{rows}d", rest)
         assert list(times) == sorted(times)
         assert dt >= 0
         sequences.append(sequence)

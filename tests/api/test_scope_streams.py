@@ -77,9 +77,21 @@ def begin(page: Live, drive: str, keys: tuple[str, ...], number: int = 1) -> Any
     return page.wait("scope_info", subscription=number)
 
 
+def blocks(frame: bytes) -> Iterator[tuple[tuple[Any, ...], bytes]]:
+    """Head and rest of the blocks of a frame, by the layout in `backend.api.live_messages`."""
+    at = 0
+    while at < len(frame):
+        head = struct.unpack_from("<IIIIHHIdd", frame, at)
+        rows, columns, flags = head[4:7]
+        size = 4 * rows * columns + 8 * rows * (flags & 1) + 8 * columns * (flags >> 1 & 1)
+        yield head, frame[at + 40 : at + 40 + size]
+        at += 40 + size
+    assert at == len(frame)
+
+
 def heads(frames: list[bytes], number: int = 1) -> list[tuple[Any, ...]]:
     """(sequence, dropped, rows, flags, t0, dt) of the frames of a subscription."""
-    found = [struct.unpack_from("<IIIIHHIdd", frame) for frame in frames]
+    found = [head for frame in frames for head, _ in blocks(frame)]
     return [(h[2], h[3], h[4], h[6], h[7], h[8]) for h in found if h[1] == number]
 
 

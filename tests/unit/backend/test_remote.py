@@ -41,7 +41,8 @@ def test_what_is_no_bus_is_asked_of_nobody() -> None:
 def test_blocks_are_taken_apart() -> None:
     values = np.array([[1.0, 2.0**31 - 1], [np.nan, 2.0**31]])
     block = ScopeBlock(0, 5.0, 0.25, ("a", "b"), values, dropped=3)
-    found = decode(encode_block(1, block, (0, 2), 3))
+    (found, again) = decode(encode_block(1, block, (0, 2), 3) * 2)
+    assert again.values.shape == (2, 3)
     assert found.times_s.tolist() == [5.0, 5.25]
     assert found.dropped == 3
     assert found.values[:, 2].tolist() == [2.0**31 - 1, 2.0**31]

@@ -21,9 +21,19 @@ const HEADER_BYTES = 40
 const TRUE_TIMES = 1
 const BASES = 2
 
-/** Decode one binary frame. Throws RangeError or Error on anything that is not a whole block. */
-export function decodeBlock(buffer: ArrayBuffer): ScopeBlock {
-  const view = new DataView(buffer)
+/** Decode one binary frame. Throws RangeError or Error on anything that is not whole blocks. */
+export function decodeBlocks(buffer: ArrayBuffer): ScopeBlock[] {
+  const blocks: ScopeBlock[] = []
+  for (let at = 0; at < buffer.byteLength || at === 0; ) {
+    const { block, end } = decodeBlock(buffer, at)
+    blocks.push(block)
+    at = end
+  }
+  return blocks
+}
+
+function decodeBlock(buffer: ArrayBuffer, at: number): { block: ScopeBlock; end: number } {
+  const view = new DataView(buffer, at)
   if (view.getUint32(0, true) !== MAGIC) throw new Error('not a scope block')
   const rows = view.getUint16(16, true)
   const channels = view.getUint16(18, true)
@@ -34,8 +44,8 @@ export function decodeBlock(buffer: ArrayBuffer): ScopeBlock {
   const withBases = (flags & BASES) !== 0
   const expected =
     HEADER_BYTES + (trueTimes ? rows * 8 : 0) + (withBases ? channels * 8 : 0) + rows * channels * 4
-  if (buffer.byteLength !== expected) {
-    throw new Error(`scope block of ${buffer.byteLength} bytes instead of ${expected}`)
+  if (view.byteLength < expected) {
+    throw new Error(`scope block of ${view.byteLength} bytes instead of ${expected}`)
   }
   let offset = HEADER_BYTES
   const times = new Float64Array(rows)
@@ -43,18 +53,17 @@ export function decodeBlock(buffer: ArrayBuffer): ScopeBlock {
     times[row] = trueTimes ? view.getFloat64(offset + row * 8, true) : t0 + row * dt
   }
   if (trueTimes) offset += rows * 8
-  const bases = new Float64Array(channels)
+  // Whatever runs a browser is little endian, as the frames are; a block is whole words of 4 bytes.
+  const samples = new Float64Array(
+    new Float32Array(buffer, at + expected - rows * channels * 4, rows * channels),
+  )
   if (withBases) {
-    for (let k = 0; k < channels; k++) bases[k] = view.getFloat64(offset + k * 8, true)
-    offset += channels * 8
-  }
-  const samples = new Float64Array(rows * channels)
-  for (let row = 0, i = 0; row < rows; row++) {
-    for (let k = 0; k < channels; k++, i++) {
-      samples[i] = view.getFloat32(offset + i * 4, true) + (bases[k] as number)
+    for (let k = 0; k < channels; k++) {
+      const base = view.getFloat64(offset + k * 8, true)
+      for (let i = k; i < samples.length; i += channels) samples[i] = (samples[i] as number) + base
     }
   }
-  return {
+  const block = {
     subscription: view.getUint32(4, true),
     stream: (flags >> 8) & 0xff,
     sequence: view.getUint32(8, true),
@@ -65,4 +74,5 @@ export function decodeBlock(buffer: ArrayBuffer): ScopeBlock {
     times,
     samples,
   }
+  return { block, end: at + expected }
 }

@@ -16,7 +16,7 @@ export class Ring {
   private values = new Float64Array(FIRST_ROWS)
   private low: Float64Array
   private high: Float64Array
-  /** Number of the oldest row since the beginning; rows are stored at number % length. */
+  /** Where the oldest row lies; the others follow, past the end from the beginning on. */
   private first = 0
   private used = 0
 
@@ -42,14 +42,14 @@ export class Ring {
       if (this.times.length < this.capacity) this.grow()
       else if (this.time(0) >= this.keep) return
       else {
-        this.first++
+        if (++this.first === this.times.length) this.first = 0
         this.used--
       }
     }
-    const at = (this.first + this.used) % this.times.length
+    const at = this.place(this.used)
     this.times[at] = time
     this.values[at] = value
-    const chunk = Math.floor(at / CHUNK)
+    const chunk = (at / CHUNK) | 0
     if (at % CHUNK === 0 || this.used === 0) {
       this.low[chunk] = Number.POSITIVE_INFINITY
       this.high[chunk] = Number.NEGATIVE_INFINITY
@@ -60,17 +60,30 @@ export class Ring {
   }
 
   time(row: number): number {
-    return this.times[(this.first + row) % this.times.length] as number
+    return this.times[this.place(row)] as number
   }
 
   value(row: number): number {
-    return this.values[(this.first + row) % this.values.length] as number
+    return this.values[this.place(row)] as number
   }
 
-  /** First row at or after `time`; `length` when there is none. */
-  firstAt(time: number): number {
-    let low = 0
+  /** Where a row is stored; no remainder, which takes longer than all the rest. */
+  private place(row: number): number {
+    const at = this.first + row
+    return at < this.times.length ? at : at - this.times.length
+  }
+
+  /** First row at or after `time`, none before `from`; `length` when there is none. */
+  firstAt(time: number, from = 0): number {
+    let low = from
     let high = this.used
+    if (from > 0) {
+      // Who knows where it begins looks for something near: the reach doubles until it is inside.
+      for (let reach = 8; low + reach < high; reach *= 2) {
+        if (this.time(low + reach) >= time) high = low + reach
+        else low += reach
+      }
+    }
     while (low < high) {
       const middle = (low + high) >> 1
       if (this.time(middle) < time) low = middle + 1
@@ -91,7 +104,12 @@ export class Ring {
     let low = Number.POSITIVE_INFINITY
     let high = Number.NEGATIVE_INFINITY
     let lowFirst = true
-    const see = (least: number, greatest: number) => {
+    let row = begin
+    while (row < end) {
+      const at = this.place(row)
+      const whole = at % CHUNK === 0 && row + CHUNK <= end
+      const least = (whole ? this.low[at / CHUNK] : this.values[at]) as number
+      const greatest = (whole ? this.high[at / CHUNK] : this.values[at]) as number
       if (least < low) {
         low = least
         lowFirst = false
@@ -100,18 +118,7 @@ export class Ring {
         high = greatest
         lowFirst = true
       }
-    }
-    let row = begin
-    while (row < end) {
-      const at = (this.first + row) % this.times.length
-      if (at % CHUNK === 0 && row + CHUNK <= end) {
-        see(this.low[at / CHUNK] as number, this.high[at / CHUNK] as number)
-        row += CHUNK
-      } else {
-        const value = this.values[at] as number
-        see(value, value)
-        row++
-      }
+      row += whole ? CHUNK : 1
     }
     return low <= high ? { low, high, lowFirst } : null
   }

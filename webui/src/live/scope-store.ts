@@ -1,5 +1,5 @@
 import type { ScopeStart } from '../api/schema'
-import { decodeBlock, type ScopeBlock } from './blocks'
+import { decodeBlocks, type ScopeBlock } from './blocks'
 import { columns, thinned } from './decimate'
 import { MathsChannel } from './maths'
 import { measure, stretch } from './measure'
@@ -181,10 +181,11 @@ export class ScopeStore {
   // --- samples ------------------------------------------------------------------------
 
   block(data: ArrayBuffer): void {
-    const block = decodeBlock(data)
-    for (const [drive, subscription] of this.subscriptions) {
-      if (subscription.number !== block.subscription) continue
-      this.take(drive, subscription, block)
+    for (const block of decodeBlocks(data)) {
+      for (const [drive, subscription] of this.subscriptions) {
+        if (subscription.number !== block.subscription) continue
+        this.take(drive, subscription, block)
+      }
     }
     for (const { channel } of this.maths) channel.advance()
     this.look()
@@ -380,7 +381,7 @@ export class ScopeStore {
     return this.sweeps.slice(0, -1).flatMap((sweep) => {
       const [times, ...series] = columns(traces, sweep.from, sweep.to, bins)
       return series.map((values, trace) => {
-        const shown = times.flatMap((_, i) => (values[i] == null ? [] : [i]))
+        const shown = Array.from(times, (_, i) => i).filter((i) => values[i] != null)
         return {
           trace,
           times: shown.map((i) => (times[i] as number) - sweep.at),

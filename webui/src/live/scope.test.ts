@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest'
-import { decodeBlock } from './blocks'
+import { decodeBlocks, type ScopeBlock } from './blocks'
 import { columns, thinned } from './decimate'
 import { measure } from './measure'
 import { Ring, Trace } from './ring'
@@ -53,9 +53,28 @@ function traceOf(times: number[], values: number[], capacity = 10_000): Trace {
 
 const grid = (n: number, rate: number) => Array.from({ length: n }, (_, i) => i / rate)
 
+const decoded = (buffer: ArrayBuffer) => decodeBlocks(buffer)[0] as ScopeBlock
+
 describe('scope blocks', () => {
+  it('reads all blocks of a frame, whatever they carry', () => {
+    const parts = [
+      frame({ sequence: 1, times: [1, 1.7, 2], rows: [[1], [2], [3]] }),
+      frame({ sequence: 2, bases: [100, 200], rows: [[1, 2]] }),
+      frame({ sequence: 3, t0: 5, dt: 0.5, rows: [[7], [8]] }),
+    ].map((each) => new Uint8Array(each))
+    const whole = Uint8Array.from(parts.flatMap((each) => [...each]))
+    const blocks = decodeBlocks(whole.buffer)
+    expect(blocks.map((each) => each.sequence)).toEqual([1, 2, 3])
+    expect(blocks.map((each) => [...each.samples])).toEqual([
+      [1, 2, 3],
+      [101, 202],
+      [7, 8],
+    ])
+    expect([...(blocks[2] as ScopeBlock).times]).toEqual([5, 5.5])
+    expect(() => decodeBlocks(whole.buffer.slice(0, whole.length - 4))).toThrow(/bytes/)
+  })
   it('reads a synchronous block', () => {
-    const block = decodeBlock(
+    const block = decoded(
       frame({
         subscription: 3,
         stream: 2,
@@ -75,7 +94,7 @@ describe('scope blocks', () => {
     expect([...block.samples]).toEqual([1, 2, 3, 4])
   })
   it('reads true times and invalid values', () => {
-    const block = decodeBlock(frame({ times: [1, 1.7], rows: [[Number.NaN], [5]] }))
+    const block = decoded(frame({ times: [1, 1.7], rows: [[Number.NaN], [5]] }))
     expect(block.spacing).toBeNull()
     expect([...block.times]).toEqual([1, 1.7])
     expect(block.samples[0]).toBeNaN()
@@ -83,15 +102,15 @@ describe('scope blocks', () => {
   it('keeps every count of a position of many turns', () => {
     // 2^30 + 1 has no float32 of its own.
     const base = 2 ** 30
-    const block = decodeBlock(frame({ bases: [base], rows: [[0], [1]] }))
+    const block = decoded(frame({ bases: [base], rows: [[0], [1]] }))
     expect([...block.samples]).toEqual([base, base + 1])
   })
   it('refuses what is cut short or something else', () => {
     const whole = frame({ rows: [[1], [2]] })
-    expect(() => decodeBlock(whole.slice(0, whole.byteLength - 1))).toThrow(/bytes/)
+    expect(() => decodeBlocks(whole.slice(0, whole.byteLength - 1))).toThrow(/bytes/)
     const other = frame({ rows: [[1]] })
     new DataView(other).setUint8(0, 0)
-    expect(() => decodeBlock(other)).toThrow(/not a scope block/)
+    expect(() => decodeBlocks(other)).toThrow(/not a scope block/)
   })
 })
 

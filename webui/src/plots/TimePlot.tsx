@@ -116,7 +116,7 @@ export function TimePlot({
         const [times, ...rest] = next.columns
         plot.batch(() => {
           plot.setData(
-            [times.map((time) => time - next.origin), ...rest] as uPlot.AlignedData,
+            [Float64Array.from(times, (time) => time - next.origin), ...rest],
             false,
           )
           // A scale of no width would keep uPlot looking for ticks for ever.

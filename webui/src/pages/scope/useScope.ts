@@ -88,8 +88,9 @@ export function useFrames(
         latest.current.onFrame(frame)
       }
       // One picture at a time, with a rest between: a slow page asks less often instead of
-      // falling behind, and is always free to hear STOP.
-      const rest = Math.max(period * LEAST_REST, period - (performance.now() - began))
+      // falling behind, leaves half of its time to others, and is always free to hear STOP.
+      const took = performance.now() - began
+      const rest = Math.max(period * LEAST_REST, period - took, took)
       if (alive) timer = setTimeout(() => requestAnimationFrame(() => void round()), rest)
     }
     void round()
