@@ -15,7 +15,9 @@ from dataclasses import dataclass
 
 from backend import restoring
 from backend.drive import Drive
+from backend.people.identity import acting
 from backend.power import PowerState
+from backend.quick_stop import quick_stop_keys, raise_quick_stop
 from backend.readings import Reading
 from backend.restoring import CLEANUP_TIMEOUT_S, shielded
 from backend.travel_units import TravelUnit
@@ -55,6 +57,8 @@ class Axis(PowerState):
         self._unit_raws: dict[str, Raw | None] = {}
         #: A person enabled it by a transition, and nobody took that back here.
         self._left_enabled = False
+        #: The page by which that was done; None where it was no page.
+        self.enabled_by: str | None = None
         drive.listen(self._units_may_have_changed)
 
     async def units(self) -> AxisUnits:
@@ -106,6 +110,8 @@ class Axis(PowerState):
             await self.aim_here()
         # Noted before the word goes out: whatever happens on the way, it may be enabled then.
         self._left_enabled = goal is State.OPERATION_ENABLED
+        actor = acting.get()
+        self.enabled_by = actor.connection if self._left_enabled and actor is not None else None
         await self.go_to(goal)
 
     async def let_go(self) -> None:
@@ -118,7 +124,7 @@ class Axis(PowerState):
         """
         if not self._left_enabled:
             return
-        self._left_enabled = False
+        self._left_enabled, self.enabled_by = False, None
         if await self.state() is State.OPERATION_ENABLED:
             await shielded(self._power_off, CLEANUP_TIMEOUT_S, self.drive.name)
 
@@ -177,6 +183,8 @@ class Axis(PowerState):
     async def enabled(self, mode: Mode, envelope: Envelope) -> AsyncIterator[None]:
         """Operation enabled in ``mode`` with the drive's torque limited by ``envelope``.
 
+        STOP brakes at least as hard meanwhile as the profile's deceleration that was set before.
+
         On leaving, the axis is brought to rest, and back to the power state and mode it was
         in. The mode is set before enabling, at standstill, as some families demand.
 
@@ -205,10 +213,12 @@ class Axis(PowerState):
             if (key := drive.key(role)) is not None
         ]
         mode_keys = await self.restorable_mode()
-        async with self.restoring(*limits, *mode_keys) as earlier:
+        stop_keys = quick_stop_keys(drive)
+        async with self.restoring(*limits, *stop_keys, *mode_keys) as earlier:
             shown = next((earlier[key] for key in mode_keys if key in earlier), None)
             previous = Mode(int(shown)) if shown in set(Mode) else mode
             await self.limit_torque(limits, envelope.torque_percent)
+            await raise_quick_stop(drive, earlier)
             # A stale set-point must not start to move the axis: neither at the change of mode,
             # where it is enabled already, nor when it is enabled.
             await self.aim_here(mode)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import re
-from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -75,7 +75,11 @@ class Bench:
         self.on_drives: list[Callable[[], None]] = []
         self.jobs = JobRunner(self._job_changed, self._permit)
         self._stops: set[asyncio.Task[dict[str, str]]] = set()
+        #: Buses whose exchange is being started or ended, and drives that are being removed.
         self._changing: set[str] = set()
+        self._parting: set[str] = set()
+        #: Bus and station of drives that left the bench and never took their stop.
+        self._unstopped: set[tuple[str, int]] = set()
         self.leases = Leases(self._lease_changed)
         self._witness = Witness(self.audit, self.name_of)
         self.on_job.append(self._witness.job_changed)
@@ -197,27 +201,46 @@ class Bench:
         for member in users:
             if member.drive.id != in_job_of:
                 self.require_idle(member)
-        if url in self._changing:
-            raise Busy(f"{url}: the cyclic exchange is just being changed", remedy="wait for it")
-        if (old := self.sessions.get(url)) is not None:
-            if old.running:
-                raise Busy(f"{url}: the cyclic exchange runs already", remedy="end it first")
-            await self.stop_cyclic(url)
-        session = CyclicSession(link, [m.drive for m in users], by_speed)
-        self._changing.add(url)
-        try:
+        self._require_settled(url)
+        if (old := self.sessions.get(url)) is not None and old.running:
+            raise Busy(f"{url}: the cyclic exchange runs already", remedy="end it first")
+        # From here on nothing else may change it, nor begin to move: not even while the old one
+        # ends.
+        with self._changing_of(url):
+            await self._end_session(url)
+            session = CyclicSession(link, [m.drive for m in users], by_speed)
             await session.start(cycle_s)
-        finally:
-            self._changing.discard(url)
-        self.sessions[url] = session
-        for member in users:
-            member.axis.session = session
+            self.sessions[url] = session
+            for member in users:
+                member.axis.session = session
         self.journal.add(f"{url}: cyclic exchange every {cycle_s * 1e3:g} ms")
         self._drives_changed()
         return session
 
     async def stop_cyclic(self, url: str) -> None:
-        """End the exchange of a bus; what moves is braked. Does nothing where none runs."""
+        """End the exchange of a bus; what moves is braked. Does nothing where none runs.
+
+        Raises:
+            Busy: it is just being started or ended.
+        """
+        self._require_settled(url)
+        with self._changing_of(url):
+            await self._end_session(url)
+
+    def _require_settled(self, url: str) -> None:
+        if url in self._changing:
+            raise Busy(f"{url}: the cyclic exchange is just being changed", remedy="wait for it")
+
+    @contextlib.contextmanager
+    def _changing_of(self, url: str) -> Iterator[None]:
+        """No motion begins on this bus meanwhile: its drives would be taken out from under it."""
+        self._changing.add(url)
+        try:
+            yield
+        finally:
+            self._changing.discard(url)
+
+    async def _end_session(self, url: str) -> None:
         session = self.sessions.pop(url, None)
         if session is None:
             return
@@ -328,6 +351,9 @@ class Bench:
 
     def _add(self, drive: Drive) -> Member:
         axis = Axis(drive)
+        places = {(self.url_of(port), port.station) for port in drive.ports}
+        axis.owes_stop = bool(places & self._unstopped)
+        self._unstopped -= places
         drive_id = drive.id
         monitor = Monitor(
             axis,
@@ -354,20 +380,45 @@ class Bench:
             Busy: it is moving.
         """
         member = self.member(drive_id)
+        self._require_stays(member)
         self.require_idle(member)
-        await self._let_go(member)
-        for url, session in list(self.sessions.items()):
-            if member.drive in session.drives:
-                await self.stop_cyclic(url)
-        del self.members[drive_id]
+        # STOP reaches what is on the bench: nothing may begin to move on its way off it.
+        self._parting.add(drive_id)
+        try:
+            await self._let_go(member)
+            for url, session in list(self.sessions.items()):
+                if member.drive in session.drives:
+                    await self.stop_cyclic(url)
+            if member.axis.owes_stop:
+                self._unstopped.update((self.url_of(p), p.station) for p in member.drive.ports)
+            del self.members[drive_id]
+        finally:
+            self._parting.discard(drive_id)
         await member.monitor.close()
         self._remember()
         self._drives_changed()
+
+    def _require_stays(self, member: Member) -> None:
+        if member.drive.id in self._parting:
+            raise Busy(f"{member.drive.name} is being taken off the bench", drive=member.drive.name)
+
+    async def let_go(self, drive_id: str) -> None:
+        """Take the power off an axis that was enabled here and left so; never raises."""
+        member = self.members.get(drive_id)
+        if member is not None:
+            job = self.jobs.moving(drive_id)
+            if job is not None:
+                # Of the page that is gone, and being ended: the axis is brought to rest first.
+                await job.wait()
+            await self._let_go(member)
+            member.monitor.hurry()
 
     async def _let_go(self, member: Member) -> None:
         try:
             await member.axis.let_go()
         except DriveError as error:
+            # Told to stop as soon as it answers, here or after it was put back on the bench.
+            member.axis.owes_stop = True
             text = f"{member.drive.name} may still be enabled: {error.message}"
             self.journal.add(text, level="error", drive=member.drive.id)
 
@@ -403,9 +454,10 @@ class Bench:
         """A new motion begins by a person's command; it takes back an earlier STOP.
 
         Raises:
-            Busy: the exchange of its bus is being started or ended.
+            Busy: the exchange of its bus is being started or ended, or it leaves the bench.
         """
         member = self.member(drive_id)
+        self._require_stays(member)
         busy = self._changing.intersection(self._urls(member.drive))
         if busy:
             raise Busy(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
@@ -9,7 +11,7 @@ import numpy as np
 
 from backend.drive import Drive
 from backend.ports import Port, address_of
-from drivers.errors import Busy, NotAllowed
+from drivers.errors import Busy, DriveError, NotAllowed
 from drivers.link import (
     Cyclic,
     CyclicSignal,
@@ -85,7 +87,13 @@ class CyclicSession:
             outputs += _signals(drive, port, roles, ("rx", "rxtx"))
         outputs = _fitting_outputs(self.drives, outputs)
         mapped = await self.cyclic.configure(inputs, outputs, cycle_s)
-        await self.cyclic.start()
+        try:
+            await self.cyclic.start()
+        except BaseException:
+            # One that came too late, or that nobody waited for, would own the drives unseen.
+            with contextlib.suppress(DriveError):
+                await asyncio.shield(self.cyclic.stop())
+            raise
         left = {s.channel for s in [*inputs, *outputs]} - {s.channel for s in mapped}
         reasons = {s.channel: why for s, why in getattr(self.cyclic, "left_over", ())}
         self.state = CyclicState(

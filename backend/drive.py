@@ -30,7 +30,7 @@ _COMMAND_ROLES = frozenset({
 #: Roles that a motion sets for its own length, or that change what its numbers mean.
 _MOTION_ROLES = frozenset({
     "profile_velocity", "profile_acceleration", "profile_deceleration", "max_torque",
-    "torque_limit_positive", "torque_limit_negative", "home_offset",
+    "torque_limit_positive", "torque_limit_negative", "home_offset", "quick_stop_deceleration",
 })  # fmt: skip
 
 

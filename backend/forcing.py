@@ -41,6 +41,7 @@ class ForcingSession:
     renewed: float = field(default_factory=time.monotonic)
     reason: str = ""
     before: dict[str, int] = field(default_factory=dict)
+    over: bool = False
     lock: asyncio.Lock = field(default_factory=asyncio.Lock)
 
     def renew(self) -> None:
@@ -60,12 +61,29 @@ class ForcingSession:
             if value is not None:
                 await self._require_allowed(name)
         async with self.lock:
+            self._require_open()
             await self._require_appliable()
             values = {**self.values, **{n: v for n, v in wanted.items() if v is not None}}
             for name in [n for n, v in wanted.items() if v is None]:
                 values.pop(name, None)
             await self._write(values)
             self.values = values
+
+    async def shut(self) -> None:
+        """Nothing is overruled from now on; a write that is under way is waited for."""
+        self.over = True
+        async with self.lock:
+            pass
+
+    def _require_open(self) -> None:
+        """What came too late must not be written after all has been put back."""
+        if self.over:
+            why = self.reason or "cancelled"
+            raise NotAllowed(
+                f"{self.axis.drive.name}: {self.spec.title} has ended: {why}",
+                drive=self.axis.drive.name,
+                remedy="begin it again",
+            )
 
     def _require_known(self, name: str) -> None:
         if name not in self.spec.value.bits:
@@ -259,22 +277,23 @@ class ForcingSessions:
                         drive=axis.drive.name,
                     )
                 ready.set_result(None)
-                await self._watch(session, progress)
+                try:
+                    await self._watch(session, progress)
+                finally:
+                    await shielded(session.shut, CLEANUP_TIMEOUT_S, axis.drive.name)
         finally:
             # The real terminals must count again even if somebody enabled the axis meanwhile.
             await shielded(lambda: apply_settings(axis, keys), CLEANUP_TIMEOUT_S, axis.drive.name)
         return {"reason": session.reason}
 
     async def _watch(self, session: ForcingSession, progress: Progress) -> None:
-        """Until there is a reason to end; a write that is under way is waited for."""
+        """Until there is a reason to end."""
         stopped = session.axis.stopped
         while not session.reason:
             progress(0.0, _words(session))
             await asyncio.sleep(_LOOK_S)
             session.reason = session.reason or self._why_end(session, stopped)
             stopped = session.axis.stopped
-        async with session.lock:
-            pass
 
     def _why_end(self, session: ForcingSession, was_stopped: bool) -> str:
         if session.axis.stopped and not was_stopped:

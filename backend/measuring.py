@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from dataclasses import dataclass
 
 from backend.bench import Bench, Member
 from backend.cyclic import CyclicSession
+from backend.jobs import Job
 from backend.ports import Port
 from backend.tools import profile_speed
 from drivers.errors import DriveError
 
+#: Ending an exchange, and starting the one that had to give way.
+EXCHANGE_ENDS_S = 60.0
 
-@dataclass(frozen=True)
+
+@dataclass
 class Exchange:
     """A running exchange, and what to do with it afterwards."""
 
@@ -24,6 +29,19 @@ class Exchange:
     """It was started for this measurement."""
     before_s: float | None = None
     """Cycle of the exchange that had to give way to it."""
+    taken: bool = False
+    """The measurement has begun, and ends it."""
+    late: asyncio.Task[None] | None = None
+
+    def ends_with(self, job: Job) -> None:
+        """End it also where STOP cancels the job before its first step: no cleanup runs then."""
+
+        def ended(_task: object) -> None:
+            if not self.taken:
+                self.late = asyncio.create_task(self.end(), name=f"end-exchange-{self.drive}")
+
+        if job.task is not None:
+            job.task.add_done_callback(ended)
 
     async def end(self) -> None:
         """Leave the bus as it was. A drive that does not let itself be set up again is told of."""

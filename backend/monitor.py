@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -18,6 +19,8 @@ from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from profiles.schema import Fault
+
+log = logging.getLogger(__name__)
 
 #: Polling period while somebody watches, and while nobody does.
 WATCHED_S = 0.1
@@ -74,7 +77,8 @@ class Monitor:
     ) -> None:
         self.axis = axis
         self.snapshot = Snapshot(time.time(), fresh=False, problem="not read yet")
-        self.watchers = 0
+        #: The live connections that look at it.
+        self.watchers: set[str] = set()
         self._journal = journal
         self._changed = changed
         self._returned = returned
@@ -98,7 +102,13 @@ class Monitor:
 
     async def _run(self) -> None:
         while True:
-            await self.refresh()
+            try:
+                await self.refresh()
+            except Exception as error:
+                # A watch that ended unseen would show the last state as the present one for ever.
+                log.exception("the state of %s cannot be shown", self.axis.drive.name)
+                problem = f"internal error: {type(error).__name__}: {error}"
+                self.snapshot = replace(self.snapshot, fresh=False, problem=problem)
             self._wake.clear()
             period = WATCHED_S if self.watchers else IDLE_S
             with contextlib.suppress(TimeoutError):

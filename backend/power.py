@@ -106,6 +106,8 @@ class PowerState:
                 await self.set_mode(mode)
             await self.go_to(goal, timeout_s)
             return
+        if goal is State.OPERATION_ENABLED:
+            await self.require_stop_delivered()
         if self.stopped and goal is State.OPERATION_ENABLED:
             raise NotAllowed(f"{self.drive.name}: STOP was pressed", drive=self.drive.name)
         station = session.station(self.drive)
@@ -254,7 +256,9 @@ class PowerState:
                 await self.session.cyclic.halt(self.session.station(self.drive))
             else:
                 await self._quick_stop_by_any_port()
-        except (LinkLost, LinkTimeout, ProtocolError):
+        except BaseException:
+            # Whatever kept it: also an exchange that just ended, a drive that refused the word
+            # while it was busy, and a caller that did not wait.
             self.owes_stop = True
             raise
         self.owes_stop = False

@@ -150,6 +150,11 @@ def stops(control_word: int) -> bool:
     return control_word & 0x06 != 0x06 or bool(control_word & HALT)
 
 
+def is_stop(index: int | None, subindex: int, data: bytes) -> bool:
+    """Whether writing this (little endian) is a control word that only takes motion away."""
+    return (index, subindex) == (0x6040, 0) and stops(int.from_bytes(data, "little"))
+
+
 def next_control_word(state: State, goal: State, previous: int = 0) -> int | None:
     """Control word of the next step from ``state`` towards ``goal``, or None when arrived.
 

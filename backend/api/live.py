@@ -230,7 +230,7 @@ class Connection:
         self._release_holds()
         for drive in self.watched:
             if (member := self._bench.members.get(drive)) is not None:
-                member.monitor.watchers -= 1
+                member.monitor.watchers.discard(self.id)
         self.watched = set()
         for task in self._polls.values():
             task.cancel()
@@ -371,9 +371,13 @@ class Connection:
         self._bench.leases.give(request.drive, self.id)
 
     def _watch(self, drives: set[str]) -> None:
-        for drive in drives ^ self.watched:
-            if (member := self._bench.members.get(drive)) is not None:
-                member.monitor.watchers += 1 if drive in drives else -1
+        for drive in drives | self.watched:
+            if (member := self._bench.members.get(drive)) is None:
+                continue
+            # A drive that was taken off the bench and put back is another one of the same name.
+            watchers = member.monitor.watchers
+            if (self.id in watchers) is not (drive in drives):
+                watchers ^= {self.id}
                 member.monitor.hurry()
         self.watched = {drive for drive in drives if drive in self._bench.members}
 

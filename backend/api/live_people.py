@@ -164,12 +164,14 @@ class PeopleLive:
         """A page is gone: what it moved stops, what it held is free."""
         self._support.release_all(page.id, "the connection on site closed")
         self._end_motions(page, "is gone")
+        self._let_go(page, "is gone")
         self._talk.pop(page.id, None)
         self._bench.leases.drop(page.id)
         self.changed()
 
     def _fell_silent(self, page: Page) -> None:
         """A page says nothing any more, though its line may look open for some seconds yet."""
+        self._let_go(page, "fell silent")
         if self._bench.leases.held_by(page.id):
             page.release(None, "the page fell silent")
             self._bench.leases.lose(page.id)
@@ -189,6 +191,25 @@ class PeopleLive:
             )
             self._ending.add(job.id)
             self._spawn(self._end(job))
+
+    def _let_go(self, page: Page, what: str) -> None:
+        """Nothing stays enabled that nobody looks after: not what this page enabled and left so.
+
+        Whoever controls or moves the axis by now looks after it from here on.
+        """
+        for member in self._bench.members.values():
+            if member.axis.enabled_by != page.id:
+                continue
+            drive = member.drive.id
+            holder, job = self._bench.leases.holder(drive), self._bench.jobs.moving(drive)
+            actor = None if job is None else job.actor
+            others = {each.connection for each in (holder, actor) if each is not None}
+            heir = next((each for each in others if each not in (None, page.id)), None)
+            member.axis.enabled_by = heir
+            if heir is None:
+                text = f"{member.drive.name} loses its power: the page that enabled it {what}"
+                self._bench.journal.add(text, level="warning", drive=drive)
+                self._spawn(self._bench.let_go(drive))
 
     async def _end(self, job: Job) -> None:
         try:

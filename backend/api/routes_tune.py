@@ -27,8 +27,9 @@ from backend.bench import Bench, Member
 from backend.cyclic import CyclicSession
 from backend.jobs import JobResult, Progress
 from backend.measurements import MeasurementStore
-from backend.measuring import exchange_for
+from backend.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.report.changes import Change
+from backend.restoring import shielded
 from backend.tools import (
     autotune,
     inertia,
@@ -57,11 +58,6 @@ async def _start(
     bench.require_idle(member)
     exchange = await exchange_for(bench, member, request.cycle_ms / 1e3)
     session = exchange.session
-    try:
-        profile_speed.require_consent(session, member.drive, request.consent)
-    except DriveError:
-        await exchange.end()
-        raise
     files: list[str] = []
 
     def keep(
@@ -70,18 +66,26 @@ async def _start(
         files.append(bench.measurements.save(name, member.drive, arrays, meta))
 
     async def work(progress: Progress) -> JobResult:
+        exchange.taken = True
         limits = _envelope(request)
         try:
             async with profile_speed.prepared(member.axis, session, limits, request.consent):
                 result = await tool(session, progress, keep)
             await asyncio.to_thread(_conclude, bench.measurements, files, result)
         finally:
-            await exchange.end()
+            await shielded(exchange.end, EXCHANGE_ENDS_S, member.drive.name)
         return result | {"measurements": files}
 
-    job = bench.jobs.start(
-        kind, f"{title}: {member.drive.name}", work, drive=member.drive.id, motion=True
-    )
+    try:
+        profile_speed.require_consent(session, member.drive, request.consent)
+        job = bench.jobs.start(
+            kind, f"{title}: {member.drive.name}", work, drive=member.drive.id, motion=True
+        )
+    except DriveError:
+        # Another motion may have begun while the exchange was started.
+        await exchange.end()
+        raise
+    exchange.ends_with(job)
     bench.journal.add(f"{member.drive.name}: {title}", drive=member.drive.id)
     return convert.job(job)
 

@@ -71,8 +71,11 @@ class SdoChannel:
         """The bus is gone: end a waiting transfer at once (called by the receiving thread)."""
         self._answers.put(error)
 
-    def run(self, transfer: sdo.Transfer[T], timeout_s: float) -> T:
+    def run(self, transfer: sdo.Transfer[T], timeout_s: float, at_any_rate: bytes = b"") -> T:
         """Run one transfer to its end.
+
+        The frame ``at_any_rate`` (a stop) is sent where the transfer cannot even begin: a node
+        that does not answer may hear all the same. The error is raised then too.
 
         Raises:
             LinkTimeout: no answer within ``timeout_s`` of a request; the server was sent an abort.
@@ -81,7 +84,13 @@ class SdoChannel:
         """
         with self._turn:
             if self._unanswered:
-                self._wait_out_late_answers(timeout_s)
+                try:
+                    self._wait_out_late_answers(timeout_s)
+                except LinkTimeout:
+                    if at_any_rate:
+                        self._send(at_any_rate)
+                        self._unanswered.add(at_any_rate[1:4])
+                    raise
             self._discard_strays()
             self.transactions += 1
             return self._converse(transfer, timeout_s)
@@ -196,8 +205,19 @@ class SdoChannel:
                 self.no_block_transfer = True
         return self.run(sdo.upload(index, subindex), timeout_s)
 
-    def write(self, index: int, subindex: int, data: bytes, timeout_s: float) -> None:
-        """Write an object; long ones by block transfer where the node offers it."""
+    def write(
+        self,
+        index: int,
+        subindex: int,
+        data: bytes,
+        timeout_s: float,
+        *,
+        at_any_rate: bool = False,
+    ) -> None:
+        """Write an object; long ones by block transfer where the node offers it.
+
+        ``at_any_rate`` as in `run`, for data of up to four bytes.
+        """
         if len(data) > _BLOCK_ABOVE and not self.no_block_transfer:
             # Both refusals come before any data went, so segments afterwards do not write twice.
             try:
@@ -208,7 +228,8 @@ class SdoChannel:
                 if refusal.code != sdo.ABORT_COMMAND:
                     raise
                 self.no_block_transfer = True
-        return self.run(sdo.download(index, subindex, data), timeout_s)
+        stop = sdo.expedited(index, subindex, data) if at_any_rate else b""
+        return self.run(sdo.download(index, subindex, data), timeout_s, stop)
 
     def begin_probe(self) -> None:
         """Take the node's turn and ask for its device type; `end_probe` must follow."""

@@ -25,6 +25,7 @@ from drivers.canopen.port import CanPort
 from drivers.canopen.scanning import identify, probe
 from drivers.canopen.synchronous import LoopClock
 from drivers.canopen.url import CanUrl, parse_canopen_url
+from drivers.cia402 import is_stop
 from drivers.codec import size_of
 from drivers.dialect import dialect_of
 from drivers.errors import DriveError, LinkLost, NotAllowed
@@ -273,7 +274,8 @@ class CanopenLink:
         timeout_s = max(self._settings.timeout_s, _WRITE_TIMEOUT_S)
         if index in _STORE_INDICES:
             timeout_s = max(timeout_s, _STORE_TIMEOUT_S)
-        self._channel(station).write(index, subindex, data, timeout_s)
+        stop = is_stop(index, subindex, data)
+        self._channel(station).write(index, subindex, data, timeout_s, at_any_rate=stop)
 
     def _in_use(self, station: int) -> None:
         if station not in self._used:

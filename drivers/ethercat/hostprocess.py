@@ -116,7 +116,11 @@ class HostProcess:
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         self._waiting[number] = (future, progress)
         try:
-            await self._write(protocol.pack(message | {"id": number}))
+            # A message that was cut off would swallow those after it, a halt among them: who gives
+            # up waiting (STOP cancels a motion) leaves it to be sent whole.
+            sending = asyncio.create_task(self._write(protocol.pack(message | {"id": number})))
+            sending.add_done_callback(_noticed)
+            await asyncio.shield(sending)
             async with asyncio.timeout(timeout_s):
                 return await future
         except TimeoutError:
@@ -128,19 +132,15 @@ class HostProcess:
 
     async def _spawn(self, timeout_s: float) -> None:
         loop = asyncio.get_running_loop()
-        ours, theirs = socket.socketpair()
-        ring_fd = Ring.create()
         try:
-            self.ring = Ring(ring_fd)
-            self._process = await asyncio.create_subprocess_exec(
-                *self._launcher, sys.executable, "-m", "drivers.ethercat.host", self._interface,
-                "--control", str(theirs.fileno()), "--ring", str(ring_fd), *self._options,
-                pass_fds=(theirs.fileno(), ring_fd), env=_environment(),
-                stdin=asyncio.subprocess.DEVNULL,
-            )  # fmt: skip
-        finally:
-            theirs.close()
-            os.close(ring_fd)
+            ours = await self._launch()
+        except OSError as error:
+            # No memory, no file descriptor, no process to be had: all of that may pass.
+            raise LinkLost(
+                f"the EtherCAT process for {self._interface} cannot be started: "
+                f"{error.strerror or error}",
+                remedy="look at memory, disk and open files of this computer",
+            ) from error
         ours.setblocking(False)
         self._socket = ours
         self._ready = loop.create_future()
@@ -154,6 +154,28 @@ class HostProcess:
                 f"the EtherCAT process for {self._interface} did not start within {timeout_s:g} s"
             ) from None
         self.words = "open"
+
+    async def _launch(self) -> socket.socket:
+        """Start the child; our end of its control channel. Raises OSError, with nothing left."""
+        ours, theirs = socket.socketpair()
+        try:
+            with theirs:
+                ring_fd = Ring.create()
+                try:
+                    self.ring = Ring(ring_fd)
+                    self._process = await asyncio.create_subprocess_exec(
+                        *self._launcher, sys.executable, "-m", "drivers.ethercat.host",
+                        self._interface, "--control", str(theirs.fileno()),
+                        "--ring", str(ring_fd), *self._options,
+                        pass_fds=(theirs.fileno(), ring_fd), env=_environment(),
+                        stdin=asyncio.subprocess.DEVNULL,
+                    )  # fmt: skip
+                finally:
+                    os.close(ring_fd)
+        except BaseException:
+            ours.close()
+            raise
+        return ours
 
     async def _read(self, ours: socket.socket) -> None:
         loop = asyncio.get_running_loop()
@@ -295,6 +317,12 @@ class HostProcess:
         ring, self.ring = self.ring, None
         if ring is not None:
             ring.close()
+
+
+def _noticed(sending: asyncio.Task[None]) -> None:
+    """Whoever waits hears of a failure; where nobody waits any more, it is no matter."""
+    if not sending.cancelled():
+        sending.exception()
 
 
 def _environment() -> dict[str, str]:

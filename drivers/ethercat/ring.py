@@ -50,7 +50,11 @@ class Ring:
     def create() -> int:
         """A new memory file; it vanishes with the last process that holds it."""
         descriptor = os.memfd_create("servodeck-ethercat")
-        os.ftruncate(descriptor, RING_BYTES)
+        try:
+            os.ftruncate(descriptor, RING_BYTES)
+        except OSError:
+            os.close(descriptor)
+            raise
         return descriptor
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.cia402 import State
-from drivers.errors import LinkLost, LinkTimeout, NotAllowed
+from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
 from drivers.ethercat.hostprocess import HostProcess
 from drivers.ethercat.mapping import Pdo, StationPlan, plan_station
 from drivers.ethercat.playback import Phase
@@ -285,7 +285,13 @@ class EthercatCyclic:
     async def _set_up_again(self) -> None:
         """As `configure` and `start`, with the very same drives; they all end up disabled."""
         await self._host.call(self._setup, _CONFIGURE_S)
-        await self._start()
+        try:
+            await self._start()
+        except LinkTimeout:
+            # It may run by now; the next attempt could not search the segment then.
+            with contextlib.suppress(DriveError):
+                await self._host.call({"op": "stop"}, _STOP_S)
+            raise
 
     async def _forget(self) -> None:
         self._wanted = False

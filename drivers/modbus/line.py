@@ -128,8 +128,13 @@ class Line:
         """
         return self._ask(read_query(station, start, count), timeout_s)[3:-2]
 
-    def write(self, station: int, start: int, words: tuple[int, ...]) -> None:
+    def write(
+        self, station: int, start: int, words: tuple[int, ...], *, at_any_rate: bool = False
+    ) -> None:
         """Write one register (06) or several at once (16).
+
+        With ``at_any_rate`` (a stop) it is sent also where nothing could be asked: a drive whose
+        answers do not come, or come too late, may hear all the same. The error is raised then too.
 
         Raises:
             LinkTimeout: no valid answer; whether the drive took the value is unknown.
@@ -140,7 +145,7 @@ class Line:
         else:
             query = write_many_query(station, start, words)
         try:
-            self._ask(query, None)
+            self._ask(query, None, at_any_rate=at_any_rate)
         except ProtocolError as error:
             raise LinkTimeout(
                 f"the answer of station {station} to a write came damaged: whether the drive took "
@@ -182,23 +187,23 @@ class Line:
 
     # --- one transaction ---
 
-    def _ask(self, query: Query, timeout_s: float | None) -> bytes:
+    def _ask(self, query: Query, timeout_s: float | None, *, at_any_rate: bool = False) -> bytes:
         if self._port is None:
             raise LinkLost(
                 f"the serial port {self.settings.device} is not open",
                 remedy="check the cable and the adapter; the line opens by itself when it is back",
             )
         try:
-            self._settle(self._port)
             late = self._late.get(query.station)
             if late is None:
                 late = self._late[query.station] = LateAnswers()
-            same_read_again = query.frame[1] == READ and query.frame == self._last_failed
-            if late.pending(self._clock()) and not same_read_again:
-                self._outwait(self._port, late, query, timeout_s)
-            if self.echo is None and query.frame[1] != READ:
-                with suppress(Rejected):
-                    self._exchange(self._port, late, late.check(query), timeout_s)
+            try:
+                self._clear_the_way(self._port, late, query, timeout_s)
+            except (LinkTimeout, ProtocolError):
+                if at_any_rate:
+                    self._port.write(query.frame)
+                    late.failed(query, self._clock() + self.settings.late_s)
+                raise
             return self._exchange(self._port, late, query, timeout_s)
         except LinkLost as error:
             self._port.close()
@@ -307,6 +312,18 @@ class Line:
         counters.round_trip_ms = took_ms if old is None else old + (took_ms - old) / 16
 
     # --- what must be done before a question ---
+
+    def _clear_the_way(
+        self, port: Port, late: LateAnswers, query: Query, timeout_s: float | None
+    ) -> None:
+        """So that what comes after the question is its answer."""
+        self._settle(port)
+        same_read_again = query.frame[1] == READ and query.frame == self._last_failed
+        if late.pending(self._clock()) and not same_read_again:
+            self._outwait(port, late, query, timeout_s)
+        if self.echo is None and query.frame[1] != READ:
+            with suppress(Rejected):
+                self._exchange(port, late, late.check(query), timeout_s)
 
     def _settle(self, port: Port) -> None:
         """Throw away stray bytes; if there were any, wait until the line is silent."""

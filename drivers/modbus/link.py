@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
+from drivers.cia402 import is_stop
 from drivers.errors import (
     DriveError,
     LinkLost,
@@ -188,7 +189,9 @@ class RegisterLink:
         """Write one value; goes before all waiting reads. See `drivers.link.Link.write`."""
         place = self._layout.place(station, address)
         words = to_words(place, data)
-        await self._run(partial(self._line.write, station, place.start, words), urgent=True)
+        stop = is_stop(address.index, address.subindex, data)
+        write = partial(self._line.write, station, place.start, words, at_any_rate=stop)
+        await self._run(write, urgent=True)
 
     def quality(self, station: int | None = None) -> LinkQuality:
         """Counters. See `drivers.link.Link.quality`."""

@@ -20,6 +20,14 @@ from serial.tools import list_ports
 
 from drivers.errors import DriveError, LinkLost, OutOfRange
 
+if sys.platform != "win32":
+    import termios
+
+    #: No OSError: pyserial lets it through where it sets up a terminal that has just gone.
+    _TERMINAL_ERRORS: tuple[type[Exception], ...] = (termios.error,)
+else:
+    _TERMINAL_ERRORS = ()
+
 Parity = Literal["N", "E", "O"]
 
 #: 1.75 ms above 19200 baud: MODBUS over Serial Line V1.02, clause 2.5.1.1.
@@ -98,6 +106,9 @@ def open_port(settings: LineSettings) -> Port:
         raise _unsuitable(settings, str(error)) from error
     except OSError as error:  # SerialException is one
         raise _explain(settings, error) from error
+    except _TERMINAL_ERRORS as error:
+        # An adapter that goes while it is being set up.
+        raise _gone(settings.device, error) from error
     if sys.platform == "linux":
         # USB chips hold answers back for up to 16 ms unless asked not to; ptys cannot be asked.
         with suppress(OSError, ValueError):

@@ -25,7 +25,7 @@ from typing import Protocol
 from drivers.errors import DriveError
 from drivers.urls import parse_url
 from drivers.virtual.bench import AxisSpec, BenchSpec, load_bench
-from drivers.virtual.device import Device
+from drivers.virtual.device import Device, SdoAbort
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.shared import SharedDevice
 from drivers.virtual.wires.can_wire import CanWire
@@ -211,9 +211,12 @@ class Wires:
             self._axis(command).inject(str(command.get("what")), value)
 
     def _read(self, command: dict[str, object]) -> str:
+        """The drive's own value as it is now, past the wire."""
         with self._lock:
             index, subindex = int(str(command["index"])), int(str(command["subindex"]))
-            return self._axis(command).read(index, subindex).hex()
+            device = self._axis(command)
+            device.advance(time.monotonic_ns())
+            return device.read(index, subindex).hex()
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -234,7 +237,7 @@ def main(argv: list[str] | None = None) -> int:
         for line in sys.stdin:
             try:
                 _answer({"ok": True, "result": wires.carry_out(json.loads(line))})
-            except (ValueError, KeyError) as error:
+            except (ValueError, KeyError, SdoAbort) as error:
                 _answer({"ok": False, "error": str(error)})
     except KeyboardInterrupt:
         pass

@@ -231,6 +231,29 @@ async def test_a_cancelled_job_puts_back_too(
     assert outputs(io_link) == (0x1, 0)
 
 
+@pytest.mark.parametrize("how", ["cancelled", "STOP"])
+async def test_what_comes_while_it_ends_overrules_nothing_any_more(
+    axis: Axis, io_link: MemoryLink, sessions: ForcingSessions, how: str
+) -> None:
+    """A request that waits for the one before it came through after all had been put back."""
+    session = await sessions.start(axis, "outputs", confirmed=True, connection="me")
+    await session.lock.acquire()  # as a write that is under way
+    late = asyncio.create_task(session.set({"DO1": True}))
+    await asyncio.sleep(0.01)
+    if how == "STOP":
+        axis.stopped = True
+    else:
+        assert session.job is not None
+        assert session.job.task is not None
+        session.job.task.cancel()
+    await ended(lambda: session.over)
+    session.lock.release()
+    with pytest.raises(NotAllowed, match="has ended"):
+        await late
+    await ended(lambda: sessions.get("x", "outputs") is None)
+    assert outputs(io_link) == (0x1, 0)
+
+
 async def test_an_unreadable_object_begins_nothing(
     axis: Axis, io_link: MemoryLink, sessions: ForcingSessions
 ) -> None:

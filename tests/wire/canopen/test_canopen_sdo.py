@@ -192,6 +192,21 @@ def test_a_block_lost_in_part_is_sent_again() -> None:
     assert channel.run(sdo.block_upload(0x2000, 0), 0.5) == bytes(range(100))
 
 
+def test_a_stop_goes_out_to_a_node_that_cannot_be_heard() -> None:
+    """It may hear all the same; what enables waits until it answers (CiA 402: 6040h)."""
+    sent: list[bytes] = []
+    channel = SdoChannel(1, sent.append)
+    with pytest.raises(LinkTimeout):
+        channel.read(0x6041, 0, 0.0)
+    stop, enable = (bytes([0x2B, 0x40, 0x60, 0, word, 0, 0, 0]) for word in (2, 15))
+    with pytest.raises(LinkTimeout, match="nothing was asked"):
+        channel.write(0x6040, 0, b"\x0f\0", 0.0)
+    assert enable not in sent
+    with pytest.raises(LinkTimeout):
+        channel.write(0x6040, 0, b"\x02\0", 0.0, at_any_rate=True)
+    assert sent[-1] == stop
+
+
 @given(st.lists(st.binary(min_size=8, max_size=8), max_size=30))
 def test_the_server_survives_any_request(frames: list[bytes]) -> None:
     memory = Memory(b"some contents")

@@ -187,6 +187,35 @@ def test_late_echo_of_a_write_does_not_confirm_the_same_write_again() -> None:
     assert port.sent == [read_query(1, 0, 1).frame, write, read_query(1, 0, 1).frame, write]
 
 
+def test_a_stop_goes_out_to_a_drive_that_cannot_be_heard() -> None:
+    """Its answers do not come; it may hear all the same. The check before it is not waited for."""
+    stop = write_one_query(1, 0x6400, 2).frame
+    port = ScriptedPort(MUTE, MUTE, MUTE)
+    line = line_on(port)
+    with pytest.raises(LinkTimeout):
+        line.read(1, 0, 1)
+    with pytest.raises(LinkTimeout):
+        line.write(1, 0x6400, (15,))
+    assert stop not in port.sent
+    assert len(port.sent) == 2, "what enables waits until the drive answers"
+    with pytest.raises(LinkTimeout):
+        line.write(1, 0x6400, (2,), at_any_rate=True)
+    assert port.sent[-1] == stop
+
+
+def test_a_stop_goes_out_on_a_line_that_never_falls_silent() -> None:
+    port = ScriptedPort([(0.001, answer(0))], MUTE)
+    line = line_on(port)
+    line.read(1, 0, 1)
+    port.due = [(port.now_s + 0.01 * n, b"\x55") for n in range(1000)]
+    with pytest.raises(LinkTimeout):
+        line.write(1, 0x6400, (15,))
+    assert len(port.sent) == 1, "what enables waits until the line is silent"
+    with pytest.raises(LinkTimeout):
+        line.write(1, 0x6400, (2,), at_any_rate=True)
+    assert port.sent[1:] == [write_one_query(1, 0x6400, 2).frame]
+
+
 def test_repeated_read_may_take_the_late_answer_and_guards_the_next_one() -> None:
     port = ScriptedPort(
         [(0.15, answer(111))], [(0.1, answer(112))], [(0.06, answer(0, 0))], [(0.001, answer(3))]

@@ -1,0 +1,96 @@
+"""The parent's side of the EtherCAT process, with the child's end of the pipe in hand."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import os
+import socket
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from drivers.errors import LinkLost
+from drivers.ethercat import protocol
+from drivers.ethercat.hostprocess import HostProcess
+from drivers.ethercat.ring import Ring
+
+
+def host() -> HostProcess:
+    return HostProcess("eth9", (), lambda _message: None, lambda _why: None)
+
+
+def descriptors() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+async def connected(process: HostProcess) -> socket.socket:
+    """As if a child ran; returns its end."""
+    ours, theirs = socket.socketpair()
+    ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+    ours.setblocking(False)
+    theirs.setblocking(False)
+    process._socket = ours
+    process._process = SimpleNamespace(returncode=None, pid=0)  # type: ignore[assignment]
+    process._ready = asyncio.get_running_loop().create_future()
+    process._ready.set_result(None)
+    return theirs
+
+
+async def test_a_halt_comes_whole_after_a_motion_that_was_cancelled_while_it_was_sent() -> None:
+    """STOP cancels a motion while its long trajectory goes into a full pipe, then sends the halt.
+
+    What is left of a cut-off message would swallow the halt.
+    """
+    process = host()
+    child = await connected(process)
+    trajectory = {"op": "play", "trajectories": [{"values": bytes(1_000_000)}]}
+    play = asyncio.create_task(process.call(trajectory, 5.0))
+    await asyncio.sleep(0.01)
+    play.cancel()
+    await asyncio.wait([play])
+    assert play.cancelled()
+    halt = asyncio.create_task(process.call({"op": "halt", "station": 1}, 5.0))
+    unpacker = protocol.Unpacker()
+    got: list[protocol.Message] = []
+    async with asyncio.timeout(5):
+        while not any(message["op"] == "halt" for message in got):
+            data = await asyncio.get_running_loop().sock_recv(child, 1 << 16)
+            got += unpacker.feed(data)
+    assert [message["op"] for message in got] == ["play", "halt"]
+    halt.cancel()
+    await asyncio.wait([halt])
+    child.close()
+    assert process._socket is not None
+    process._socket.close()
+
+
+async def test_a_process_that_cannot_be_started_is_a_lost_link_and_leaves_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Too many open files, no memory: whoever looks after it tries again, and must not die of it.
+
+    Its file descriptors are counted before and after: there will be many tries.
+    """
+
+    def full() -> int:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+
+    monkeypatch.setattr(Ring, "create", staticmethod(full))
+    before = descriptors()
+    for _ in range(3):
+        with pytest.raises(LinkLost, match=r"eth9 cannot be started: Too many open files"):
+            await host()._spawn(1.0)
+    assert descriptors() == before
+
+
+def test_a_ring_that_gets_no_memory_leaves_no_descriptor(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_descriptor: int, _size: int) -> None:
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+
+    before = descriptors()
+    monkeypatch.setattr(os, "ftruncate", full)
+    with pytest.raises(OSError, match="File too large"):
+        Ring.create()
+    assert descriptors() == before
