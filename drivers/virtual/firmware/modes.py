@@ -41,16 +41,13 @@ class Modes:
         self._steps = 20
         self._cycle_step = 0
         self._cycle_steps = 0
-        numbered = core.od.numbered
         self._item = core.axis.s.item
         self._following_ms = core.od.cell("6066:00", 10)
         self._position_ms = core.od.cell("6068:00", 10)
         self._speed_ms = core.od.cell("606E:00", 10)
         self._zero_ms = core.od.cell("6070:00", 10)
-        self._cyclic_entries = tuple(
-            numbered.get(key)
-            for key in ("607A:00", "60B0:00", "60FF:00", "60B1:00", "6071:00", "60B2:00")
-        )
+        self._targets = tuple(core.od.cell(key) for key in ("607A:00", "60FF:00", "6071:00"))
+        self._offsets = tuple(core.od.cell(key) for key in ("60B0:00", "60B1:00", "60B2:00"))
 
     # --- starting and ending ---------------------------------------------------------------
     def start(self, mode: int) -> None:
@@ -191,23 +188,22 @@ class Modes:
         if not self.running or self.mode not in _CYCLIC_LOOP:
             return
         core, units = self._core, self._core.units
-        position, p_off, speed, v_off, torque, t_off = (
-            0 if entry is None else entry.active for entry in self._cyclic_entries
-        )
-        wanted = float(position) + float(p_off)
+        position, speed, torque = self._targets
+        p_offset, v_offset, t_offset = self._offsets
+        wanted = float(position.active) + float(p_offset.active)
         low, high = core.software_limits()
         target = min(max(wanted, low), high)
         self.limited = target != wanted
         angle = target / units.position_per_rad + core.zero_rad
-        omega = float(v_off) / units.speed_per_rad_s
-        nm = float(t_off) / units.torque_per_nm
+        omega = float(v_offset.active) / units.speed_per_rad_s
+        nm = float(t_offset.active) / units.torque_per_nm
         if self.mode in (CSV, IMPEDANCE):
-            omega += float(speed) / units.speed_per_rad_s
+            omega += float(speed.active) / units.speed_per_rad_s
         if self.mode == CSV:
             limit = core.max_speed()
             omega = min(max(omega, -limit), limit)
         if self.mode == CST:
-            nm += float(torque) / units.torque_per_nm
+            nm += float(torque.active) / units.torque_per_nm
         self._axis.set_cyclic(angle, omega, nm, steps or self._steps)
 
     # --- for the status word ---------------------------------------------------------------

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.dictionary import Number
 
 _INPUTS, _OUTPUTS = 4, 2
 _PROBE_FUNCTION = 4  # of DI1 (probe 1) and DI2 (probe 2), 004:6480, 004:6492
 _ALARM_RESET = 4  # of DI3, 004:6500
-_SIGNALS = {1: k.SIG_NEGATIVE, 2: k.SIG_POSITIVE, 3: k.SIG_HOME}
+_SIGNALS: dict[Number, int] = {1: k.SIG_NEGATIVE, 2: k.SIG_POSITIVE, 3: k.SIG_HOME}
 
 
 class Panel:
@@ -37,15 +38,17 @@ class Panel:
         """Logic of an input: after polarity and, if asked, after simulation (2031h)."""
         if simulated and int(self._simulated.active) >> terminal & 1:
             return bool(int(self._simulation.active) >> terminal & 1)
-        return self._level(terminal, self._function(terminal), self._physical())
+        return self._levels()[terminal]
 
-    def _level(self, terminal: int, function: int, physical: int) -> bool:
-        """Logic of an input after polarity, with the switches in ``physical``."""
-        signal = _SIGNALS.get(function)
-        if signal is None:
-            return self.external[terminal]
-        inverted = int(self._polarity.active) >> terminal & 1
-        return (physical & signal != 0) != bool(inverted)
+    def _levels(self) -> list[bool]:
+        """Logic of all inputs after polarity."""
+        physical, polarity = self._physical(), int(self._polarity.active)
+        levels = list(self.external)
+        for terminal in range(_INPUTS):
+            signal = _SIGNALS.get(self._functions[terminal].active)
+            if signal is not None:
+                levels[terminal] = bool(physical & signal) is not bool(polarity >> terminal & 1)
+        return levels
 
     def _physical(self) -> int:
         """Switches as the mechanics presses them."""
@@ -61,11 +64,11 @@ class Panel:
 
         Simulation does not show here (004:2014-2015).
         """
-        word, physical = 0, self._physical()
-        for terminal in range(_INPUTS):
-            function = self._function(terminal)
-            if self._level(terminal, function, physical):
+        word = 0
+        for terminal, level in enumerate(self._levels()):
+            if level:
                 word |= 1 << (16 + terminal)
+                function = self._function(terminal)
                 if 1 <= function <= 3:
                     word |= 1 << (function - 1)
         return word | self.outputs() << 24

@@ -329,3 +329,12 @@ def test_after_the_watchdog_the_master_can_go_back_to_op() -> None:
     wire.write(OUT, wire.outputs())
     assert wire.request(OP)[0] == SAFEOP | 0x10  # not without acknowledgement
     assert wire.request(OP | 0x10) == (OP, 0)
+
+
+def test_a_mapping_that_the_master_moves_counts_from_the_next_frame_on() -> None:
+    wire = Wire()
+    wire.to_op()
+    assert wire.one(LRD, 0x100, 0, bytes(8)).wkc == 1
+    wire.write(0x0610, fmmu(0x200, 8, IN, write=False))
+    assert wire.one(LRD, 0x100, 0, bytes(8)).wkc == 0
+    assert wire.one(LRD, 0x200, 0, bytes(8)).wkc == 1
