@@ -132,6 +132,13 @@ describe('the catalogue', () => {
       expect(/\p{Script=Han}/u.test(en), `${key}: ${en}`).toBe(false)
     }
   })
+  it('tells one thing from several', () => {
+    expect(translate('en', 'library.parameters', { count: 1 })).toBe('1 parameter')
+    expect(translate('en', 'library.parameters', { count: 0 })).toBe('0 parameters')
+    const counts = { sessions: 2, tokens: 1 }
+    expect(translate('en', 'accounts.counts', counts)).toBe('2 log-ins, 1 token')
+    expect(translate('zh', 'library.parameters', { count: 1 })).toBe('1 个参数')
+  })
   it('fills variables in, and leaves unknown ones standing', () => {
     expect(translate('en', 'job.elapsed', { time: '3 s' })).toBe('3 s so far')
     expect(translate('zh', 'job.elapsed', {})).toContain('{time}')

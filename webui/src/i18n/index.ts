@@ -28,15 +28,23 @@ export function setLanguage(next: Language): void {
   for (const listener of listeners) listener()
 }
 
-/** Text of a key; `{name}` is replaced by the variable of that name. */
+/**
+ * Text of a key; `{name}` is replaced by the variable of that name, and `{name|one|more}` by the
+ * first word where it is 1 and by the second otherwise.
+ */
 export function translate(
   to: Language,
   key: Key,
   variables: Record<string, string | number> = {},
 ): string {
   const text: string = catalogue[key][to === 'en' ? 0 : 1]
-  return text.replace(/\{(\w+)\}/g, (whole: string, name: string) =>
-    name in variables ? String(variables[name]) : whole,
+  return text.replace(
+    /\{(\w+)(?:\|([^|}]*)\|([^}]*))?\}/g,
+    (whole: string, name: string, one?: string, more?: string) => {
+      if (!(name in variables)) return whole
+      if (one === undefined) return String(variables[name])
+      return (Number(variables[name]) === 1 ? one : more) ?? ''
+    },
   )
 }
 

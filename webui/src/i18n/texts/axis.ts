@@ -62,7 +62,7 @@ export const axis = {
   'log.error': ['error', '错误'],
   'procedures.title': ['Procedures', '操作流程'],
   'procedures.stopped': ['The axis must stand still.', '轴必须静止。'],
-  'procedures.steps': ['What is done ({count} steps)', '执行内容（{count} 步）'],
+  'procedures.steps': ['What is done ({count} {count|step|steps})', '执行内容（{count} 步）'],
   'procedures.run': ['Run', '执行'],
   'motion.tab.jog': ['Jog', '点动'],
   'motion.tab.move': ['Move', '移动'],

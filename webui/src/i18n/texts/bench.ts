@@ -77,7 +77,7 @@ export const bench = {
   'cyclic.on': ['Runs every {cycle} µs', '每 {cycle} µs 运行'],
   'cyclic.dc': ['with distributed clocks', '使用分布式时钟'],
   'cyclic.noDc': ['without distributed clocks', '未使用分布式时钟'],
-  'cyclic.channels': ['{count} values in every cycle', '每周期 {count} 个值'],
+  'cyclic.channels': ['{count} {count|value|values} in every cycle', '每周期 {count} 个值'],
   'cyclic.leftOver': ['Polled instead: {count}', '改为轮询：{count}'],
   'cyclic.cycle': ['Cycle', '周期'],
   'cyclic.start': ['Start', '启动'],
@@ -92,7 +92,7 @@ export const bench = {
     '{name} 将断开连接，驱动器内容不变。',
   ],
   'connect.removeUnsaved': [
-    '{count} changed parameters are not saved in the drive; they are lost at power-off.',
+    '{count} changed {count|parameter is|parameters are} not saved in the drive and lost at power-off.',
     '{count} 个已更改的参数未保存到驱动器，断电后丢失。',
   ],
   'connect.buses': ['Opened buses', '已打开的总线'],
@@ -225,7 +225,7 @@ export const bench = {
   'sets.upload': ['Upload a file', '上传文件'],
   'sets.exportAs': ['{name} as {format}', '将 {name} 导出为 {format}'],
   'sets.listRead': [
-    '{count} parameters of the list were stored as a set. Nothing was written to a drive.',
+    '{count} {count|parameter|parameters} of the list {count|was|were} stored as a set. Nothing was written to a drive.',
     '列表中的 {count} 个参数已存为参数集，未写入驱动器。',
   ],
   'sets.listProblems': ['Lines that could not be used:', '无法使用的行：'],

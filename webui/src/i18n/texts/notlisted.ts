@@ -24,7 +24,7 @@ export const notListed = {
     'EtherCAT 驱动器可列出自身对象，少数 CANopen 驱动器内含 EDS。厂家文件信息更全：单位、限值和默认值。',
   ],
   'notListed.made': [
-    '{title}: {count} parameters, as {profile}',
+    '{title}: {count} {count|parameter|parameters}, as {profile}',
     '{title}：{count} 个参数，名为 {profile}',
   ],
   'notListed.path': ['To improve it, edit {path}', '如需完善，请编辑 {path}'],
@@ -59,7 +59,7 @@ export const notListed = {
     '所有设置下均无应答。请检查电源、接线和站号。',
   ],
   'port.missing': [
-    'Not connected over {kind}: {count} parameters are only there ({groups}).',
+    'Not connected over {kind}: {count} {count|parameter is|parameters are} only there ({groups}).',
     '未通过 {kind} 连接：有 {count} 个参数仅在该端口（{groups}）。',
   ],
   'port.missingNothing': ['It can be connected over {kind} too.', '也可以通过 {kind} 连接。'],

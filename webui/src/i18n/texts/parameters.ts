@@ -23,7 +23,10 @@ export const parameters = {
     'Refused by the drive or out of range: {count}. They stay edited; choose a row to see why.',
     '被驱动器拒绝或超出范围：{count}。仍保持编辑状态，选择行可查看原因。',
   ],
-  'parameters.unread': ['{count} parameters could not be read', '{count} 个参数无法读取'],
+  'parameters.unread': [
+    '{count} {count|parameter|parameters} could not be read',
+    '{count} 个参数无法读取',
+  ],
   'parameters.count': ['{shown} of {all} parameters', '{shown} / {all} 个参数'],
   'parameters.keys': [
     '↑ ↓ move · Enter edit · Ctrl+Enter write · Delete discard',
@@ -100,12 +103,12 @@ export const parameters = {
   'compare.file': ['file {name}', '文件 {name}'],
   'compare.run': ['Compare', '比较'],
   'compare.none': ['No difference.', '没有差异。'],
-  'compare.count': ['{count} differ', '{count} 项不同'],
+  'compare.count': ['{count} {count|differs|differ}', '{count} 项不同'],
   'compare.bad': ['{count} cannot be used', '{count} 项不可用'],
   'compare.all': ['Also show what is the same', '同时显示相同项'],
   'compare.takeOver': ['Take over as edited ({count})', '作为编辑值采用（{count}）'],
   'compare.taken': [
-    '{count} values are now marked as edited in the table; nothing has been written yet.',
+    '{count} {count|value is|values are} now marked as edited in the table; nothing has been written yet.',
     '{count} 个值已在表格中标记为已编辑，尚未写入。',
   ],
   'compare.theirs': ['Compared', '比较值'],
@@ -121,7 +124,7 @@ export const parameters = {
   'load.open': ['Load ({count})', '载入（{count}）'],
   'load.title': ['Load {file}', '载入 {file}'],
   'load.text': [
-    '{count} values will be written to {name}, each read back. What is there now is stored in a file first.',
+    '{count} {count|value|values} will be written to {name}, each read back. What is there now is stored in a file first.',
     '将向 {name} 写入 {count} 个值并逐一回读。当前值会先保存到文件。',
   ],
   'load.otherDrive': [

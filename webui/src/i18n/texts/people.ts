@@ -95,6 +95,7 @@ export const people = {
   'support.guest': ['Name of the guest', '访客姓名'],
   'support.valid': ['Valid for', '有效期'],
   'support.minutes': ['{minutes} min', '{minutes} 分钟'],
+  'support.hours': ['{hours} h', '{hours} 小时'],
   'support.allowed': ['May be granted, besides looking', '除查看外可授予'],
   'support.invite': ['Make an invitation', '创建邀请'],
   'support.send': [
@@ -154,7 +155,10 @@ export const people = {
 
   'accounts.title': ['Accounts', '账户'],
   'accounts.role': ['Role', '角色'],
-  'accounts.counts': ['{sessions} log-ins, {tokens} tokens', '{sessions} 个登录，{tokens} 个令牌'],
+  'accounts.counts': [
+    '{sessions} {sessions|log-in|log-ins}, {tokens} {tokens|token|tokens}',
+    '{sessions} 个登录，{tokens} 个令牌',
+  ],
   'accounts.setPassword': ['Set a password', '设置密码'],
   'accounts.remove': ['Delete', '删除'],
   'accounts.really': ['Really delete', '确认删除'],

@@ -6,7 +6,7 @@ export const recordings = {
   'recordings.start': ['Record', '开始录制'],
   'recordings.stop': ['End', '结束'],
   'recordings.what': [
-    'Records {count} signals chosen on the Scope page.',
+    'Records {count} {count|signal|signals} chosen on the Scope page.',
     '录制示波器页面所选的 {count} 个信号。',
   ],
   'recordings.name': ['Name', '名称'],
@@ -15,10 +15,10 @@ export const recordings = {
   'recordings.none': ['No recordings.', '没有录制。'],
   'recordings.free': ['{size} free', '剩余 {size}'],
   'recordings.facts': [
-    '{duration} · {samples} samples · {size}',
+    '{duration} · {samples} {samples|sample|samples} · {size}',
     '{duration} · {samples} 个采样 · {size}',
   ],
-  'recordings.lost': ['{count} samples lost', '丢失 {count} 个采样'],
+  'recordings.lost': ['{count} {count|sample|samples} lost', '丢失 {count} 个采样'],
   'recordings.state.waiting': ['waits for its trigger', '等待触发'],
   'recordings.state.recording': ['recording', '录制中'],
   'recordings.state.complete': ['complete', '完整'],

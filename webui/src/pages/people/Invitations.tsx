@@ -61,7 +61,10 @@ function Invite({ onMade }: { onMade: (made: MadeInvitation) => void }) {
         onChange={(event) => setMinutes(Number(event.currentTarget.value))}
         data={LIFETIMES_MIN.map((each) => ({
           value: String(each),
-          label: t('support.minutes', { minutes: each }),
+          label:
+            each % 60 === 0
+              ? t('support.hours', { hours: each / 60 })
+              : t('support.minutes', { minutes: each }),
         }))}
       />
       <Rights
