@@ -21,6 +21,9 @@ from drivers.link import ScopeBlock
 MAX_QUEUED_BYTES = 64 * 1024 * 1024
 #: What was recorded is on the disk at least this often, so that also a power cut loses no more.
 SYNC_S = 0.5
+#: Blocks are gathered for this long, unless so many bytes wait already: waking the thread for each
+#: would cost more than writing it.
+GATHER_S, GATHER_BYTES = 0.1, 1024 * 1024
 #: Chunks of one write: each is at most five pieces, and the system takes 1024 (IOV_MAX).
 _WRITE_ITEMS = 200
 #: A recording ends while this much is still free, so that the rest of the system lives on.
@@ -68,6 +71,7 @@ class RecordingWriter:
         self.path = path
         self._failed = failed
         self._limit = max_queued_bytes
+        self._enough = min(GATHER_BYTES, max_queued_bytes // 8)
         self._reserve = reserve_bytes
         self._free = free
         self._queue: deque[_Item] = deque()
@@ -124,7 +128,12 @@ class RecordingWriter:
             else:
                 self._queue.append(item)
                 self._queued += size
-            self._wake.notify()
+            if self._urgent():
+                self._wake.notify()
+
+    def _urgent(self) -> bool:
+        """The thread is not to wait for more."""
+        return self._queued >= self._enough or self._closing is not None or self._error is not None
 
     # --- the thread -------------------------------------------------------------------
 
@@ -151,8 +160,8 @@ class RecordingWriter:
         try:
             while True:
                 with self._wake:
-                    if not self._queue and self._closing is None and self._error is None:
-                        self._wake.wait(SYNC_S)
+                    if not self._urgent():
+                        self._wake.wait(GATHER_S)
                     items, self._queue = list(self._queue), deque()
                     closing, error = self._closing, self._error
                     self._queued = 0
