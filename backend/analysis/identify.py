@@ -39,6 +39,8 @@ SYSTEMATIC_DEG = 0.35
 #: A model whose median relative misfit is larger, and larger than the noise, corrects nothing.
 TRUSTED_ERROR = 0.03
 
+#: Paths whose criteria differ by less are both possible.
+_UNDECIDED = 80.0
 #: What no model explains is shown to this share of the sample rate; its misfit is a mean over so
 #: many lines to each side.
 _UNTRUSTED_SHARE, _AROUND = 0.1, 6
@@ -50,8 +52,9 @@ _AVERAGED = 0.5
 #: Path parameters are moved by this much (cycles, logarithm) to see what they do, and moved at
 #: all where torque and motion together put them further off than this share of their deviation.
 _STEP, _SETTLED, _LEAST_STEP = 0.02, 0.2, 1e-4
-#: What half a cycle of delay weighs, in the criterion's units, is half of this.
-_FRACTION = 100.0
+#: What half a cycle of delay weighs, in the criterion's units, is half of this; and what a cycle
+#: by which a drive would report too early does.
+_FRACTION, _EARLY = 100.0, 2e3
 
 
 @dataclass(frozen=True)
@@ -104,8 +107,8 @@ def identify_with_path(
     corner_known = path.current_bandwidth_hz is not None
     task = _Task(settled(records), quantity)
     paths = find_paths(task.records, path, loop_closed=closed, hold_known=hold_known)
-    trials = [task.trial(each) for each in paths]
-    best = min(trials, key=lambda t: t.fit.score + _implausible(t.fit))
+    trials = sorted((task.trial(each) for each in paths), key=_rank)
+    best = trials[0]
 
     def again(fit: SampledFit) -> SignalPath:
         known = replace(path, hold=fit.path.hold)
@@ -120,7 +123,8 @@ def identify_with_path(
             break
         found = task.moved(found, doubt)
         doubt = task.doubt(found, corner_known)
-    return _identification(task, found, doubt)
+    alike = [t for t in trials[1:] if _rank(t) < _rank(best) + _UNDECIDED]
+    return _undecided(_identification(task, found, doubt), best, alike)
 
 
 @dataclass(frozen=True)
@@ -230,13 +234,18 @@ def _alike(one: SignalPath, other: SignalPath) -> bool:
     return one.hold == other.hold and apart < 0.01 and abs(np.log(corners)) < 0.03
 
 
+def _rank(trial: _Trial) -> float:
+    """Less is better."""
+    return trial.fit.score + _implausible(trial.fit)
+
+
 def _implausible(fit: SampledFit) -> float:
     """A drive does not report what has not happened yet, and takes set-points at whole cycles."""
     path = fit.path
     early = max(-fit.delay_s * path.sample_rate_hz - 0.1, 0.0)
     lead_s = STEP_LEAD_S if path.hold == "linear" else 0.0
     cycles = (path.command_delay_s + lead_s) * path.sample_rate_hz
-    return 1e3 * early + _FRACTION * abs(cycles - round(cycles))
+    return _EARLY * early + _FRACTION * abs(cycles - round(cycles))
 
 
 def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
@@ -266,6 +275,32 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
         lines = lines.cut(lines.valid_band_hz[1])
         return Identification(lines, lines, fit, False, spoilt)
     return Identification(lines, best, fit, True, spoilt)
+
+
+def _without_path(trial: _Trial) -> ComplexArray:
+    """The velocity's response without delay, filter and images."""
+    raw, fit = trial.views.velocity, trial.fit
+    late = delay_response(raw.frequency_hz, fit.delay_s)
+    if trial.path.response_bandwidth_hz is None:
+        late = late * lag_response(raw.frequency_hz, fit.path.response_bandwidth_hz)
+    return np.asarray(raw.response / late / fit.image_factor(raw.frequency_hz))
+
+
+def _undecided(found: Identification, best: _Trial, others: list[_Trial]) -> Identification:
+    """Charge to the band how far another path that explains as much would move the lines."""
+    if not found.trusted or not others:
+        return found
+    apart = np.log(np.array([_without_path(t) for t in others]) / _without_path(best))
+    size, turn = (np.max(np.abs(part), axis=0) * 0.5 for part in (apart.real, apart.imag))
+
+    def wider(frf: Frf) -> Frf:
+        return replace(
+            frf,
+            std_db=np.hypot(frf.std_db, 20 / np.log(10) * size),
+            std_deg=np.hypot(frf.std_deg, np.degrees(turn)),
+        )
+
+    return replace(found, direct=wider(found.direct), corrected=wider(found.corrected))
 
 
 def _unexplained(raw: Frf, solution: Solution) -> Frf:

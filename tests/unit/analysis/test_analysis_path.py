@@ -10,7 +10,14 @@ from scipy.optimize import least_squares
 
 from backend.analysis.excitation import choose_lines, multisine, scaled
 from backend.analysis.frf import estimate_periodic
-from backend.analysis.identify import _Task, identify_with_path
+from backend.analysis.identify import (
+    Identification,
+    _Task,
+    _undecided,
+    _unexplained,
+    _without_path,
+    identify_with_path,
+)
 from backend.analysis.line_spectra import Record
 from backend.analysis.path_fit import find_paths, moved_path, reference_gain
 from backend.analysis.robust_fit import minimise
@@ -217,3 +224,25 @@ def test_doubt_tells_how_far_a_path_that_is_off_bends_the_answer():
     moved = np.log(then / now)
     assert np.median(np.abs(moved.imag)) <= 1.5 * np.median(doubt.corrected[0].imag)
     assert np.median(np.abs(moved.real)) <= 1.5 * np.median(doubt.corrected[0].real)
+
+
+def test_what_else_may_be_true_widens_the_band():
+    case = case_of(1000.0, late_steps=0, current_hz=1000.0)
+    path = SignalPath(1000.0, current_bandwidth_hz=1000.0, response_bandwidth_hz=1000.0)
+    task = _Task(records_of(case), "torque_mode")
+    best = task.trial(path)
+    other = task.trial(replace(path, current_bandwidth_hz=500.0), start=best.solution)
+    frf = best.views.velocity
+    plain = Identification(frf, frf, best.fit)
+    wider = _undecided(plain, best, [other]).corrected
+    # A corner of 500 instead of 1000 Hz: 10·lg((1 + 0.4²)/(1 + 0.8²)) at 400 Hz, but for what gain,
+    # delay and mechanics make up for.
+    added = np.sqrt(wider.std_db**2 - frf.std_db**2)
+    ratio = np.abs(_without_path(other) / _without_path(best))
+    assert added == pytest.approx(0.5 * np.abs(20 * np.log10(ratio)), abs=1e-9)
+    assert 0.1 < added[-1] < 2.0
+    assert _undecided(plain, best, []) is plain
+    # Where no model explains the lines, another hold may be the right one: half a cycle later.
+    unexplained = _unexplained(frf, best.solution)
+    assert np.all(unexplained.std_deg >= 180.0 * frf.frequency_hz / 1000.0)
+    assert unexplained.valid_band_hz[1] == pytest.approx(100.0)
