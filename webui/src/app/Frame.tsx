@@ -19,6 +19,7 @@ import { LeaseControl, LeaseNotices } from './LeaseControl'
 import { PointerLayer } from './PointerLayer'
 import { Preferences } from './Preferences'
 import { StopButton } from './StopButton'
+import { StopElsewhere } from './StopElsewhere'
 import { SupportBar } from './SupportBar'
 import { linkLook, stateLook } from './states'
 import { useCanTune } from './useCanTune'
@@ -79,6 +80,7 @@ export function Frame({ children }: { children: ReactNode }) {
         </div>
       </header>
       <StopButton />
+      <StopElsewhere />
       <ConnectionLost />
       <nav className="side" aria-label={t('frame.pages')}>
         <Pages />
@@ -309,7 +311,7 @@ function Refused() {
   return (
     <div className="note fault" role="alert">
       <p>
-        <strong>{refused.problem.title}</strong> {refused.problem.detail}
+        <strong>{known(t, 'problemTitle', refused.problem.title)}</strong> {refused.problem.detail}
       </p>
       {refused.problem.remedy && (
         <p>

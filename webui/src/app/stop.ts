@@ -15,6 +15,11 @@ let report: StopReport | null = null
 
 export const currentReport = () => report
 
+let pressed = -Infinity
+
+/** When STOP was last pressed on this page. */
+export const pressedAt = () => pressed
+
 export function dismissReport(): void {
   report = null
   publish('stop')
@@ -34,6 +39,7 @@ export async function stopEverything(): Promise<void> {
     priority: 'high',
   })
   const mine: StopReport = { at: Date.now(), answer: null, failure: null }
+  pressed = mine.at
   try {
     live.send({ type: 'stop', drive: null })
     live.jogStop('STOP')

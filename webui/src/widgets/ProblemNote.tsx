@@ -1,6 +1,6 @@
 import { UNREACHABLE } from '../api/client'
 import type { Problem } from '../api/schema'
-import { useT } from '../i18n'
+import { known, useT } from '../i18n'
 import { FORGOTTEN } from '../live/store'
 
 /** What happened, to which drive and parameter, the limit, and what to try. */
@@ -19,7 +19,9 @@ export function ProblemNote({
     <div className="note fault" role="alert">
       <p>
         <strong>
-          {unreachable ? t('problem.unreachable') : problem.title || t('problem.title')}
+          {unreachable
+            ? t('problem.unreachable')
+            : known(t, 'problemTitle', problem.title) || t('problem.title')}
         </strong>{' '}
         {forgotten ? t('problem.forgotten') : problem.detail}
       </p>

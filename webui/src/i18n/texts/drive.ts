@@ -1,6 +1,6 @@
 import type { Texts } from '../types'
 
-/** Words of the profiles: the key is the English text, which the server sends. */
+/** Words of the server and its profiles: the key ends with the English text that it sends. */
 export const drive = {
   'procedure.Clear the alarm': ['Clear the alarm', '清除报警'],
   'procedure.Reset fault': ['Reset fault', '复位故障'],
@@ -51,6 +51,28 @@ export const drive = {
   ],
   'procedure.Write settings': ['Write settings', '应用设置'],
   'procedure.Zero the position': ['Zero the position', '位置清零'],
+  'problemTitle.No answer in time': ['No answer in time', '未及时应答'],
+  'problemTitle.The link is gone': ['The link is gone', '链路已断开'],
+  'problemTitle.The answer makes no sense': ['The answer makes no sense', '应答无效'],
+  'problemTitle.The drive refused': ['The drive refused', '驱动器拒绝'],
+  'problemTitle.Value out of range': ['Value out of range', '数值超出范围'],
+  'problemTitle.Not possible now': ['Not possible now', '现在无法执行'],
+  'problemTitle.In use': ['In use', '正在使用'],
+  'problemTitle.Not a usable description': ['Not a usable description', '描述文件不可用'],
+  'problemTitle.Not a usable parameter set': ['Not a usable parameter set', '参数集不可用'],
+  'problemTitle.Not a usable recording': ['Not a usable recording', '记录不可用'],
+  'problemTitle.Not a usable snapshot': ['Not a usable snapshot', '快照不可用'],
+  'problemTitle.Could not be stored': ['Could not be stored', '无法存储'],
+  'problemTitle.Not everything was restored': ['Not everything was restored', '未能全部恢复'],
+  'problemTitle.Not found': ['Not found', '未找到'],
+  'problemTitle.Not logged in': ['Not logged in', '未登录'],
+  'problemTitle.Forbidden': ['Forbidden', '禁止'],
+  'problemTitle.Too often': ['Too often', '过于频繁'],
+  'problemTitle.Wrong method': ['Wrong method', '方法错误'],
+  'problemTitle.Internal error': ['Internal error', '内部错误'],
+  'problemTitle.Bad request': ['Bad request', '请求无效'],
+  'problemTitle.Request failed': ['Request failed', '请求失败'],
+  'problemTitle.Drive error': ['Drive error', '驱动器错误'],
   'group.Alarms': ['Alarms', '报警'],
   'group.Brake and regeneration': ['Brake and regeneration', '抱闸与再生制动'],
   'group.Communication': ['Communication', '通信'],

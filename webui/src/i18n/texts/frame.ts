@@ -2,6 +2,12 @@ import type { Texts } from '../types'
 
 /** Frame, states, and words used everywhere. */
 export const frame = {
+  'stop.byOther': ['{person} pressed STOP.', '{person} 按下了停止。'],
+  'stop.somebody': ['Somebody', '有人'],
+  'stop.askFirst': [
+    'All axes were stopped. Ask why before you move anything again.',
+    '所有轴已停止。再次移动之前请先询问原因。',
+  ],
   'frame.faultElsewhere': ['Fault on {names}: show it', '{names} 有故障：查看'],
   'stop.label': ['STOP', '停止'],
   'stop.help': ['Stop all axes (Esc)', '停止所有轴（Esc）'],
