@@ -2,6 +2,7 @@ import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { figure } from '../widgets/format'
+import { lineWidth } from './line-width'
 import { sharedCursor } from './shared-cursor'
 
 /** A curve over a quantity other than time, with the value beneath the pointer. */
@@ -48,7 +49,10 @@ export function LinesPlot({
   useEffect(() => {
     // A logarithmic scale has no zero.
     const from = logarithmic ? 1 : 0
-    plotted.current?.setData([Array.from(x).slice(from), Array.from(y).slice(from)])
+    const plot = plotted.current
+    if (!plot) return
+    for (const each of plot.series) each.width = lineWidth(y.length, devicePixelRatio)
+    plot.setData([Array.from(x).slice(from), Array.from(y).slice(from)])
   }, [x, y, xLabel, yLabel, label, color, dark, logarithmic])
   return <div ref={box} className="lines-plot" role="img" aria-label={label} />
 }
@@ -88,7 +92,6 @@ function options(
       {
         label: look.label,
         stroke: look.color,
-        width: 1.5,
         points: { show: false },
         value: (_plot, value) => figure(value, 5),
       },

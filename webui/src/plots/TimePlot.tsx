@@ -4,6 +4,7 @@ import 'uplot/dist/uPlot.min.css'
 import type { Columns } from '../live/decimate'
 import { figure } from '../widgets/format'
 import { listen, type PlotEvents } from './gestures'
+import { lineWidth } from './line-width'
 import { Extent, type Span, withAir } from './yscale'
 import { sharedCursor } from './shared-cursor'
 
@@ -114,6 +115,8 @@ export function TimePlot({
       draw(next) {
         frame.now = next
         const [times, ...rest] = next.columns
+        const points = rest.reduce((sum, column) => sum + column.length, 0)
+        for (const each of plot.series) each.width = lineWidth(points, devicePixelRatio)
         plot.batch(() => {
           plot.setData(
             [Float64Array.from(times, (time) => time - next.origin), ...rest],
@@ -230,7 +233,6 @@ function options(
         label: each.label,
         scale: each.unit || NO_UNIT,
         stroke: each.color,
-        width: 1.5,
         spanGaps: true,
         points: { show: false },
       })),
@@ -255,7 +257,9 @@ function drawMarks(plot: uPlot, frame: PlotFrame | null, color: string): void {
   if (!frame) return
   const { ctx, bbox } = plot
   ctx.save()
-  for (const overlay of frame.overlays ?? []) drawOverlay(plot, overlay)
+  const overlays = frame.overlays ?? []
+  const points = overlays.reduce((sum, each) => sum + each.times.length, 0)
+  for (const overlay of overlays) drawOverlay(plot, overlay, points)
   ctx.lineWidth = devicePixelRatio
   for (const [i, time] of frame.cursors.entries()) {
     const x = plot.valToPos(time - frame.origin, 'x', true)
@@ -301,7 +305,8 @@ function drawBeyond(plot: uPlot, frame: PlotFrame | null, series: PlotSeries[]):
   }
 }
 
-function drawOverlay(plot: uPlot, overlay: PlotOverlay): void {
+/** One of the overlays, which have so many points together. */
+function drawOverlay(plot: uPlot, overlay: PlotOverlay, points: number): void {
   const { ctx, bbox } = plot
   const scale = overlay.unit || NO_UNIT
   if (!plot.scales[scale]) return // no trace of this unit is shown
@@ -311,7 +316,7 @@ function drawOverlay(plot: uPlot, overlay: PlotOverlay): void {
   ctx.clip()
   ctx.globalAlpha = overlay.opacity ?? 0.8
   ctx.strokeStyle = overlay.color
-  ctx.lineWidth = 1.2 * devicePixelRatio
+  ctx.lineWidth = Math.min(1.2, lineWidth(points, devicePixelRatio)) * devicePixelRatio
   ctx.setLineDash(overlay.dashed ? [6, 4] : [])
   ctx.beginPath()
   for (const [i, time] of overlay.times.entries()) {
