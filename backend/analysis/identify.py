@@ -13,38 +13,43 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray, neighbour_mean
+from backend.analysis.arrays import ComplexArray
 from backend.analysis.distortion import Distortion, distortion
 from backend.analysis.doubt import Doubt, Shifted
 from backend.analysis.doubt import doubt as joint_doubt
-from backend.analysis.frf import Frf, estimate_periodic, valid_band_hz
+from backend.analysis.frf import Frf, estimate_periodic
 from backend.analysis.line_spectra import Quantity, Record, loop_spectra
 from backend.analysis.loop_fit import fit_loop
 from backend.analysis.model_fit import Solution, fit_sampled_model, views_of
-from backend.analysis.path_fit import find_paths, moved_path, path_covariance
+from backend.analysis.path_fit import (
+    at_whole_cycles,
+    find_paths,
+    moved_path,
+    path_covariance,
+)
 from backend.analysis.sampled_model import LoopModel, SampledFit
 from backend.analysis.sampling import (
     STEP_LEAD_S,
     SignalPath,
     delay_response,
-    hold_response,
     lag_response,
 )
 from backend.analysis.settling import settled
-
-#: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
-SYSTEMATIC_DB = 0.05
-SYSTEMATIC_DEG = 0.35
+from backend.analysis.stated_band import (
+    distorted,
+    pooled,
+    unexplained,
+    widened,
+    without_images,
+)
 
 #: A model whose median relative misfit is larger, and larger than the noise, corrects nothing.
 TRUSTED_ERROR = 0.03
 
+#: A path that leaves more cycles of delay than this is doubted.
+_LEFT_LATE = 0.3
 #: Paths whose criteria differ by less are both possible.
 _UNDECIDED = 80.0
-#: What no model explains is shown to this share of the sample rate; its misfit is a mean over so
-#: many lines to each side.
-_UNTRUSTED_SHARE, _AROUND = 0.1, 6
-
 #: At most this many rounds of refining loop, path and mechanics against each other.
 _PASSES = 4
 #: What is left of a distortion along one axis of the complex plane, two draws averaged.
@@ -107,7 +112,7 @@ def identify_with_path(
     corner_known = path.current_bandwidth_hz is not None
     task = _Task(settled(records), quantity)
     paths = find_paths(task.records, path, loop_closed=closed, hold_known=hold_known)
-    trials = sorted((task.trial(each) for each in paths), key=_rank)
+    trials = task.trials(paths)
     best = trials[0]
 
     def again(fit: SampledFit) -> SignalPath:
@@ -163,6 +168,17 @@ class _Task:
             max_modes=self.max_modes, start=start,
         )  # fmt: skip
         return _Trial(views, path, solution)
+
+    def trials(self, paths: tuple[SignalPath, ...]) -> list[_Trial]:
+        """All that are worth it, best first: fractions of a cycle where no whole ones do.
+
+        Torque and motion are reported together, so a path that leaves much delay is a wrong one.
+        """
+        first = [p for p in paths if at_whole_cycles(p)] or list(paths)
+        tried = sorted((self.trial(p) for p in first), key=_rank)
+        if abs(tried[0].fit.delay_s) * paths[0].sample_rate_hz > _LEFT_LATE:
+            tried += [self.trial(p) for p in paths if p not in first]
+        return sorted(tried, key=_rank)
 
     def views(self, path: SignalPath, coulomb_nm: float | None) -> _Views:
         """Estimates from what was recorded."""
@@ -253,7 +269,7 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
     views, path, fit = trial.views, trial.path, trial.fit
     spoilt = distortion(task.records, path, task.quantity, views.velocity)
     if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
-        plain = _unexplained(views.velocity, trial.solution)
+        plain = unexplained(views.velocity, trial.solution)
         return Identification(plain, plain, fit, False, spoilt)
     direct, corrected = [], []
     ways = [(views.velocity, fit.delay_s, False)]
@@ -266,11 +282,11 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
         plain = replace(raw, response=np.asarray(raw.response / late))
         factor = fit.image_factor(raw.frequency_hz, integrated=integrated)
         # Images stay in the direct estimate: its band must contain them.
-        direct.append(_widened(plain, factor, 1.0, doubt.direct[place]))
-        corrected.append(_without_images(plain, factor, task.jitter_s, doubt.corrected[place]))
+        direct.append(widened(plain, factor, 1.0, doubt.direct[place]))
+        corrected.append(without_images(plain, factor, task.jitter_s, doubt.corrected[place]))
     # Play changes stiffness, and so everything above the frequency where it shows most.
     share = np.maximum.accumulate(spoilt.share) if spoilt.play else _AVERAGED * spoilt.share
-    best, lines = (_distorted(_pooled(parts), share) for parts in (corrected, direct))
+    best, lines = (distorted(pooled(parts), share) for parts in (corrected, direct))
     if spoilt.play:
         lines = lines.cut(lines.valid_band_hz[1])
         return Identification(lines, lines, fit, False, spoilt)
@@ -303,81 +319,9 @@ def _undecided(found: Identification, best: _Trial, others: list[_Trial]) -> Ide
     return replace(found, direct=wider(found.direct), corrected=wider(found.corrected))
 
 
-def _unexplained(raw: Frf, solution: Solution) -> Frf:
-    """Lines that no model explains: neither hold and delay nor images are known of them.
-
-    What the best model leaves is charged to them, and that another hold may be the right one.
-    """
-    f, rate = raw.frequency_hz, raw.sample_rate_hz
-    misfit = solution.problem.logs(solution.x)[0][0]
-    hold = np.log(hold_response(f, rate, "zero"))
-    size, turn = (
-        np.hypot(neighbour_mean(np.abs(left), _AROUND), known)
-        for left, known in ((misfit.real, hold.real), (misfit.imag, hold.imag))
-    )
-    low, high = raw.valid_band_hz
-    return replace(
-        raw,
-        std_db=np.hypot(raw.std_db, 20 / np.log(10) * size),
-        std_deg=np.hypot(raw.std_deg, np.degrees(turn)),
-        valid_band_hz=(low, min(high, _UNTRUSTED_SHARE * rate)),
-    )
-
-
-def _distorted(frf: Frf, share: FloatArray) -> Frf:
-    """Charge what friction does not explain of the motion between the lines to the lines, too."""
-    return replace(
-        frf,
-        std_db=np.hypot(frf.std_db, 20 / np.log(10) * share),
-        std_deg=np.hypot(frf.std_deg, np.degrees(share)),
-    )
-
-
 @dataclass(frozen=True)
 class _Views:
     """The same mechanics by way of the reported velocity and of the reported position."""
 
     velocity: Frf
     position: Frf | None
-
-
-def _pooled(parts: list[Frf]) -> Frf:
-    """Each line by what is known best; the errors of two views of one motion may be the same."""
-    if len(parts) == 1:
-        return parts[0]
-    first, second = parts
-    a, b = (np.maximum(np.nan_to_num(p.std_db, nan=1.0), 1e-6) ** -2 for p in parts)
-    share = a / (a + b)
-    response = first.response * share + second.response * (1.0 - share)
-    return replace(
-        first,
-        response=np.asarray(response),
-        std_db=first.std_db * share + second.std_db * (1.0 - share),
-        std_deg=first.std_deg * share + second.std_deg * (1.0 - share),
-        coherence=np.maximum(first.coherence, second.coherence),
-        noise=first.noise * share + second.noise * (1.0 - share),
-        distortion=first.distortion * share + second.distortion * (1.0 - share),
-    )
-
-
-def _widened(frf: Frf, factor: ComplexArray, share: float, doubt: ComplexArray) -> Frf:
-    """Charge a share of the image factor, the doubt, and what none is better than, to the band."""
-    image = np.log(factor)
-    doubt_db = 20 / np.log(10) * np.hypot(image.real * share, doubt.real)
-    doubt_deg = np.degrees(np.hypot(image.imag * share, doubt.imag))
-    return replace(
-        frf,
-        std_db=np.hypot(frf.std_db, np.hypot(doubt_db, SYSTEMATIC_DB)),
-        std_deg=np.hypot(frf.std_deg, np.hypot(doubt_deg, SYSTEMATIC_DEG)),
-    )
-
-
-def _without_images(direct: Frf, factor: ComplexArray, jitter_s: float, doubt: ComplexArray) -> Frf:
-    # The correction is as uncertain as the model: a fifth of it stays in the band.
-    return replace(
-        _widened(direct, factor, 0.2, doubt),
-        response=np.asarray(direct.response / factor),
-        valid_band_hz=valid_band_hz(
-            float(direct.frequency_hz[0]), direct.sample_rate_hz, model=True, jitter_s=jitter_s
-        ),
-    )

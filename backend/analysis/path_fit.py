@@ -110,7 +110,7 @@ def path_covariance(
     drives are: those in step with the bus take set-points at its cycles, and a corner that a
     drive tells is meant to be one of first order.
     """
-    usual = [_STEADY if _at_whole_cycles(path) else _UNSTEADY]
+    usual = [_STEADY if at_whole_cycles(path) else _UNSTEADY]
     if path.current_bandwidth_hz is not None:
         usual.append(_TOLD if corner_known else _UNTOLD)
     information = np.diag(np.array(usual) ** -2.0)
@@ -142,17 +142,18 @@ def _ranked(fit: _Fit, holds: tuple[Hold, ...]) -> tuple[SignalPath, ...]:
     found = sorted((fit.best(hold) for hold in holds), key=lambda t: t[1])
     least = max(found[0][1], _ROUNDING)
     alike = [t for t in found if t[1] < _ALIKE * least]
-    whole = [t for t in alike if _at_whole_cycles(t[0])]
+    whole = [t for t in alike if at_whole_cycles(t[0])]
     there = {p.hold for p, _ in whole}
     pinned = [fit.best_whole(hold) for hold in holds if hold not in there]
     pinned = sorted((t for t in pinned if t[1] < _ALIKE * least), key=lambda t: t[1])
     if whole:
-        return tuple(p for p, _ in sorted([*whole, *pinned], key=lambda t: t[1]))
+        first = sorted([*whole, *pinned], key=lambda t: t[1])
+        return tuple(p for p, _ in [*first, *(t for t in alike if t not in whole)])
     nearly = [t for t in pinned if t[1] < _NEARLY * least]
     return tuple(p for p, _ in [*nearly, *alike, *(t for t in pinned if t not in nearly)])
 
 
-def _at_whole_cycles(path: SignalPath) -> bool:
+def at_whole_cycles(path: SignalPath) -> bool:
     """Whether set-points take effect with a cycle of the bus, as drives in step with it do."""
     lead_s = STEP_LEAD_S if path.hold == "linear" else 0.0
     cycles = (path.command_delay_s + lead_s) * path.sample_rate_hz

@@ -14,7 +14,6 @@ from backend.analysis.identify import (
     Identification,
     _Task,
     _undecided,
-    _unexplained,
     _without_path,
     identify_with_path,
 )
@@ -22,6 +21,7 @@ from backend.analysis.line_spectra import Record
 from backend.analysis.path_fit import find_paths, moved_path, reference_gain
 from backend.analysis.robust_fit import minimise
 from backend.analysis.sampling import SignalPath, sampled_command, sampled_command_response
+from backend.analysis.stated_band import unexplained
 
 ONE = Mechanics(loads=((1e-4, 20.0, 0.002),))
 
@@ -243,6 +243,6 @@ def test_what_else_may_be_true_widens_the_band():
     assert 0.1 < added[-1] < 2.0
     assert _undecided(plain, best, []) is plain
     # Where no model explains the lines, another hold may be the right one: half a cycle later.
-    unexplained = _unexplained(frf, best.solution)
-    assert np.all(unexplained.std_deg >= 180.0 * frf.frequency_hz / 1000.0)
-    assert unexplained.valid_band_hz[1] == pytest.approx(100.0)
+    left = unexplained(frf, best.solution)
+    assert np.all(left.std_deg >= 180.0 * frf.frequency_hz / 1000.0)
+    assert left.valid_band_hz[1] == pytest.approx(100.0)

@@ -1,0 +1,93 @@
+"""What is charged to the stated band of an estimate, beyond what its scatter tells."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray, neighbour_mean
+from backend.analysis.frf import Frf, valid_band_hz
+from backend.analysis.model_fit import Solution
+from backend.analysis.sampling import hold_response
+
+#: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
+SYSTEMATIC_DB = 0.05
+SYSTEMATIC_DEG = 0.35
+
+#: What no model explains is shown to this share of the sample rate; its misfit is a mean over so
+#: many lines to each side.
+_UNTRUSTED_SHARE, _AROUND = 0.1, 6
+
+
+def unexplained(raw: Frf, solution: Solution) -> Frf:
+    """Lines that no model explains: neither hold and delay nor images are known of them.
+
+    What the best model leaves is charged to them, and that another hold may be the right one.
+    """
+    f, rate = raw.frequency_hz, raw.sample_rate_hz
+    misfit = solution.problem.logs(solution.x)[0][0]
+    hold = np.log(hold_response(f, rate, "zero"))
+    size, turn = (
+        np.hypot(neighbour_mean(np.abs(left), _AROUND), known)
+        for left, known in ((misfit.real, hold.real), (misfit.imag, hold.imag))
+    )
+    low, high = raw.valid_band_hz
+    return replace(
+        raw,
+        std_db=np.hypot(raw.std_db, 20 / np.log(10) * size),
+        std_deg=np.hypot(raw.std_deg, np.degrees(turn)),
+        valid_band_hz=(low, min(high, _UNTRUSTED_SHARE * rate)),
+    )
+
+
+def distorted(frf: Frf, share: FloatArray) -> Frf:
+    """Charge what friction does not explain of the motion between the lines to the lines, too."""
+    return replace(
+        frf,
+        std_db=np.hypot(frf.std_db, 20 / np.log(10) * share),
+        std_deg=np.hypot(frf.std_deg, np.degrees(share)),
+    )
+
+
+def pooled(parts: list[Frf]) -> Frf:
+    """Each line by what is known best; the errors of two views of one motion may be the same."""
+    if len(parts) == 1:
+        return parts[0]
+    first, second = parts
+    a, b = (np.maximum(np.nan_to_num(p.std_db, nan=1.0), 1e-6) ** -2 for p in parts)
+    share = a / (a + b)
+    response = first.response * share + second.response * (1.0 - share)
+    return replace(
+        first,
+        response=np.asarray(response),
+        std_db=first.std_db * share + second.std_db * (1.0 - share),
+        std_deg=first.std_deg * share + second.std_deg * (1.0 - share),
+        coherence=np.maximum(first.coherence, second.coherence),
+        noise=first.noise * share + second.noise * (1.0 - share),
+        distortion=first.distortion * share + second.distortion * (1.0 - share),
+    )
+
+
+def widened(frf: Frf, factor: ComplexArray, share: float, doubt: ComplexArray) -> Frf:
+    """Charge a share of the image factor, the doubt, and what none is better than, to the band."""
+    image = np.log(factor)
+    doubt_db = 20 / np.log(10) * np.hypot(image.real * share, doubt.real)
+    doubt_deg = np.degrees(np.hypot(image.imag * share, doubt.imag))
+    return replace(
+        frf,
+        std_db=np.hypot(frf.std_db, np.hypot(doubt_db, SYSTEMATIC_DB)),
+        std_deg=np.hypot(frf.std_deg, np.hypot(doubt_deg, SYSTEMATIC_DEG)),
+    )
+
+
+def without_images(direct: Frf, factor: ComplexArray, jitter_s: float, doubt: ComplexArray) -> Frf:
+    """The lines without what sampling folds back, and the band that is left to them."""
+    # The correction is as uncertain as the model: a fifth of it stays in the band.
+    return replace(
+        widened(direct, factor, 0.2, doubt),
+        response=np.asarray(direct.response / factor),
+        valid_band_hz=valid_band_hz(
+            float(direct.frequency_hz[0]), direct.sample_rate_hz, model=True, jitter_s=jitter_s
+        ),
+    )
