@@ -164,6 +164,9 @@ def test_a_viewer_moves_nothing_and_can_stop(opened: Open, bench: Bench) -> None
     bench.wait_moving()
     vera.keyboard.press("Escape")
     bench.wait_standing()
+    # Who stopped it is told where it was moved from, and not on the page that pressed.
+    expect(olaf.get_by_text("Vera pressed STOP.")).to_be_visible()
+    expect(vera.get_by_text("Vera pressed STOP.")).to_have_count(0)
     olaf.mouse.up()
 
 

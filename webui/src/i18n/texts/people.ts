@@ -115,9 +115,9 @@ export const people = {
   'support.until': ['until {time}', '至 {time}'],
   'support.mayGet': ['may be granted: {rights}', '可授予：{rights}'],
   'support.looksOnly': ['looks only', '仅查看'],
-  'support.looks': ['looks on, and can change nothing.', '正在查看，不能更改任何内容。'],
+  'support.looks': ['Looking on; can change nothing.', '正在查看，不能更改任何内容。'],
   'support.granted': [
-    'may until {time}: {rights} ({axis}).',
+    'May until {time}: {rights} ({axis}).',
     '在 {time} 前可以：{rights}（{axis}）。',
   ],
   'support.allAxes': ['all axes', '所有轴'],
