@@ -104,8 +104,11 @@ class ScopeHub:
             NotAllowed: a key that the drive does not have or that no port carries.
         """
         axis = self._axis_of(drive)
-        for key in keys:
-            axis.drive.port_for(axis.drive.parameter(key))
+        parameters = [axis.drive.parameter(key) for key in keys]
+        for parameter in parameters:
+            axis.drive.port_for(parameter)
+        # Readings and channels go by the key, also where the maker's number was asked for.
+        keys = [parameter.key for parameter in parameters]
         session = axis.session
         cyclic = [n for n, k in enumerate(keys) if session and session.carries(axis.drive, k)]
         polled = [n for n in range(len(keys)) if n not in cyclic]

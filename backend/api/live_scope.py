@@ -125,7 +125,17 @@ class ScopeStreams:
             # It is tried again when the bench changes: a drive may come back.
             self._running[request.subscription] = _Running(request, signature, [])
             return
-        described = await self._described(request, streams)
+        try:
+            described = await self._described(request, streams)
+        except BaseException as error:
+            # The page, or a drive, went meanwhile: nothing must be polled for it any more.
+            for stream, _ in streams:
+                await self._bench.scope.unsubscribe(stream)
+            if not isinstance(error, DriveError):
+                raise
+            self._refuse(request, error)
+            self._running[request.subscription] = _Running(request, signature, [])
+            return
         self._tell(ScopeInfo(subscription=request.subscription, channels=described))
         for stream, _ in streams:
             stream.ready = self._ready

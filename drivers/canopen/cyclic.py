@@ -26,7 +26,7 @@ from drivers.canopen.port import CanPort
 from drivers.canopen.synchronous import LoopClock, SyncLoop
 from drivers.canopen.url import CanUrl
 from drivers.cia402 import Dialect, Mode, State
-from drivers.errors import DriveError, NotAllowed, OutOfRange
+from drivers.errors import DriveError, LinkLost, NotAllowed, OutOfRange
 from drivers.ethercat.playback import AxisLoop, Limits, Motion
 from drivers.link import CyclicSignal, LinkEvent, ScopeBlock, Trajectory, Unsubscribe
 from profiles.schema import INTEGER_RANGE
@@ -225,9 +225,15 @@ class CanopenCyclic:
         self._require_running().axis(station, AxisLoop.renew)
 
     async def halt(self, station: int | None = None) -> None:
-        """Brake now and leave Operation enabled; setpoints end."""
+        """Brake now and leave Operation enabled; setpoints end.
+
+        Raises:
+            LinkLost: nobody receives it. The setpoints end all the same, for when the bus is back.
+        """
         if self._loop is not None:
             self._loop.halt(station, "it was halted")
+            if self._loop.bus_lost:
+                raise LinkLost("the CAN bus is lost", remedy="wait until the adapter is back")
 
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
         """Deliver samples on the event loop's thread."""

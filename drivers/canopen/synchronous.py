@@ -114,6 +114,11 @@ class SyncLoop:
         """Whether SYNC is being sent."""
         return self._thread.is_alive()
 
+    @property
+    def bus_lost(self) -> bool:
+        """The last cycle could not be sent."""
+        return self._bus_lost
+
     def stop(self) -> None:
         """End the thread at once; `halt_and_wait` first to stop motion."""
         with self._lock:

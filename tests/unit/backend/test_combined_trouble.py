@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from backend.api.live import Connection, LiveHub
+from backend.api.live_messages import ScopeChannel, ScopeStart
 from backend.api.security_socket import OpenSockets
 from backend.axis import Envelope
 from backend.bench import Bench, Member
@@ -288,6 +289,64 @@ async def test_a_drive_put_back_on_the_bench_is_watched_as_often_as_before(
     assert again.monitor.watchers == {"c1"}
     await page.close()
     assert not again.monitor.watchers
+
+
+async def test_a_scope_of_a_drive_that_goes_while_it_is_begun_is_refused_and_leaves_nothing(
+    bench: Bench, x: Member, servo: Servo, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It ended the page's whole connection, and the drive was polled for ever."""
+    page = connection(bench, tmp_path)
+
+    async def gone(_drive: str) -> None:
+        del bench.members["x"]
+
+    monkeypatch.setattr(page.scopes, "_units", gone)
+    request = ScopeStart(subscription=1, channels=[ScopeChannel(drive="x", key="6064:00")])
+    before = asyncio.all_tasks()
+    await page.scopes._start(request)
+    bench.members["x"] = x
+    assert not page.scopes._running[1].streams
+    assert asyncio.all_tasks() <= before
+    await page.close()
+
+
+async def test_a_signal_is_polled_under_its_makers_number_too(tmp_path: Path) -> None:
+    """The sampler looked for the number among the keys, and ended without a word."""
+    servo = Servo("r6l")
+    servo.kind = "ethercat"
+    bench = Bench(tmp_path, {URL: lambda: servo})
+    x = await bench.connect(URL, 1, "r6l", "X")
+    parameter = x.drive.parameter("2006:01")
+    assert parameter.number
+    ((stream, places),) = bench.scope.subscribe("x", [parameter.number], 0.2)
+    assert places == (0,)
+    async with asyncio.timeout(5):
+        await stream.ready.wait()
+    block = stream.queue.popleft()
+    assert block.samples[0, 0] == x.drive.readings["2006:01"].value
+    await bench.scope.unsubscribe(stream)
+    await bench.close()
+
+
+async def test_a_page_that_goes_while_its_scope_is_begun_leaves_no_poll(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = connection(bench, tmp_path)
+    waiting = asyncio.Event()
+
+    async def never(_drive: str) -> None:
+        waiting.set()
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr(page.scopes, "_units", never)
+    request = ScopeStart(subscription=1, channels=[ScopeChannel(drive="x", key="6064:00")])
+    before = asyncio.all_tasks()
+    beginning = asyncio.create_task(page.scopes._start(request))
+    await waiting.wait()
+    beginning.cancel()
+    await asyncio.wait([beginning])
+    await page.close()
+    assert asyncio.all_tasks() <= before
 
 
 # --- STOP ---------------------------------------------------------------------------------

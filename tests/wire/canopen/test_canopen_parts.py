@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+from typing import Any
 
 import can
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.canopen.adapter import open_bus, translate
+from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.frames import Frame, exact_bits, worst_case_bits
 from drivers.canopen.images import Images
 from drivers.canopen.link import _fit
@@ -223,3 +225,28 @@ def test_padding_is_cut_and_other_bytes_are_kept() -> None:
 def test_version_numbers_and_texts() -> None:
     assert readable(b"V1.2\0\0") == "V1.2"
     assert readable(b"\x65\x00") == "101"
+
+
+class LoopOnADeadBus:
+    """As much of the SYNC loop as a halt needs."""
+
+    bus_lost = True
+
+    def __init__(self) -> None:
+        self.halted: list[int | None] = []
+
+    def halt(self, station: int | None, _why: str) -> None:
+        self.halted.append(station)
+
+
+async def test_a_halt_that_nobody_receives_does_not_say_that_it_was_received() -> None:
+    """STOP told that it had reached the axis while the adapter was gone."""
+    nothing: Any = None
+    url = parse_canopen_url("canopen://virtual/can0")
+    cyclic = CanopenCyclic(nothing, url, nothing, nothing, nothing)
+    cyclic._loop = loop = LoopOnADeadBus()  # type: ignore[assignment]
+    with pytest.raises(LinkLost, match="bus is lost"):
+        await cyclic.halt(3)
+    assert loop.halted == [3], "for when it is back"
+    loop.bus_lost = False
+    await cyclic.halt(3)
