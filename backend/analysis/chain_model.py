@@ -141,10 +141,14 @@ def with_load(x: FloatArray, place: int, new: tuple[float, float, float, float])
 def responses_with_load(
     x: FloatArray, place: int, new: FloatArray, frequency_hz: FloatArray
 ) -> ComplexArray:
-    """Responses [n, lines] of `with_load` for many ``new`` [n, 4] at once."""
-    s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
-    loads = loads_of(x)
-    inertias = np.concatenate([[np.exp(x[0])], loads[:, 0]])
+    """Responses [n, lines] of `with_load` for many ``new`` [n, 4] at once.
+
+    As exact as the precision of ``frequency_hz``: to rank very many, single precision does.
+    """
+    frequency_hz = np.asarray(frequency_hz)
+    s = 1j * TURN * frequency_hz
+    loads = [tuple(float(v) for v in row) for row in loads_of(x)]
+    inertias = [float(np.exp(x[0])), *(load[0] for load in loads)]
 
     def hung(inertia: FloatArray | float, stiffness: FloatArray | float,
              damping: FloatArray | float, behind: ComplexArray) -> ComplexArray:  # fmt: skip
@@ -153,13 +157,14 @@ def responses_with_load(
 
     behind: ComplexArray = np.zeros_like(s)
     for i in range(len(loads), place, -1):
-        behind = hung(inertias[i], loads[i - 1, 1], loads[i - 1, 2], behind)
-    kept, inertia, stiffness, damping = (column[:, None] for column in new.T)
+        behind = hung(inertias[i], loads[i - 1][1], loads[i - 1][2], behind)
+    columns = np.asarray(new.T, dtype=frequency_hz.dtype)
+    kept, inertia, stiffness, damping = (column[:, None] for column in columns)
     front = s * kept + hung(inertia, stiffness, damping, behind)
     for i in range(place, 0, -1):
-        coupling = loads[i - 1, 1] / s + loads[i - 1, 2]
+        coupling = loads[i - 1][1] / s + loads[i - 1][2]
         front = s * inertias[i - 1] + coupling * front / (coupling + front)
-    return np.asarray(1.0 / (front + np.exp(x[1])))
+    return np.asarray(1.0 / (front + float(np.exp(x[1]))))
 
 
 def chain_of_modes(

@@ -48,13 +48,17 @@ def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
     view = best_view(problem.views)
     lines = telling_lines(view, found)
     f = view.f[lines]
-    weight = np.minimum(view.weight[lines], 100.0)
+    weight = np.minimum(view.weight[lines], 100.0).astype(np.float32)
+    cycles_per_sample = (f * problem.period_s).astype(np.float32)
     # What is folded back from beyond a few kHz is weak.
     images = max(1, round(_SEARCHED_HZ * problem.period_s))
-    sampler = view.sampler.thinned(lines).nearest(images)
+    sampler = view.sampler.thinned(lines).nearest(images).single()
     every = sampler.frequency_hz
-    late = delay_response(every, float(found.x[2]) * problem.period_s)
+    late = delay_response(every, float(found.x[2]) * problem.period_s).astype(np.complex64)
     further = problem.further(found.x, view, every)
+    if further is not None:
+        further = further.astype(np.complex64)
+    measured = view.g[lines].astype(np.complex64)
     top = float(view.f[-1])
     grid_hz = np.concatenate(
         [np.geomspace(_LOWEST_TRIED * float(f[0]), 0.8 * top, 26),
@@ -68,7 +72,7 @@ def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
         plants = responses_with_load(found.x, place, new, every.ravel())
         seen = sampler.shown(plants.reshape(-1, *every.shape) * late, further)
         rest, gain, cycles = _without_gain_and_delay(
-            np.log(seen / view.g[lines]), f * problem.period_s, weight
+            np.log(seen / measured), cycles_per_sample, weight
         )
         error = np.abs(rest) * weight
         costs = np.sum(np.sqrt(1.0 + error**2 / 9.0) - 1.0, axis=1)

@@ -8,7 +8,7 @@ explain themselves instead of bending the answer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -104,6 +104,15 @@ class Sampler:
             self.reported[rows], self.controller[rows], self.seen_as[rows], self.command,
             self.told,
         )  # fmt: skip
+
+    def single(self) -> Sampler:
+        """In single precision, to rank very many."""
+        parts = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "true"}
+        small = {
+            name: part.astype(np.float32 if name == "frequency_hz" else np.complex64)
+            for name, part in parts.items()
+        }
+        return replace(self, **small)
 
     def shown(self, plants: ComplexArray, further: ComplexArray | None = None) -> ComplexArray:
         """As `seen`, for many plants [n, images, lines] at once and without slopes: [n, lines]."""
