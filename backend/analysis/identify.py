@@ -269,7 +269,11 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
     views, path, fit = trial.views, trial.path, trial.fit
     spoilt = distortion(task.records, path, task.quantity, views.velocity)
     if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
-        plain = unexplained(views.velocity, trial.solution)
+        # A filter of the speed that nobody tells would stay in the lines; the position has none.
+        if views.position is not None and path.response_bandwidth_hz is None:
+            plain = unexplained(views.position, trial.solution, 1)
+        else:
+            plain = unexplained(views.velocity, trial.solution, 0)
         return Identification(plain, plain, fit, False, spoilt)
     direct, corrected = [], []
     ways = [(views.velocity, fit.delay_s, False)]

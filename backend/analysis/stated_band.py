@@ -20,13 +20,14 @@ SYSTEMATIC_DEG = 0.35
 _UNTRUSTED_SHARE, _AROUND = 0.1, 6
 
 
-def unexplained(raw: Frf, solution: Solution) -> Frf:
+def unexplained(raw: Frf, solution: Solution, view: int) -> Frf:
     """Lines that no model explains: neither hold and delay nor images are known of them.
 
-    What the best model leaves is charged to them, and that another hold may be the right one.
+    What the best model leaves of this ``view`` is charged to them, and that another hold may be
+    the right one.
     """
     f, rate = raw.frequency_hz, raw.sample_rate_hz
-    misfit = solution.problem.logs(solution.x)[0][0]
+    misfit = solution.problem.logs(solution.x)[0][view]
     hold = np.log(hold_response(f, rate, "zero"))
     size, turn = (
         np.hypot(neighbour_mean(np.abs(left), _AROUND), known)

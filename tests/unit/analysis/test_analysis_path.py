@@ -243,6 +243,6 @@ def test_what_else_may_be_true_widens_the_band():
     assert 0.1 < added[-1] < 2.0
     assert _undecided(plain, best, []) is plain
     # Where no model explains the lines, another hold may be the right one: half a cycle later.
-    left = unexplained(frf, best.solution)
+    left = unexplained(frf, best.solution, 0)
     assert np.all(left.std_deg >= 180.0 * frf.frequency_hz / 1000.0)
     assert left.valid_band_hz[1] == pytest.approx(100.0)
