@@ -122,16 +122,19 @@ async def first_look(
             break
         # Should it follow all at once, twice the way must still be permitted, and twice the torque.
         way_rev = 2.0 * float(np.sum(np.abs(speed))) / rate / 60.0
-        if (
+        cramped = (
             way_rev > 0.8 * envelope.travel_rev
             or 2.0 * float(np.max(np.abs(speed))) > highest_rpm
-            or 2.0 * peak > 0.8 * envelope.torque_percent / 100.0
-        ):
+        )  # fmt: skip
+        if cramped or 2.0 * peak > 0.8 * envelope.torque_percent / 100.0:
             raise NotAllowed(
                 f"{axis.drive.name} moves only {moved:.3g} of {aim:.3g} rev, with up to {peak:.0%} "
-                "of its rated torque",
+                "of its rated torque"
+                + (", and no larger move is permitted" if cramped else ""),
                 drive=axis.drive.name, value=round(moved, 4), limit=f"{aim:.3g} rev",
-                remedy="look for a closed brake, a blocked axis, a torque limit that is too low or "
+                remedy=("permit more travel and speed if the machine allows it, or " if cramped
+                        else "")
+                + "look for a closed brake, a blocked axis, a torque limit that is too low or "
                 "a speed loop that is far too soft",
             )  # fmt: skip
         speed = 2.0 * speed

@@ -8,6 +8,7 @@ import signal
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import httpx
 import pytest
@@ -21,6 +22,8 @@ from backend.commands import tune
 from backend.commands.remote import Remote
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
+from backend.tools import autotune as tool
+from backend.tools.temporary import write_settings
 from drivers.cia402 import State
 from drivers.virtual.firmware.factory import make_device
 from profiles.loader import load_profile
@@ -107,10 +110,37 @@ def test_ctrl_c_and_a_termination_leave_everything_as_it_was(
     assert signal.getsignal(signal.SIGTERM) == before
 
 
-def test_by_a_server_a_design_is_verified_and_taken_back(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+DESIGN = {
+    "marks": ["balanced"], "notches": [{"center_hz": 156.0}], "bandwidth_hz": 92.0,
+    "gains": {"speed_bandwidth_hz": 220.0},
+    "promised": {"phase_margin_deg": 48.0, "gain_margin_db": 9.0, "ms": 1.8},
+    "settling_s": 0.02, "overshoot_percent": 25.0,
+}  # fmt: skip
+VERIFIED = {
+    "sweep": {"margins": {"phase_margin_deg": 56.6, "gain_margin_db": None, "ms": 1.12}},
+    "predicted_bandwidth_hz": 92.0, "measured_bandwidth_hz": 91.5,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("keep", [False, True])
+def test_by_a_server_a_design_is_taken_back_or_kept(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, keep: bool
 ) -> None:
+    """The way to the server and back; the tuning itself is that of the test above."""
     seen: dict[str, dict[str, int]] = {}
+    asked: list[tool.AutotuneSettings] = []
+
+    async def tuned(
+        axis: Axis, _session: object, settings: tool.AutotuneSettings, *_: object
+    ) -> SimpleNamespace:
+        asked.append(settings)
+        before = await write_settings(axis, {"2005:03": 2200, "2001:06": 1500})
+        seen["meanwhile"] = {key: await axis.drive.raw(key) for key in GAINS}
+        return SimpleNamespace(before=before)
+
+    def as_json(found: SimpleNamespace) -> dict[str, object]:
+        return {"candidates": [DESIGN], "applied": DESIGN, "verified": VERIFIED,
+                "before": found.before, "tried": ["300 Hz: too fast"], "notes": []}  # fmt: skip
 
     @asynccontextmanager
     async def remote(address: str) -> AsyncIterator[Remote]:
@@ -125,12 +155,38 @@ def test_by_a_server_a_design_is_verified_and_taken_back(
         assert not bench.sessions, "the exchange that it started is ended"
         await bench.close()
 
+    monkeypatch.setattr(tool, "autotune", tuned)
+    monkeypatch.setattr(tool, "as_json", as_json)
     monkeypatch.setattr(tune, "remote", remote)
-    code, told = run("--server", "http://test", "--axis", "Spindle", "--apply")
+    how = "--keep" if keep else "--apply"
+    code, told = run(
+        "--server", "http://test", "--axis", "Spindle", how, "--mark", "fast", "--load", "stiff",
+        "--travel-rev", "2", "--torque-percent", "50",
+    )  # fmt: skip
     assert code == 0, told
-    assert re.search(r"^bandwidth +[\d.]+ +[\d.]+ Hz$", told, re.MULTILINE), told
-    assert "taken back: all parameters are as before" in told
-    assert seen["after"] == seen["before"]
+    (settings,) = asked
+    assert (settings.mark, settings.load, settings.apply) == ("fast", "stiff", True)
+    assert (settings.envelope.travel_rev, settings.envelope.torque_percent) == (2.0, 50.0)
+    assert re.search(r"^balanced +220\.0 Hz +92\.0 Hz .*156 Hz$", told, re.MULTILINE), told
+    assert re.search(r"^phase margin, at least +48\.00 +56\.60 °$", told, re.MULTILINE), told
+    assert re.search(r"^gain margin, at least +9\.00 +– dB$", told, re.MULTILINE), told
+    assert "not kept: 300 Hz: too fast" in told
+    assert seen["meanwhile"] != seen["before"]
+    assert seen["after"] == seen["meanwhile" if keep else "before"]
+    assert ("taken back: all parameters are as before" in told) is not keep
+
+
+def test_a_drive_that_the_server_does_not_have(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    @asynccontextmanager
+    async def remote(address: str) -> AsyncIterator[Remote]:
+        app = make_app(Bench(tmp_path), hosts=frozenset({"test"}))
+        transport = httpx.ASGITransport(app)
+        async with httpx.AsyncClient(transport=transport, base_url=f"{address}/api/v1") as http:
+            yield Remote(address, http)
+
+    monkeypatch.setattr(tune, "remote", remote)
     code, told = run("--server", "http://test", "--axis", "Table")
     assert code == 1
     assert "http://test has no drive 'Table'" in told
