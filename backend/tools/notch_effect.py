@@ -38,10 +38,11 @@ _PLACE, _LOWEST_HZ, _HIGHEST_HZ = 0.12, 55.0, 400.0
 #: Widths in shares of the centre (Hz), or level pairs (width, depth).
 _WIDTHS = (0.5, 0.2)
 _SHARE_OF_TORQUE = 0.35
-#: An axis that only trembles: its lines begin here, and it may go so far and so fast.
-_STILL_FROM_HZ, _STILL_REV, _STILL_RPM = 30.0, 0.1, 150.0
+#: An axis that only trembles: its lines begin here, and it may go so far and so fast. Nothing
+#: holds it, so that rounded torques let it drift by some hundredths of a revolution.
+_STILL_FROM_HZ, _STILL_REV, _STILL_RPM = 30.0, 0.3, 150.0
 #: Less than this to the nearest end is too little for it.
-_LEAST_ROOM_REV = 0.02
+_LEAST_ROOM_REV = 0.1
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import struct
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import asdict, dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -61,7 +62,7 @@ class DirectBench:
 class DirectLink:
     """`drivers.link.Link` and its `Cyclic` in one, on one virtual drive."""
 
-    kind = "ethercat"
+    kind: Literal["ethercat", "canopen", "modbus", "mlink"] = "ethercat"
     url = "direct://virtual"
 
     def __init__(self, device: Device, profile: Profile) -> None:
