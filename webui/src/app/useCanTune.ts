@@ -1,32 +1,29 @@
 import { useEffect, useState } from 'react'
 import { api, ask } from '../api/client'
 import { useAxisState, useDrive, useLink } from '../live/store'
+import { measurable } from '../pages/response/measurable'
 
-/** CiA 402 modes that a measurement commands in every cycle: CSP, CSV, CST. */
-const CYCLIC_MODES = [8, 9, 10]
-
-/** Whether an axis can be measured: a cyclic mode, and a bus that can exchange process data. */
+/** Whether an axis can be measured over a bus that it is connected to. */
 export function useCanTune(drive: string | null): boolean {
   const { open } = useLink()
   const summary = useDrive(drive)
   const state = useAxisState(drive)
   const urls = summary?.ports.map((port) => port.url).join(' ') ?? ''
-  const [possible, setPossible] = useState(false)
+  const [url, setUrl] = useState<string | null>(null)
   useEffect(() => {
-    if (!open || urls === '') {
-      setPossible(false)
-      return
-    }
+    setUrl(null)
+    if (!open || urls === '') return
     let current = true
     ask(api.GET('/api/v1/buses')).then(
-      (buses) =>
-        current &&
-        setPossible(buses.some((bus) => bus.cyclic_possible && urls.split(' ').includes(bus.url))),
+      (buses) => {
+        const bus = buses.find((each) => each.cyclic_possible && urls.split(' ').includes(each.url))
+        if (current) setUrl(bus?.url ?? null)
+      },
       () => {}, // asked again when the connection is back
     )
     return () => {
       current = false
     }
   }, [open, urls])
-  return possible && (state?.modes.some((mode) => CYCLIC_MODES.includes(mode)) ?? false)
+  return measurable(url, state?.modes ?? []).possible
 }
