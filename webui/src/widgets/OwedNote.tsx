@@ -26,7 +26,8 @@ export function OwedNote({ drive }: { drive: string }) {
   return (
     <div className="note warn" role="alert">
       <p>
-        <strong>{t('owed.title', { count: summary.owed.length })}</strong> {t('owed.text')}
+        <strong>{t('owed.title', { count: summary.owed.length })}</strong>{' '}
+        {t(summary.connected ? 'owed.offered' : 'owed.text')}
       </p>
       <details>
         <summary>{t('owed.which')}</summary>

@@ -275,6 +275,10 @@ export const tuning = {
     'A motion set them for its own length and lost the drive before its end. They are put back by themselves when the drive answers again, as long as the axis stands and nobody has changed them. Look at them before the next motion.',
     '某次运动临时更改了它们，结束前与驱动器失去联系。驱动器恢复应答后，若轴静止且无人更改过，将自动恢复。下次运动前请检查。',
   ],
+  'owed.offered': [
+    'A motion set them for its own length and lost the drive before its end. They were not put back by themselves: somebody has changed them since, or the axis was in use. Decide before the next motion.',
+    '某次运动临时更改了它们，结束前与驱动器失去联系。未能自动恢复：此后有人更改过，或轴正在使用。请在下次运动前决定。',
+  ],
   'owed.which': ['Which, and what they were before', '哪些参数，原来的值'],
   'owed.unapplied': ['back, but not in effect yet', '已写回，尚未生效'],
   'owed.putBack': ['Put them back', '恢复原值'],
