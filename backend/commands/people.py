@@ -60,7 +60,7 @@ def list_accounts(config: Config = None) -> None:
     async def work(accounts: Accounts) -> None:
         for each in accounts.all():
             here = len(accounts.sessions(each.id))
-            print(f"{each.name}  {each.role}  {here} sessions")
+            print(f"{each.name}  {each.role}  {here} {'session' if here == 1 else 'sessions'}")
 
     _with(config, work)
 

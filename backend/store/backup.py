@@ -64,7 +64,9 @@ def make_backup(
     """
     if archive.exists() and not overwrite:
         raise BackupFailed(
-            f"{archive} exists already", value=str(archive), remedy="choose another name"
+            f"{archive} exists already",
+            value=str(archive),
+            remedy="choose another name, or replace it with --overwrite",
         )
     try:
         archive.parent.mkdir(parents=True, exist_ok=True)
