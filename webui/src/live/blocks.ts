@@ -24,7 +24,7 @@ const BASES = 2
 /** Decode one binary frame. Throws RangeError or Error on anything that is not whole blocks. */
 export function decodeBlocks(buffer: ArrayBuffer): ScopeBlock[] {
   const blocks: ScopeBlock[] = []
-  for (let at = 0; at < buffer.byteLength || at === 0; ) {
+  for (let at = 0; at < buffer.byteLength || at === 0;) {
     const { block, end } = decodeBlock(buffer, at)
     blocks.push(block)
     at = end

@@ -57,7 +57,8 @@ function binned(traces: Trace[], from: number, to: number, bins: number): Column
     let gaps = false
     let row = ring.firstAt(from)
     for (let bin = 0; bin < bins; bin++) {
-      const end = bin === bins - 1 ? ring.firstAfter(to) : ring.firstAt(from + (bin + 1) * width, row)
+      const end =
+        bin === bins - 1 ? ring.firstAfter(to) : ring.firstAt(from + (bin + 1) * width, row)
       const found = trace.extremes(row, end)
       row = Math.max(row, end)
       if (!found) {

@@ -118,10 +118,7 @@ export function TimePlot({
         const points = rest.reduce((sum, column) => sum + column.length, 0)
         for (const each of plot.series) each.width = lineWidth(points, devicePixelRatio)
         plot.batch(() => {
-          plot.setData(
-            [Float64Array.from(times, (time) => time - next.origin), ...rest],
-            false,
-          )
+          plot.setData([Float64Array.from(times, (time) => time - next.origin), ...rest], false)
           // A scale of no width would keep uPlot looking for ticks for ever.
           const end = Math.max(next.to, next.from + SHORTEST_S)
           plot.setScale('x', { min: next.from - next.origin, max: end - next.origin })
