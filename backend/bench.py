@@ -22,6 +22,7 @@ from backend.journal import Journal, Level
 from backend.matching import profile_for
 from backend.measurements import MeasurementStore
 from backend.monitor import Monitor, Snapshot
+from backend.owed_store import OwedStore
 from backend.people.identity import by_itself
 from backend.ports import Port
 from backend.readings import Reading
@@ -83,7 +84,7 @@ class Bench:
         self.leases = Leases(self._lease_changed)
         self._witness = Witness(self.audit, self.name_of)
         self.on_job.append(self._witness.job_changed)
-        self.returning = Returning(self)
+        self.returning = Returning(self, OwedStore(state_folder / "owed"))
         self.scope = ScopeHub(lambda drive: self.member(drive).axis)
         self.state_folder = state_folder
         self.axis_records = AxisStore(state_folder / "axes")
@@ -367,6 +368,7 @@ class Bench:
         drive.listen_writes(self._witness.wrote)
         drive.listen_commands(self._witness.commanded)
         drive.owed.listen(self._drives_changed)
+        self.returning.begin(drive)
         monitor.start()
         self._remember()
         self.journal.add(f"connected {drive.name} ({drive.profile.title})", drive=drive_id)

@@ -36,8 +36,11 @@ def checked_name(name: str, suffix: str) -> str:
     return stem + suffix
 
 
-def write_atomically(path: Path, data: bytes) -> None:
+def write_atomically(path: Path, data: bytes, *, durable: bool = True) -> None:
     """Replace ``path`` by ``data``, or leave it as it was.
+
+    What is not ``durable`` outlives the process but perhaps not the computer; the disk is not
+    waited for.
 
     Raises:
         StorageFailed: disk full, no permission; the old file stays.
@@ -56,7 +59,8 @@ def write_atomically(path: Path, data: bytes) -> None:
         with handle:
             handle.write(data)
             handle.flush()
-            os.fsync(handle.fileno())
+            if durable:
+                os.fsync(handle.fileno())
         temporary.replace(path)
     except OSError as error:
         temporary.unlink(missing_ok=True)

@@ -180,7 +180,7 @@ class Monitor:
             self._journal.add(now.problem, level="error", drive=drive.id)
         if now.fresh and not before.fresh:
             self._journal.add(f"{drive.name} answers", drive=drive.id)
-            if before.status_word is not None:
+            if before.status_word is not None or drive.owed:
                 self._returned()
         if not now.fresh:
             return

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from backend.readings import Reading
@@ -28,8 +29,10 @@ class Owed:
 
     def __init__(self) -> None:
         self._debts: dict[str, Debt] = {}
+        self._lent: dict[str, list[Raw]] = {}
         self._sent: dict[str, frozenset[Raw]] = {}
         self._listeners: list[Callable[[], None]] = []
+        self._note: Callable[[], None] = lambda: None
 
     def __bool__(self) -> bool:
         return bool(self._debts)
@@ -37,6 +40,41 @@ class Owed:
     def listen(self, listener: Callable[[], None]) -> None:
         """Call ``listener`` after every change of the list."""
         self._listeners.append(listener)
+
+    def keep(self, note: Callable[[], None]) -> None:
+        """Call ``note`` after every change of `outstanding`."""
+        self._note = note
+
+    def recall(self, debts: Iterable[Debt]) -> None:
+        """What a process that is no more has left."""
+        for debt in debts:
+            self._debts[debt.key] = debt
+            self._sent[debt.key] = debt.left
+
+    @contextmanager
+    def lent(self, values: Mapping[str, Raw]) -> Iterator[None]:
+        """Around a motion that changes these raw values and puts them back when it ends."""
+        lent = dict(values)
+        for key, raw in lent.items():
+            self._lent.setdefault(key, []).append(raw)
+        self._note()
+        try:
+            yield
+        finally:
+            for key in lent:
+                self._lent[key].pop()
+                if not self._lent[key]:
+                    del self._lent[key]
+            self._note()
+
+    @property
+    def outstanding(self) -> tuple[Debt, ...]:
+        """What would be owed if this process ended now, without a chance to put anything back."""
+        lent = {
+            key: Debt(key, raws[0], self._sent.get(key, frozenset()))
+            for key, raws in self._lent.items()
+        }
+        return tuple((lent | self._debts).values())
 
     @property
     def debts(self) -> tuple[Debt, ...]:
@@ -67,6 +105,8 @@ class Owed:
         debt = self._debts.get(key)
         if debt is not None and wanted != debt.raw:
             self._debts[key] = replace(debt, left=frozenset())
+        if debt is not None or key in self._lent:
+            self._note()
 
     def seen(self, readings: Iterable[Reading]) -> None:
         """What a drive holds as it should is owed no longer."""
@@ -81,5 +121,6 @@ class Owed:
             self._changed()
 
     def _changed(self) -> None:
+        self._note()
         for listener in self._listeners:
             listener()

@@ -40,13 +40,14 @@ async def restoring(drive: Drive, *keys: str) -> AsyncIterator[dict[str, Raw]]:
         reading = await drive.read(key)
         if reading.raw is not None:
             before[key] = reading.raw
-    try:
-        yield before
-    except BaseException as error:
-        await _put_back(drive, before, error)
-        raise
-    else:
-        await _put_back(drive, before, None)
+    with drive.owed.lent(before):
+        try:
+            yield before
+        except BaseException as error:
+            await _put_back(drive, before, error)
+            raise
+        else:
+            await _put_back(drive, before, None)
 
 
 async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException | None) -> None:

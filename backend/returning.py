@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from backend.drive import Drive
+from backend.files import StorageFailed
 from backend.jobs import Job, JobResult, Progress
+from backend.owed_store import OwedStore
 from backend.tools.settling import settle
 from drivers.errors import NotAllowed
+from drivers.link import Found
 
 if TYPE_CHECKING:
     from backend.bench import Bench, Member
@@ -15,8 +19,32 @@ if TYPE_CHECKING:
 class Returning:
     """For the drives of one bench."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: Bench, notes: OwedStore) -> None:
         self._bench = bench
+        self._notes = notes
+        self._noted = True
+
+    def begin(self, drive: Drive) -> None:
+        """Recall what an earlier server left in a drive; note from now on what is owed to it."""
+        debts, serial = self._notes.get(drive.id, _serial(drive))
+        drive.owed.recall(debts)
+        drive.owed.keep(lambda: self._note(drive))
+        if drive.found is None and serial is not None:
+            # What is owed is owed to that one: another that answers here is noticed.
+            drive.found = Found(drive.ports[0].station, serial=serial)
+
+    def _note(self, drive: Drive) -> None:
+        try:
+            self._notes.put(drive.id, _serial(drive), drive.owed.outstanding)
+        except StorageFailed as error:
+            if self._noted:
+                text = (
+                    f"a server that is killed in a motion will not know what to put back: {error}"
+                )
+                self._bench.journal.add(text, level="warning", drive=drive.id)
+            self._noted = False
+        else:
+            self._noted = True
 
     def returned(self, drive_id: str) -> None:
         """It may have restarted, so everything is read anew, and what is owed to it is put back."""
@@ -39,8 +67,7 @@ class Returning:
     async def _is_the_same(self, member: Member) -> bool:
         """Notice another drive at this place before anything is written to it."""
         drive = member.drive
-        known = drive.found.serial if drive.found else None
-        if known is None:
+        if _serial(drive) is None:
             return True
         try:
             await drive.confirm_identity()
@@ -76,3 +103,7 @@ class Returning:
             "put-back", f"Put back what a motion left in {drive.name}", work, drive=drive.id,
             motion=True, stoppable=False, by_person=asked,
         )  # fmt: skip
+
+
+def _serial(drive: Drive) -> int | None:
+    return drive.found.serial if drive.found is not None else None

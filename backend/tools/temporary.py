@@ -104,8 +104,10 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
 @asynccontextmanager
 async def temporary(axis: Axis, values: Mapping[str, int]) -> AsyncIterator[dict[str, int]]:
     """These raw values act inside the block; yields what is put back afterwards."""
-    before = await write_settings(axis, values)
-    try:
-        yield before
-    finally:
-        await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, axis.drive.name)
+    drive = axis.drive
+    with drive.owed.lent({key: await drive.raw(key) for key in values}):
+        before = await write_settings(axis, values)
+        try:
+            yield before
+        finally:
+            await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, drive.name)

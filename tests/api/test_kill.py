@@ -17,6 +17,7 @@ import pytest
 from backend.demo import DemoBench
 from drivers.link import Address
 from drivers.urls import link_for
+from profiles.schema import DataType
 from tests.support.station import Live, until
 
 SPEED_RPM, RAMP_RPM_S = 300.0, 3000.0
@@ -124,6 +125,42 @@ def test_server_finds_its_drives_again_after_a_kill(drives: DemoBench, tmp_path:
         again.end()
 
 
+def test_what_a_killed_server_left_in_the_drive_is_put_back(
+    drives: DemoBench, tmp_path: Path
+) -> None:
+    """The ramps of its jog; nothing is written while the axis still holds its position."""
+    url = drives.addresses["mlink://virtual0"]
+    before = asyncio.run(number(url, 0x6083, "UINT32"))
+    server = ServerProcess(tmp_path / "state")
+    x = add_drive(server, url)
+    page = server.live()
+    page.send(type="jog_start", drive=x, direction=1, speed=SPEED_RPM, acceleration=1500.0,
+              travel_limit=30, torque_limit=150)  # fmt: skip
+
+    def jogs() -> bool:
+        page.send(type="jog_renew", drive=x)
+        speed = server.http.get(f"/drives/{x}/state").json()["velocity"]
+        return speed is not None and abs(speed) > 0.5 * SPEED_RPM
+
+    until(jogs, 10)
+    page.socket.socket.close()
+    server.kill()
+    jogged = asyncio.run(number(url, 0x6083, "UINT32"))
+    assert jogged != before
+    again = ServerProcess(tmp_path / "state")
+    try:
+        until(lambda: again.http.get(f"/drives/{x}/state").json()["fresh"], 5)
+        owed = {each["key"]: each["raw"] for each in again.http.get(f"/drives/{x}").json()["owed"]}
+        assert owed["6083:00"] == before
+        body = {"goal": "Switch on disabled"}
+        again.http.post(f"/drives/{x}/transition", json=body).raise_for_status()
+        until(lambda: again.http.post(f"/drives/{x}/jobs/put-back").status_code in (202, 409), 5)
+        until(lambda: again.http.get(f"/drives/{x}").json()["owed"] == [], 10)
+    finally:
+        again.end()
+    assert asyncio.run(number(url, 0x6083, "UINT32")) == before
+
+
 def test_ended_server_stops_the_axis_first(drives: DemoBench, tmp_path: Path) -> None:
     url = drives.addresses["mlink://virtual0"]
     server = ServerProcess(tmp_path / "state")
@@ -149,13 +186,13 @@ def test_an_axis_left_enabled_loses_its_power(drives: DemoBench, tmp_path: Path,
     if how == "axis leaves the bench":
         server.http.delete(f"/drives/{x}").raise_for_status()
     server.end()
-    assert not asyncio.run(status_word(url)) & 1 << 2
+    assert not asyncio.run(number(url, 0x6041, "UINT16")) & 1 << 2
 
 
-async def status_word(url: str) -> int:
+async def number(url: str, index: int, type_: DataType) -> int:
     link = link_for(url)
     await link.open()
     try:
-        return int.from_bytes(await link.read(1, Address(0x6041, 0, "UINT16")), "little")
+        return int.from_bytes(await link.read(1, Address(index, 0, type_)), "little")
     finally:
         await link.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import shutil
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from backend.bench import Bench, Member
 from backend.restoring import RestoreFailed
 from backend.tools.temporary import temporary
 from drivers.errors import LinkLost
+from drivers.link import Found
 from tests.support.servo import CONTROL, Servo, bench_with
 
 #: Largest torque, and the bandwidth of the speed loop, which acts after "write settings".
@@ -199,3 +201,69 @@ async def test_what_is_back_but_does_not_act_is_owed_too(
     await back(bench, servo)
     assert [at for at, _data in servo.written] == [WRITE_SETTINGS]
     assert not x.drive.owed
+
+
+async def killed(x: Member, servo: Servo, state: Path, left_by_it: Path) -> None:
+    """What a server killed in the middle of a motion leaves: its state folder and the drive."""
+    x.drive.found = Found(1, serial=await x.drive.read_serial())
+    async with x.axis.restoring(TORQUE), temporary(x.axis, {SPEED: 200}):
+        await x.drive.write(TORQUE, 800)
+        shutil.copytree(state, left_by_it)
+        midway = held(servo)
+    assert midway == {TORQUE: 800, SPEED: 200}
+    for key, raw in midway.items():
+        servo.set(place(key), raw)
+
+
+async def test_the_next_server_puts_back_what_a_killed_one_left(
+    x: Member, servo: Servo, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    state = tmp_path_factory.mktemp("killed") / "state"
+    await killed(x, servo, tmp_path, state)
+    assert not any((tmp_path / "owed").iterdir()), "an orderly end leaves no note"
+    again, member = await bench_with(servo, state)
+    assert {debt.key: debt.raw for debt in member.drive.owed.debts} == WAS
+    await back(again, servo)
+    assert held(servo) == WAS
+    assert not member.drive.owed
+    assert not any((state / "owed").iterdir())
+    await again.close()
+
+
+async def test_what_was_changed_after_the_kill_is_offered_not_done(
+    x: Member, servo: Servo, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    state = tmp_path_factory.mktemp("killed") / "state"
+    await killed(x, servo, tmp_path, state)
+    servo.set(place(TORQUE), 1234)
+    again, member = await bench_with(servo, state)
+    await back(again, servo)
+    assert held(servo) == {TORQUE: 1234, SPEED: 400}
+    assert [(debt.key, debt.raw) for debt in member.drive.owed.debts] == [(TORQUE, 3000)]
+    await again.close()
+
+
+async def test_another_drive_in_its_place_owes_nothing(
+    x: Member, servo: Servo, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    state = tmp_path_factory.mktemp("killed") / "state"
+    await killed(x, servo, tmp_path, state)
+    servo.set((0x1018, 4), servo.number((0x1018, 4)) + 1)
+    again, member = await bench_with(servo, state)
+    await back(again, servo)
+    assert "had serial number 7" in member.drive.identity_warning
+    assert held(servo) == {TORQUE: 800, SPEED: 200}, "nothing is written to it"
+    await again.accept_identity("x")
+    assert not member.drive.owed
+    await again.close()
+
+
+async def test_a_full_disk_keeps_nobody_from_moving(
+    bench: Bench, x: Member, servo: Servo, tmp_path: Path
+) -> None:
+    (tmp_path / "owed").write_text("in the way")
+    async with temporary(x.axis, {SPEED: 200}):
+        assert held(servo)[SPEED] == 200
+    assert held(servo) == WAS
+    lines = [entry.text for entry in bench.journal.entries("x")]
+    assert sum("will not know what to put back" in line for line in lines) == 1
