@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+import zlib
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -43,8 +44,15 @@ class AxisSpec(BaseModel):
     station: int = Field(default=1, ge=0, le=65535)
     also_on: str | None = None
     also_station: int | None = None
-    serial: int | None = None
+    serial: int | None = Field(default=None, ge=1, le=0xFFFFFFFF)
     mechanics: MechanicsSpec = Field(default_factory=standard_mechanics)
+
+    @property
+    def serial_number(self) -> int:
+        """As the bench says, or one of its bus and station: no two drives of a bench share one."""
+        if self.serial is not None:
+            return self.serial
+        return 0x56000000 | (zlib.crc32(self.on.encode()) & 0xFFFF) << 8 | self.station & 0xFF
 
     @property
     def ports(self) -> tuple[tuple[str, int], ...]:

@@ -26,7 +26,7 @@ from drivers.errors import DriveError
 from drivers.urls import parse_url
 from drivers.virtual.bench import AxisSpec, BenchSpec, load_bench
 from drivers.virtual.device import Device, SdoAbort
-from drivers.virtual.firmware.factory import make_device
+from drivers.virtual.firmware.factory import make_device, number_device
 from drivers.virtual.shared import SharedDevice
 from drivers.virtual.wires.can_wire import CanWire
 from drivers.virtual.wires.canopen import CanopenNode
@@ -101,6 +101,7 @@ class Wires:
             if nvm is not None:
                 nvm.mkdir(parents=True, exist_ok=True)
             real = make_device(axis.drive, axis.mechanics, nvm, station)
+            number_device(real, axis.serial_number)
             device = SharedDevice(real, self._lock)
             # Compiles the physics on a machine's first start, before anybody asks the drive.
             now_ns = time.monotonic_ns()

@@ -9,6 +9,7 @@ import pytest
 
 from drivers.errors import NotAllowed
 from drivers.virtual.bench import load_bench
+from drivers.virtual.firmware.factory import make_device, number_device
 from drivers.virtual.mechanics.spec import (
     FrictionSpec,
     LoadSpec,
@@ -113,3 +114,23 @@ def test_odd_but_plausible_machines_are_taken() -> None:
     ):
         low, high = spec.limit_switches_rev
         assert low < high
+
+
+def test_no_two_drives_of_a_bench_have_one_serial_number(tmp_path: Path) -> None:
+    """Else a drive on a second bus would pass for a second port of the same one."""
+    file = tmp_path / "bench.toml"
+    places = [("mlink://virtual0", 1), ("ethercat://virtual0", 1), ("ethercat://virtual0", 2)]
+    file.write_text(
+        "".join(
+            AXIS.format(name=number, drive="mms7", on=on, station=station)
+            for number, (on, station) in enumerate(places)
+        )
+        + AXIS.format(name="own", drive="mms7", on="mlink://virtual0", station=2)
+        + "serial = 4711\n"
+    )
+    numbers = [axis.serial_number for axis in load_bench(file).axis]
+    assert len(set(numbers)) == 4
+    assert numbers[-1] == 4711
+    device = make_device("mms7")
+    number_device(device, numbers[0])
+    assert device.read(0x1018, 4) == numbers[0].to_bytes(4, "little")

@@ -13,6 +13,7 @@ from pathlib import Path
 from drivers import scheduling
 from drivers.errors import DriveError
 from drivers.virtual.device import Device
+from drivers.virtual.firmware.factory import number_device
 from drivers.virtual.wires.ethercat.bench import axes_by_name, axes_of_bench, load_factory
 from drivers.virtual.wires.ethercat.clock import LockstepClock, RealClock, SteadyClock, WireClock
 from drivers.virtual.wires.ethercat.segment import Segment
@@ -74,7 +75,8 @@ def build(arguments: argparse.Namespace) -> Segment:
         factory(axis.drive, axis.mechanics, arguments.nvm, station)
         for station, axis in enumerate(axes, 1)
     ]
-    for device in devices:
+    for axis, device in zip(axes, devices, strict=True):
+        number_device(device, axis.serial_number)
         _warm_up(device)
     clock: WireClock = SteadyClock() if arguments.steady else RealClock()
     if arguments.lockstep:
