@@ -151,8 +151,7 @@ class CanopenLink:
         )
         with self._watch_lock:
             record = self._watch.record(node)
-            if len(answers) > 1:
-                record.conflict = "two nodes have this number"
+            record.conflict = "two nodes have this number" if len(answers) > 1 else ""
             state = record.state_text
         return replace(found, state=state)
 

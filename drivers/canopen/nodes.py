@@ -39,6 +39,8 @@ _EMERGENCY_EXACT = {
 _LATE_PERIODS = 2.5
 _LATE_EXTRA_S = 0.1
 _DUPLICATE_WINDOW_S = 10.0
+_FORGIVEN_S = 60.0
+"""Two nodes with one number go on answering twice; what a busy computer mixed up does not."""
 #: A drive that flickers sends hundreds of emergencies a second: so many of a node are told in one.
 _EMERGENCIES_PER_S = 10
 
@@ -193,6 +195,9 @@ class NodeWatch:
         for record in self.nodes.values():
             if record.emergencies_untold:
                 events += self._end_of_storm(record, now_s)
+            if record.strays_s and now_s - record.strays_s[-1] > _FORGIVEN_S:
+                record.strays_s.clear()
+                record.conflict = ""
             if not record.alive or record.last_heartbeat_s is None or record.period_s is None:
                 continue
             limit_s = record.period_s * _LATE_PERIODS + _LATE_EXTRA_S
@@ -237,7 +242,8 @@ class NodeWatch:
     def stray_answer(self, node: int, now_s: float) -> LinkEvent | None:
         """An SDO answer of ``node`` came that nobody here asked for.
 
-        Two within ten seconds, with no other master asking, mean two nodes with one number.
+        Two within ten seconds, with no other master asking, mean two nodes with one number, until
+        there were none for a minute.
         """
         record = self.record(node)
         record.strays_s = [t for t in record.strays_s if now_s - t < _DUPLICATE_WINDOW_S]

@@ -112,6 +112,22 @@ def test_guarding_notices_a_toggle_bit_that_stands_still() -> None:
     assert "two nodes have this number" in events[0].text
 
 
+def test_answers_that_nobody_asked_for_are_two_nodes_only_while_they_come() -> None:
+    watch = NodeWatch()
+    record = watch.record(5)
+    assert watch.stray_answer(5, 0.0) is None
+    told = watch.stray_answer(5, 3.0)
+    assert told is not None
+    assert "two nodes answer as number 5" in told.text
+    assert watch.stray_answer(5, 50.0) is None, "told once"
+    watch.overdue(100.0)
+    assert record.conflict == "two nodes have this number"
+    watch.overdue(110.1)
+    assert record.conflict == "", "none for a minute"
+    assert watch.stray_answer(5, 111.0) is None
+    assert watch.stray_answer(5, 112.0) is not None, "told again"
+
+
 @pytest.mark.parametrize(
     ("code", "text"),
     [
