@@ -57,7 +57,7 @@ def test_go_back_to_an_earlier_version(
     row.get_by_role("button", name=f"Compare version {number}, or go back to it").click()
     panel = laptop.locator("section.panel", has_text="Compare with an axis")
     panel.get_by_role("button", name="Compare", exact=True).click()
-    expect(panel.get_by_text("1 differ", exact=True)).to_be_visible()
+    expect(panel.get_by_text("1 differs", exact=True)).to_be_visible()
     panel.get_by_role("button", name="Load (1)").click()
     dialog = laptop.get_by_role("dialog")
     dialog.get_by_role("button", name="Write now").click()

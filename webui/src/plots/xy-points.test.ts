@@ -19,6 +19,10 @@ describe('a moment on a curve of one quantity over another', () => {
     expect(nearestPoint(CURVE, SIZE, 0, 0)).toBe(3)
     expect(nearestPoint({ ...CURVE, times: [] }, SIZE, 0, 0)).toBeNull()
   })
+  it('is the last where several lie at one place, as while the axis stands', () => {
+    const standing = { ...CURVE, x: [10, 10, 10, 10], y: [0, 0, 0, 0] }
+    expect(nearestPoint(standing, SIZE, 0, 0)).toBe(3)
+  })
   it('is found again by its time, at the nearer of two points', () => {
     expect(pointAt(CURVE, SIZE, 6)).toEqual({ left: 50, top: 100 })
     expect(pointAt(CURVE, SIZE, 6.4)).toEqual({ left: 50, top: 100 })

@@ -20,14 +20,17 @@ const placeOf = ({ x, y, xs, ys }: XyCurve, { width, height }: Size, i: number) 
   top: (1 - ((y[i] as number) - ys[0]) / (ys[1] - ys[0])) * height,
 })
 
-/** The point of the curve that lies nearest to a place on the drawing; null without any point. */
+/**
+ * The point of the curve that lies nearest to a place on the drawing; null without any point. Of
+ * points at one place (the axis stands) it is the last, which is what others have in sight as well.
+ */
 export function nearestPoint(curve: XyCurve, size: Size, left: number, top: number): number | null {
   let found: number | null = null
   let least = Number.POSITIVE_INFINITY
   for (let i = 0; i < curve.times.length; i++) {
     const at = placeOf(curve, size, i)
     const away = (at.left - left) ** 2 + (at.top - top) ** 2
-    if (away < least) [found, least] = [i, away]
+    if (away <= least) [found, least] = [i, away]
   }
   return found
 }
