@@ -254,6 +254,13 @@ class ObjectDictionary:
         if entry is not None:
             entry.value = entry.active = value
 
+    def make_own(self, key: str, value: Raw) -> None:
+        """What this one drive has from the factory, and after every start."""
+        entry = self.numbered.get(key)
+        if entry is not None:
+            entry.parameter = entry.parameter.model_copy(update={"default_raw": value})
+            entry.value = entry.active = value
+
     def load(self, values: Mapping[str, Raw]) -> None:
         """Power-on: take over stored values, all in effect; those that no longer fit are left."""
         for key, value in values.items():

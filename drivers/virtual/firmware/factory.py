@@ -64,4 +64,4 @@ def make_device(
 def number_device(device: Device, serial: int) -> None:
     """Give a drive of ours its serial number (1018h:04); one of another factory keeps its own."""
     if isinstance(device, VirtualServo):
-        device.od.put("1018:04", serial)
+        device.od.make_own("1018:04", serial)

@@ -134,3 +134,5 @@ def test_no_two_drives_of_a_bench_have_one_serial_number(tmp_path: Path) -> None
     device = make_device("mms7")
     number_device(device, numbers[0])
     assert device.read(0x1018, 4) == numbers[0].to_bytes(4, "little")
+    device.power_cycle()
+    assert device.read(0x1018, 4) == numbers[0].to_bytes(4, "little"), "after a power cycle, too"
