@@ -62,7 +62,9 @@ def run_in_order(work: Callable[[], Awaitable[T]]) -> T:
 
     What the drive was lent for a measurement is put back while the work is cancelled.
     """
-    # The event loop makes a cancelling of SIGINT alone.
+    # The event loop makes a cancelling of SIGINT alone, and only where that is not ignored, as it
+    # is for what a shell starts in the background.
+    interrupt = signal.signal(signal.SIGINT, signal.default_int_handler)
     before = signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
     try:
         return run(work)
@@ -71,6 +73,7 @@ def run_in_order(work: Callable[[], Awaitable[T]]) -> T:
         raise typer.Exit(130) from None
     finally:
         signal.signal(signal.SIGTERM, before)
+        signal.signal(signal.SIGINT, interrupt)
 
 
 def until_interrupted(work: Callable[[], Awaitable[None]]) -> None:
