@@ -394,6 +394,8 @@ class Bench:
             if member.axis.owes_stop:
                 self._unstopped.update((self.url_of(p), p.station) for p in member.drive.ports)
             del self.members[drive_id]
+            # Whoever takes it off has read what it is owed: on its axis' pages it stands first.
+            member.drive.owed.settle([debt.key for debt in member.drive.owed.debts])
         finally:
             self._parting.discard(drive_id)
         await member.monitor.close()
