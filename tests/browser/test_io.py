@@ -61,7 +61,7 @@ def test_forcing_ends_with_leaving_the_page(laptop: Page, bench: Bench) -> None:
     begin_forcing(page, bench)
     assert bench.raw("60FE:01") & 0x10000
     open_axis(page, bench.drive, "overview")
-    until(lambda: bench.raw("60FE:02") == 0, 10, "leaving lets go, with nobody asking")
+    until(lambda: bench.raw("60FE:02") == 0, 3, "leaving lets go at once")
     assert bench.raw("60FE:01") == 0
 
 
@@ -69,7 +69,7 @@ def test_forcing_ends_with_stop(laptop: Page, bench: Bench) -> None:
     page = laptop
     begin_forcing(page, bench)
     page.keyboard.press("Escape")
-    until(lambda: bench.raw("60FE:02") == 0, 10, "STOP lets go")
+    until(lambda: bench.raw("60FE:02") == 0, 3, "STOP lets go")
     expect(page.get_by_text("STOP was pressed")).to_be_visible()
 
 
