@@ -24,6 +24,9 @@ export default defineConfig({
   base: './',
   build: {
     target: 'es2022',
+    // One sheet: a page whose code had to be fetched twice would come without a sheet of its own,
+    // since the loader asks for each only once.
+    cssCodeSplit: false,
     assetsInlineLimit: 0, // the page's policy allows no data: scripts or workers
     chunkSizeWarningLimit: 900,
     reportCompressedSize: false,

@@ -7,6 +7,7 @@ import os
 import shutil
 import threading
 import time
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -187,17 +188,35 @@ class RecordingWriter:
             self._append_together(items[start : start + _WRITE_ITEMS])
 
     def _append_together(self, items: list[_Item]) -> None:
-        """Whole chunks in one call: all of them are on the disk then, or none counts."""
+        """Whole chunks in one call; of those that a failing disk took, the whole ones count."""
+        parts: list[chunks.Part] = []
+        ends: list[int] = []
+        size = 0
+        for item in items:
+            chunk: list[chunks.Part] = (
+                [item] if isinstance(item, bytes) else chunks.samples_parts(*item)
+            )
+            parts += chunk
+            size += sum(map(len, chunk))
+            ends.append(size)
+        done = 0
+        try:
+            if parts and (done := os.writev(self._file.fileno(), parts)) < size:
+                rest = memoryview(b"".join(parts))
+                while done < size:
+                    done += self._file.write(rest[done:])
+        finally:
+            whole = bisect_right(ends, done)
+            self._count(items[:whole], ends[whole - 1] if whole else 0)
+
+    def _count(self, items: list[_Item], size: int) -> None:
         now = self._written
         samples, blocks, lost = now.samples, now.blocks, now.lost
         first, last = now.first_s, now.last_s
-        parts: list[chunks.Part] = []
         for item in items:
             if isinstance(item, bytes):
-                parts.append(item)
                 continue
-            stream, block = item
-            parts += chunks.samples_parts(stream, block)
+            block = item[1]
             rows = len(block.samples)
             samples, blocks, lost = samples + rows, blocks + 1, lost + block.dropped
             if rows:
@@ -205,7 +224,7 @@ class RecordingWriter:
                 end = float(block.times_s[-1]) if block.times_s is not None else end
                 first = block.t0_s if first is None else min(first, block.t0_s)
                 last = end if last is None else max(last, end)
-        self._good += _write_parts(self._file, parts)
+        self._good += size
         self._written = Written(samples, blocks, self._good, lost, first, last)
 
     def _end(self, content: dict[str, object]) -> None:
@@ -258,14 +277,6 @@ def end_summary(written: Written) -> dict[str, object]:
         "first_s": written.first_s,
         "last_s": written.last_s,
     }
-
-
-def _write_parts(file: BinaryIO, parts: list[chunks.Part]) -> int:
-    """All of them; returns their bytes."""
-    size = sum(map(len, parts))
-    if parts and (done := os.writev(file.fileno(), parts)) < size:
-        _write(file, b"".join(parts)[done:])
-    return size
 
 
 def _write(file: BinaryIO, data: bytes) -> None:

@@ -105,12 +105,31 @@ def test_what_is_shown_is_not_taken_for_current_without_a_connection(
     open_axis(page, bench.drive, "overview")
     state = page.get_by_label("State of the drive")
     expect(state).to_contain_text("Switch on disabled")
+    expect(page.locator(".quantities")).to_be_visible()
     cable.cut()
     expect(page.get_by_text("What is shown is from")).to_be_visible()
     expect(state).to_contain_text("No answer")
     expect(page.locator(".quantities")).to_have_class(re.compile("stale"))
     cable.mend()
     expect(state).to_contain_text("Switch on disabled")
+
+
+def test_a_page_asked_for_without_a_connection_comes_by_itself(
+    laptop: Page, bench: Bench, cable: Cable
+) -> None:
+    page = laptop
+    open_axis(page, bench.drive, "overview")
+    expect(page.locator(".quantities")).to_be_visible()
+    code = re.compile(r"/assets/AlarmsPage")
+    page.route(code, lambda route: route.abort())
+    page.reload()
+    expect(page.locator(".quantities")).to_be_visible()
+    cable.cut()
+    open_axis(page, bench.drive, "alarms")
+    expect(page.get_by_text("It comes by itself")).to_be_visible()
+    page.unroute(code)
+    cable.mend()
+    expect(page.get_by_role("heading", name="Alarms")).to_be_visible()
 
 
 def test_only_rows_in_sight_are_drawn(phone: Page, laptop: Page, bench: Bench) -> None:

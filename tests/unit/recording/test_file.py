@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -194,6 +195,24 @@ def test_full_disk_ends_it_with_a_message(tmp_path: Path, disk_of_20_kb: None) -
     assert len(blocks) >= 50, "what was written before is there"
     for k, each in enumerate(blocks):
         assert np.array_equal(each.values, block(k).samples)
+
+
+def test_of_a_batch_that_the_disk_took_in_part_the_whole_chunks_count(
+    tmp_path: Path, disk_of_20_kb: None
+) -> None:
+    failures: list[StorageFailed] = []
+    writer = RecordingWriter(tmp_path / "a.sdrec", header(), failures.append)
+    size = len(chunks.samples_chunk(0, block(0)))
+    head = len(chunks.MAGIC) + len(chunks.json_chunk(chunks.HEADER, header()))
+    fit = (20_000 - head) // size
+    large = replace(block(0), samples=np.zeros((fit * 100, 2)))
+    with writer._wake:  # the thread finds all of it at once
+        for n in range(fit):
+            writer.put(0, block(n))
+        writer.put(0, large)
+    wait_for(lambda: failures, "the disk is full")
+    with RecordingReader(tmp_path / "a.sdrec") as reader:
+        assert len(list(reader.blocks())) >= fit - 1, "an end chunk may take the room of the last"
 
 
 def test_reserve_of_the_disk_is_kept(tmp_path: Path) -> None:

@@ -90,9 +90,10 @@ class Guard extends Component<{ children: ReactNode; stop?: boolean }, { error: 
 
 function Loading() {
   const t = useT()
+  const { open } = useLink()
   return (
     <p className="empty" role="status">
-      {t('loading')}
+      {t(open ? 'loading' : 'loading.later')}
     </p>
   )
 }

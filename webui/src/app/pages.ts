@@ -1,11 +1,12 @@
 import { type ComponentType, lazy, type LazyExoticComponent } from 'react'
+import { arrived } from './arrived'
 import type { AxisPage, BenchPage } from './router'
 
 type Shown<Props> = LazyExoticComponent<ComponentType<Props>> & { fetch: () => Promise<unknown> }
 
 /** A page whose code comes when it is first shown, or ahead of that. */
 function page<Props extends object>(load: () => Promise<ComponentType<Props>>): Shown<Props> {
-  const module = async () => ({ default: await load() })
+  const module = async () => ({ default: await arrived(load) })
   // A failed fetch ahead is of no consequence: showing the page asks again.
   return Object.assign(lazy(module), { fetch: () => load().catch(() => null) })
 }

@@ -27,6 +27,10 @@ export const frame = {
   yes: ['yes', '是'],
   no: ['no', '否'],
   loading: ['Loading…', '加载中…'],
+  'loading.later': [
+    'This page is not here yet. It comes by itself as soon as there is a connection.',
+    '此页面尚未加载。连接恢复后会自动显示。',
+  ],
   source: ['Source: manual {source}', '出处：手册 {source}'],
   'broken.title': ['This page has a defect.', '此页面出现缺陷。'],
   'broken.text': [
