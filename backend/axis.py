@@ -14,6 +14,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
 
 from backend import restoring
+from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.people.identity import acting
 from backend.power import PowerState
@@ -24,7 +25,7 @@ from backend.travel_units import TravelUnit
 from backend.units import AxisUnits, read_units
 from drivers import cia402
 from drivers.cia402 import Mode, State
-from drivers.errors import LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError
+from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError
 from profiles.schema import Raw
 
 
@@ -238,6 +239,28 @@ class Axis(PowerState):
         except (LinkLost, LinkTimeout, ProtocolError):
             self.owes_stop = True
             raise
+
+    async def leave_cyclic(self, session: CyclicSession, timeout_s: float) -> None:
+        """Brake and take the power off through the loop; nothing interrupts this.
+
+        Raises:
+            DriveError: the loop does not do it. A stop is owed then: who knows what still moves.
+        """
+        try:
+            await shielded(lambda: self._leave_cyclic(session), timeout_s, self.drive.name)
+        except DriveError:
+            self.owes_stop = True
+            raise
+
+    async def _leave_cyclic(self, session: CyclicSession) -> None:
+        if not session.running:
+            # Ended in order it has braked everything; broken off it has left that to the drive.
+            self.owes_stop = self.owes_stop or bool(session.trouble)
+            return
+        await session.cyclic.halt(session.station(self.drive))
+        await self.standstill(2.0)
+        if await self.state() not in (State.FAULT, State.FAULT_REACTION):
+            await self.go_to_cyclic(session, State.SWITCH_ON_DISABLED, None, timeout_s=5.0)
 
     async def restorable_mode(self) -> list[str]:
         """The mode's key, unless the drive shows one that cannot be written (none, at power-on)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import re
-from collections.abc import Awaitable, Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from backend.axis_store import AxisStore
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.drive_list import DriveList, SavedDrive, SavedPort
+from backend.exchanges import Exchanges
 from backend.files import StorageFailed
 from backend.jobs import Job, JobRunner
 from backend.journal import Journal, Level
@@ -69,18 +70,18 @@ class Bench:
         self.measurements = MeasurementStore(state_folder / "measurements")
         self.members: dict[str, Member] = {}
         self.links: dict[str, Link] = {}
-        self.sessions: dict[str, CyclicSession] = {}
         self.on_snapshot: list[Callable[[str, Snapshot], None]] = []
         self.on_readings: list[Callable[[str, list[Reading]], None]] = []
         self.on_job: list[Callable[[Job], None]] = []
         self.on_drives: list[Callable[[], None]] = []
         self.jobs = JobRunner(self._job_changed, self._permit)
         self._stops: set[asyncio.Task[dict[str, str]]] = set()
-        #: Buses whose exchange is being started or ended, and drives that are being removed.
-        self._changing: set[str] = set()
+        #: Drives that are being removed.
         self._parting: set[str] = set()
         #: Bus and station of drives that left the bench and never took their stop.
         self._unstopped: set[tuple[str, int]] = set()
+        self.exchanges = Exchanges(self)
+        self.sessions = self.exchanges.running
         self.leases = Leases(self._lease_changed)
         self._witness = Witness(self.audit, self.name_of)
         self.on_job.append(self._witness.job_changed)
@@ -108,7 +109,7 @@ class Bench:
                 link.listen(lambda event: by_itself().run(self._bus_event, url, event))
                 self.links[url] = link
                 self.journal.add(f"opened {url}")
-                self._drives_changed()
+                self.drives_changed()
             return link
 
     async def close_link(self, url: str) -> None:
@@ -124,7 +125,7 @@ class Bench:
         if link is None:
             raise NotAllowed(f"{url} is not open", value=url)
         await link.close()
-        self._drives_changed()
+        self.drives_changed()
 
     def _urls(self, drive: Drive) -> list[str]:
         return [url for url, link in self.links.items() if any(p.link is link for p in drive.ports)]
@@ -151,11 +152,12 @@ class Bench:
         for member in self.members.values():
             if any(port.link is link for port in member.drive.ports):
                 self.require_idle(member)
-        if stop_after_first and isinstance(link, RegisterLink):
-            # Only there is one address asked after the other, each at the price of a time-out.
-            found = await link.scan(progress, stations, stop_after=1)
-        else:
-            found = await link.scan(progress, stations)
+        with self.exchanges.searching(url):
+            if stop_after_first and isinstance(link, RegisterLink):
+                # Only there is one address asked after the other, each at the price of a time-out.
+                found = await link.scan(progress, stations, stop_after=1)
+            else:
+                found = await link.scan(progress, stations)
         self.journal.add(f"{url}: {len(found)} {'drive' if len(found) == 1 else 'drives'} found")
         return found
 
@@ -195,28 +197,7 @@ class Bench:
             NotAllowed: no drives, no cyclic data on this bus, or a drive refuses.
             Busy: it runs already, or a drive is moving.
         """
-        link = await self.link(url)
-        users = [m for m in self.members.values() if any(p.link is link for p in m.drive.ports)]
-        if not users:
-            raise NotAllowed(f"{url} has no connected drives", remedy="connect a drive first")
-        for member in users:
-            if member.drive.id != in_job_of:
-                self.require_idle(member)
-        self._require_settled(url)
-        if (old := self.sessions.get(url)) is not None and old.running:
-            raise Busy(f"{url}: the cyclic exchange runs already", remedy="end it first")
-        # From here on nothing else may change it, nor begin to move: not even while the old one
-        # ends.
-        with self._changing_of(url):
-            await self._end_session(url)
-            session = CyclicSession(link, [m.drive for m in users], by_speed)
-            await session.start(cycle_s)
-            self.sessions[url] = session
-            for member in users:
-                member.axis.session = session
-        self.journal.add(f"{url}: cyclic exchange every {cycle_s * 1e3:g} ms")
-        self._drives_changed()
-        return session
+        return await self.exchanges.start(url, cycle_s, by_speed=by_speed, in_job_of=in_job_of)
 
     async def stop_cyclic(self, url: str) -> None:
         """End the exchange of a bus; what moves is braked. Does nothing where none runs.
@@ -224,33 +205,7 @@ class Bench:
         Raises:
             Busy: it is just being started or ended.
         """
-        self._require_settled(url)
-        with self._changing_of(url):
-            await self._end_session(url)
-
-    def _require_settled(self, url: str) -> None:
-        if url in self._changing:
-            raise Busy(f"{url}: the cyclic exchange is just being changed", remedy="wait for it")
-
-    @contextlib.contextmanager
-    def _changing_of(self, url: str) -> Iterator[None]:
-        """No motion begins on this bus meanwhile: its drives would be taken out from under it."""
-        self._changing.add(url)
-        try:
-            yield
-        finally:
-            self._changing.discard(url)
-
-    async def _end_session(self, url: str) -> None:
-        session = self.sessions.pop(url, None)
-        if session is None:
-            return
-        for member in self.members.values():
-            if member.axis.session is session:
-                member.axis.session = None
-        await session.stop()
-        self.journal.add(f"{url}: cyclic exchange ended")
-        self._drives_changed()
+        await self.exchanges.stop(url)
 
     def require_idle(self, member: Member) -> None:
         """Nothing moves this axis.
@@ -338,7 +293,7 @@ class Bench:
         drive.ports = (*drive.ports, port)
         self._remember()
         self.journal.add(f"{drive.name} is reached over {url} too", drive=drive.id)
-        self._drives_changed()
+        self.drives_changed()
         return member
 
     def _require_free(self, link: Link, url: str, station: int) -> None:
@@ -367,29 +322,31 @@ class Bench:
         drive.listen(lambda readings: self._readings(drive_id, readings))
         drive.listen_writes(self._witness.wrote)
         drive.listen_commands(self._witness.commanded)
-        drive.owed.listen(self._drives_changed)
+        drive.owed.listen(self.drives_changed)
         self.returning.begin(drive)
         monitor.start()
         self._remember()
         self.journal.add(f"connected {drive.name} ({drive.profile.title})", drive=drive_id)
-        self._drives_changed()
+        self.drives_changed()
         return member
 
     async def remove(self, drive_id: str) -> None:
         """Take a drive off the bench.
 
         Raises:
-            Busy: it is moving.
+            Busy: it is moving, or another axis moves through the exchange that would end with it.
         """
         member = self.member(drive_id)
         self._require_stays(member)
         self.require_idle(member)
+        self.exchanges.require_idle_but(member)
         # STOP reaches what is on the bench: nothing may begin to move on its way off it.
         self._parting.add(drive_id)
         try:
             await self._let_go(member)
             for url, session in list(self.sessions.items()):
                 if member.drive in session.drives:
+                    self.exchanges.require_idle_but(member)
                     await self.stop_cyclic(url)
             if member.axis.owes_stop:
                 self._unstopped.update((self.url_of(p), p.station) for p in member.drive.ports)
@@ -400,7 +357,7 @@ class Bench:
             self._parting.discard(drive_id)
         await member.monitor.close()
         self._remember()
-        self._drives_changed()
+        self.drives_changed()
 
     def _require_stays(self, member: Member) -> None:
         if member.drive.id in self._parting:
@@ -442,7 +399,7 @@ class Bench:
         except StorageFailed:
             drive.name, drive.notes = before
             raise
-        self._drives_changed()
+        self.drives_changed()
         return member
 
     def _new_id(self, name: str) -> str:
@@ -462,14 +419,7 @@ class Bench:
         """
         member = self.member(drive_id)
         self._require_stays(member)
-        busy = self._changing.intersection(self._urls(member.drive))
-        if busy:
-            raise Busy(
-                f"{member.drive.name}: the cyclic exchange of {', '.join(busy)} is just being "
-                "started or ended",
-                drive=member.drive.name,
-                remedy="try again when it has",
-            )
+        self.exchanges.require_calm(member.drive.name, self._urls(member.drive))
         member.axis.permit()
 
     async def stop(self, drive_ids: Sequence[str]) -> dict[str, str]:
@@ -521,19 +471,20 @@ class Bench:
 
     def _lease_changed(self, drive_id: str) -> None:
         self._witness.lease_changed(drive_id, self.leases.holder(drive_id))
-        self._drives_changed()
+        self.drives_changed()
 
     def tell(self, text: str, member: Member, level: Level = "info") -> None:
         """A line of the journal about a drive; the list of drives may have changed with it."""
         self.journal.add(text, level=level, drive=member.drive.id)
-        self._drives_changed()
+        self.drives_changed()
 
     def name_of(self, drive_id: str) -> str:
         """Name of a drive, or its id where it is not on the bench."""
         member = self.members.get(drive_id)
         return member.drive.name if member is not None else drive_id
 
-    def _drives_changed(self) -> None:
+    def drives_changed(self) -> None:
+        """Tell everybody that the list of drives and buses may look different now."""
         for listener in self.on_drives:
             listener()
 
@@ -548,7 +499,7 @@ class Bench:
         drive.owed.settle([debt.key for debt in drive.owed.debts])
         self.journal.add(f"{drive.name}: serial number {serial} accepted", drive=drive.id)
         self._remember()
-        self._drives_changed()
+        self.drives_changed()
         return member
 
     # --- over restarts ----------------------------------------------------------------
@@ -594,15 +545,20 @@ class Bench:
                 self.returning.returned(member.drive.id)
 
     async def close(self) -> None:
-        """Stop what moves, then let go of every bus."""
-        await self.jobs.close()
+        """Stop what moves, then let go of every bus; what fails keeps nothing else from its end."""
+        async with contextlib.AsyncExitStack() as then:
+            then.push_async_callback(self.records.close)
+            then.push_async_callback(self._close_links)
+            then.push_async_callback(self.scope.close)
+            then.push_async_callback(self.exchanges.close)
+            then.push_async_callback(self._let_go_of_all)
+            await self.jobs.close()
+
+    async def _let_go_of_all(self) -> None:
         await asyncio.gather(*(self._let_go(member) for member in self.members.values()))
-        await self.scope.close()
-        for url in list(self.sessions):
-            with contextlib.suppress(DriveError):
-                await self.stop_cyclic(url)
+
+    async def _close_links(self) -> None:
         await asyncio.gather(*(m.monitor.close() for m in self.members.values()))
         await asyncio.gather(
             *(link.close() for link in self.links.values()), return_exceptions=True
         )
-        await self.records.close()

@@ -44,12 +44,15 @@ class Exchange:
             job.task.add_done_callback(ended)
 
     async def end(self) -> None:
-        """Leave the bus as it was. A drive that does not let itself be set up again is told of."""
+        """Leave the bus as it was, as soon as no other axis moves through the exchange.
+
+        A drive that does not let itself be set up again is told of.
+        """
         if not self.own:
             return
         with contextlib.suppress(DriveError):
-            await self.bench.stop_cyclic(self.url)
-        if self.before_s is None:
+            await self.bench.exchanges.stop_when_idle(self.url, self.session, self.drive)
+        if self.before_s is None or self.url in self.bench.sessions:
             return
         try:
             await self.bench.start_cyclic(self.url, self.before_s, in_job_of=self.drive)

@@ -10,6 +10,7 @@ from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.faults import active_faults, fault_keys
 from backend.ports import address_of
+from backend.restoring import shielded
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.codec import encode
@@ -113,7 +114,21 @@ class PowerState:
         station = session.station(self.drive)
         if goal is State.OPERATION_ENABLED and await self.state() is State.FAULT:
             raise await self._refused(State.FAULT, goal)
-        await power.drive_to(station, goal, None if mode is None else int(mode))
+        try:
+            await power.drive_to(station, goal, None if mode is None else int(mode))
+            await self._until_there(goal, timeout_s)
+        except BaseException:
+            # The loop would go on trying, and enable when nobody waits for it any more: when the
+            # main power comes, or a fault goes.
+            if goal is State.OPERATION_ENABLED:
+                off = State.SWITCH_ON_DISABLED
+                try:
+                    await shielded(lambda: power.drive_to(station, off), timeout_s, self.drive.name)
+                except DriveError:
+                    self.owes_stop = True
+            raise
+
+    async def _until_there(self, goal: State, timeout_s: float) -> None:
         deadline = time.monotonic() + timeout_s
         while (state := await self.state()) is not goal:
             if state is State.FAULT or time.monotonic() > deadline:

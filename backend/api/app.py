@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import mimetypes
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 from fastapi import APIRouter, FastAPI, Request, Response, WebSocket
@@ -81,19 +81,21 @@ def make_app(
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
-        recordings.open()
-        await known.open()
-        await bench.restore()
-        watch = asyncio.create_task(live.people.run(), name="people")
-        yield
-        # What moves is stopped before a slow disk may keep the server waiting.
-        await bench.jobs.close()
-        await feed.close()
-        await scene.close()
-        await recordings.close()
-        watch.cancel()
-        await bench.close()
-        known.close()
+        # Whatever fails on the way up or down, the bench is closed in order: axes lose their power.
+        async with AsyncExitStack() as then:
+            recordings.open()
+            await known.open()
+            then.callback(known.close)
+            then.push_async_callback(bench.close)
+            await bench.restore()
+            watch = asyncio.create_task(live.people.run(), name="people")
+            then.callback(watch.cancel)
+            then.push_async_callback(recordings.close)
+            then.push_async_callback(scene.close)
+            then.push_async_callback(feed.close)
+            # What moves is stopped before a slow disk may keep the server waiting.
+            then.push_async_callback(bench.jobs.close)
+            yield
 
     app = DescribedApp(
         title="servodeck",

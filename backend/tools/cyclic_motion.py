@@ -22,7 +22,6 @@ from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.jobs import JobResult, Progress
 from backend.ports import address_of
-from backend.restoring import shielded
 from backend.tools.jog import Hold, JogSettings, require_scale
 from drivers import link as bus
 from drivers.cia402 import Mode, State
@@ -313,11 +312,4 @@ async def _enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncItera
         await axis.go_to_cyclic(session, State.OPERATION_ENABLED, mode, _STATE_TIMEOUT_S)
         yield
     finally:
-        await shielded(lambda: _leave(axis, session), _STATE_TIMEOUT_S, axis.drive.name)
-
-
-async def _leave(axis: Axis, session: CyclicSession) -> None:
-    station = session.station(axis.drive)
-    await session.cyclic.halt(station)
-    await axis.standstill(2.0)
-    await axis.go_to_cyclic(session, State.SWITCH_ON_DISABLED, None, _STATE_TIMEOUT_S)
+        await axis.leave_cyclic(session, _STATE_TIMEOUT_S)

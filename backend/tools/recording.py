@@ -19,7 +19,6 @@ from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession, channel
 from backend.jobs import Progress
 from backend.ports import address_of
-from backend.restoring import shielded
 from drivers import link as bus
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed
@@ -101,6 +100,7 @@ class _Catch:
         for block in self.blocks:
             samples = block.samples[:, [block.channels.index(name) for name in self.names]]
             good = np.ones(len(samples), dtype=np.bool_) if block.valid is None else block.valid
+            good = good & ~np.isnan(samples).any(axis=1)
             # By the cycle counter and not by the clock: the grid follows the drives' clock.
             missing = block.dropped if found else 0
             if found and not missing:
@@ -161,7 +161,7 @@ async def enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterat
         await _forgotten(axis, session)
         yield await axis.position_raw()
     finally:
-        await shielded(lambda: _leave(axis, session), _STATE_TIMEOUT_S, axis.drive.name)
+        await axis.leave_cyclic(session, _STATE_TIMEOUT_S)
 
 
 async def _forgotten(axis: Axis, session: CyclicSession) -> None:
@@ -172,15 +172,6 @@ async def _forgotten(axis: Axis, session: CyclicSession) -> None:
         if power is None or not power.axis_state(station)[2]:
             return
         await asyncio.sleep(_RENEW_S / 2)
-
-
-async def _leave(axis: Axis, session: CyclicSession) -> None:
-    if not session.running:
-        return
-    await session.cyclic.halt(session.station(axis.drive))
-    await axis.standstill(2.0)
-    if await axis.state() not in (State.FAULT, State.FAULT_REACTION):
-        await axis.go_to_cyclic(session, State.SWITCH_ON_DISABLED, None, _STATE_TIMEOUT_S)
 
 
 async def bus_limits(axis: Axis, envelope: Envelope, start_raw: int) -> bus.Envelope:

@@ -129,6 +129,9 @@ class HostProcess:
             ) from None
         finally:
             self._waiting.pop(number, None)
+            if future.done() and not future.cancelled():
+                # Told to whoever waited, by this way or by what kept the request from being sent.
+                future.exception()
 
     async def _spawn(self, timeout_s: float) -> None:
         loop = asyncio.get_running_loop()

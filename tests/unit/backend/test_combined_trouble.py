@@ -185,10 +185,11 @@ async def test_a_measurement_cancelled_before_its_first_step_ends_its_exchange()
     """A task that is cancelled then never comes to its ``finally``."""
     ended: list[str] = []
 
-    async def stop_cyclic(url: str) -> None:
+    async def stop_when_idle(url: str, _session: object, _but: str) -> None:
         ended.append(url)
 
-    exchange = Exchange(None, SimpleNamespace(stop_cyclic=stop_cyclic), "x", URL, own=True)  # type: ignore[arg-type]
+    bench = SimpleNamespace(exchanges=SimpleNamespace(stop_when_idle=stop_when_idle))
+    exchange = Exchange(None, bench, "x", URL, own=True)  # type: ignore[arg-type]
     job = JobRunner().start("sweep", "Sweep X", nothing, drive="x", motion=True)
     exchange.ends_with(job)
     assert job.task is not None

@@ -1,0 +1,182 @@
+"""The cyclic exchanges of a bench: which run, and who may change or end them when."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import Counter
+from collections.abc import Collection, Iterator
+from typing import TYPE_CHECKING
+
+from backend.cyclic import CyclicSession
+from drivers.errors import Busy, DriveError, NotAllowed
+
+if TYPE_CHECKING:
+    from backend.bench import Bench, Member
+
+#: Why no motion may begin on a bus at present.
+_CHANGING = "the cyclic exchange is just being changed"
+_SEARCHED = "drives are being looked for, which may reset those that are there"
+
+
+class Exchanges:
+    """For one bench. ``running`` holds the session of each bus by its URL."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.running: dict[str, CyclicSession] = {}
+        self._bench = bench
+        self._changing: set[str] = set()
+        self._searched: Counter[str] = Counter()
+        self._later: set[asyncio.Task[None]] = set()
+
+    async def start(
+        self,
+        url: str,
+        cycle_s: float,
+        *,
+        by_speed: Collection[str] = (),
+        in_job_of: str | None = None,
+    ) -> CyclicSession:
+        """Exchange process data with all drives of a bus; see `Bench.start_cyclic`."""
+        bench = self._bench
+        link = await bench.link(url)
+        users = [m for m in bench.members.values() if any(p.link is link for p in m.drive.ports)]
+        if not users:
+            raise NotAllowed(f"{url} has no connected drives", remedy="connect a drive first")
+        for member in users:
+            if member.drive.id != in_job_of:
+                bench.require_idle(member)
+        self._require_settled(url)
+        if (old := self.running.get(url)) is not None and old.running:
+            raise Busy(f"{url}: the cyclic exchange runs already", remedy="end it first")
+        # From here on nothing else may change it, nor begin to move: not even while the old one
+        # ends.
+        with self._changing_of(url):
+            await self._end(url)
+            session = CyclicSession(link, [m.drive for m in users], by_speed)
+            await session.start(cycle_s)
+            self.running[url] = session
+            for member in users:
+                member.axis.session = session
+        bench.journal.add(f"{url}: cyclic exchange every {cycle_s * 1e3:g} ms")
+        bench.drives_changed()
+        return session
+
+    async def stop(self, url: str) -> None:
+        """End the exchange of a bus; what moves is braked. Does nothing where none runs.
+
+        Raises:
+            Busy: it is just being started or ended.
+        """
+        self._require_settled(url)
+        with self._changing_of(url):
+            await self._end(url)
+
+    async def stop_when_idle(self, url: str, session: CyclicSession, but: str) -> None:
+        """End this exchange, but never under an axis that somebody else moves through it.
+
+        Returns at once where one does; it is then ended when nothing moves any more, unless
+        somebody has ended it by then. ``but`` is the drive whose own job ends it.
+
+        Raises:
+            DriveError: it does not end in order.
+        """
+        if self.running.get(url) is not session:
+            return
+        movers = [m for m in self._movers(session) if m.drive.id != but]
+        if not movers:
+            await self.stop(url)
+            return
+        names = ", ".join(m.drive.name for m in movers)
+        self._bench.journal.add(f"{url}: the cyclic exchange stays until {names} stands")
+        task = asyncio.create_task(self._stop_later(url, session), name=f"end-exchange-{url}")
+        self._later.add(task)
+        task.add_done_callback(self._later.discard)
+
+    async def _stop_later(self, url: str, session: CyclicSession) -> None:
+        jobs = self._bench.jobs
+        while movers := self._movers(session):
+            for member in movers:
+                if (job := jobs.moving(member.drive.id)) is not None:
+                    await job.wait()
+        if self.running.get(url) is session:
+            with contextlib.suppress(DriveError):
+                await self.stop(url)
+
+    def _movers(self, session: CyclicSession) -> list[Member]:
+        """Axes of this exchange that a job moves."""
+        bench = self._bench
+        users = [m for m in bench.members.values() if m.axis.session is session]
+        return [m for m in users if bench.jobs.moving(m.drive.id) is not None]
+
+    def require_idle_but(self, member: Member) -> None:
+        """The exchange of this axis' buses moves no other axis: it may be ended.
+
+        Raises:
+            Busy: another axis is moved through it.
+        """
+        session = member.axis.session
+        for other in [] if session is None else self._movers(session):
+            if other is not member:
+                raise Busy(
+                    f"{member.drive.name} shares its cyclic exchange with {other.drive.name}, "
+                    "which moves",
+                    drive=member.drive.name,
+                    remedy=f"stop {other.drive.name} first",
+                )
+
+    async def close(self) -> None:
+        """End all of them."""
+        for task in list(self._later):
+            task.cancel()
+        for url in list(self.running):
+            with contextlib.suppress(DriveError):
+                await self.stop(url)
+
+    # --- who may begin to move --------------------------------------------------------
+
+    @contextlib.contextmanager
+    def _changing_of(self, url: str) -> Iterator[None]:
+        """No motion begins on this bus meanwhile: its drives would be taken out from under it."""
+        self._changing.add(url)
+        try:
+            yield
+        finally:
+            self._changing.discard(url)
+
+    @contextlib.contextmanager
+    def searching(self, url: str) -> Iterator[None]:
+        """No motion begins on this bus while it is searched."""
+        self._searched[url] += 1
+        try:
+            yield
+        finally:
+            self._searched[url] -= 1
+
+    def require_calm(self, name: str, urls: Collection[str]) -> None:
+        """A motion of the axis of this ``name`` may begin.
+
+        Raises:
+            Busy: one of its buses is being changed or searched.
+        """
+        for url in urls:
+            why = _CHANGING if url in self._changing else _SEARCHED if self._searched[url] else ""
+            if why:
+                raise Busy(
+                    f"{name}: {url}: {why}", drive=name, remedy="try again when that has ended"
+                )
+
+    def _require_settled(self, url: str) -> None:
+        if url in self._changing:
+            raise Busy(f"{url}: {_CHANGING}", remedy="wait for it")
+
+    async def _end(self, url: str) -> None:
+        session = self.running.pop(url, None)
+        if session is None:
+            return
+        for member in self._bench.members.values():
+            if member.axis.session is session:
+                member.axis.session = None
+        await session.stop()
+        self._bench.journal.add(f"{url}: cyclic exchange ended")
+        self._bench.drives_changed()
