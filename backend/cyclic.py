@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from backend.drive import Drive
 from backend.ports import Port, address_of
@@ -21,6 +22,7 @@ from drivers.link import (
     RecoversByItself,
     ScopeBlock,
     TakesSpeeds,
+    TellsNewest,
     Unsubscribe,
 )
 
@@ -150,6 +152,14 @@ class CyclicSession:
             self.running and self.state is not None and channel(drive, key) in self.state.channels
         )
 
+    def newest(self, drive: Drive, keys: Sequence[str], within_s: float) -> dict[str, int | float]:
+        """Raw values of the last cycle, of those keys that the drive sends with every cycle."""
+        if not self.running or not isinstance(self.cyclic, TellsNewest):
+            return {}
+        told = {drive.key(role) for role in INPUT_ROLES}
+        names = {channel(drive, key): key for key in keys if key in told}
+        return {names[name]: raw for name, raw in self.cyclic.newest(list(names), within_s).items()}
+
     def subscribe(
         self, drive: Drive, keys: Sequence[str], deliver: Callable[[ScopeBlock], None]
     ) -> Unsubscribe:
@@ -169,15 +179,20 @@ class CyclicSession:
                 columns = [known.index(name) for name in names if name in known]
             if len(columns) != len(names):
                 return
+            samples = block.samples[:, columns]
+            valid = block.valid
+            absent: npt.NDArray[np.bool_] = np.asarray(np.isnan(samples).any(axis=1))
+            if absent.any():  # the drive is lost, others of its bus go on
+                valid = ~absent if valid is None else valid & ~absent
             deliver(
                 ScopeBlock(
                     sequence=block.sequence,
                     t0_s=block.t0_s,
                     dt_s=block.dt_s,
                     channels=tuple(keys),
-                    samples=block.samples[:, columns] * scale + offset,
+                    samples=samples * scale + offset,
                     dropped=block.dropped,
-                    valid=block.valid,
+                    valid=valid,
                 )
             )
 

@@ -8,7 +8,7 @@ counts is the value that came back.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from backend.owed import Owed
@@ -295,6 +295,16 @@ class Drive:
             except DriveError as error:
                 readings.append(self._failed(parameter, error))
         self._store(readings)
+        return readings
+
+    def take(self, raws: Mapping[str, int | float]) -> dict[str, Reading]:
+        """Keep values that came without being asked for, as with the process data."""
+        now = time.time()
+        readings = {
+            key: Reading(key, raw, self.parameter(key).to_value(raw), now)
+            for key, raw in raws.items()
+        }
+        self._store(list(readings.values()))
         return readings
 
     def _failed(self, parameter: Parameter, error: DriveError) -> Reading:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from backend.axis import Axis
@@ -25,6 +26,12 @@ log = logging.getLogger(__name__)
 #: Polling period while somebody watches, and while nobody does.
 WATCHED_S = 0.1
 IDLE_S = 1.0
+#: Beside an exchange that brings state and values, everything else is asked for so often.
+ASKED_S = 1.0
+#: Process data older than this say nothing of the present.
+NEWEST_S = 0.05
+#: What changes slowly enough to be asked for with everything else only.
+_SLOW_ROLES = ("dc_voltage", "temperature")
 
 _VALUE_ROLES = {
     "position": "position_actual",
@@ -34,6 +41,13 @@ _VALUE_ROLES = {
     "dc_voltage": "dc_voltage",
     "temperature": "temperature",
 }
+
+_SHOWN_ROLES = (*_VALUE_ROLES.values(), "mode_display")
+#: A change of these has everything asked for.
+_TELLING_ROLES = ("status_word", "error_code")
+#: Target reached, internal limit and the bits of the mode come and go with every motion.
+_MODE_SPECIFIC = 0x3C00
+_FAULTY = (State.FAULT, State.FAULT_REACTION, State.UNKNOWN)
 
 #: Meaning of status bits 12 and 13 in each mode (CiA 402-2 clauses 10 to 16).
 _MODE_BITS: dict[int, tuple[str, str]] = {
@@ -84,6 +98,10 @@ class Monitor:
         self._returned = returned
         self._task: asyncio.Task[None] | None = None
         self._wake = asyncio.Event()
+        self._last: dict[str, Reading] = {}
+        self._last_causes: list[str] = []
+        self._waiting: list[str] = []
+        self._asked_s = -math.inf
 
     def start(self) -> None:
         """Begin to poll."""
@@ -103,7 +121,7 @@ class Monitor:
     async def _run(self) -> None:
         while True:
             try:
-                await self.refresh()
+                await self._poll(self._read_what_changes)
             except Exception as error:
                 # A watch that ended unseen would show the last state as the present one for ever.
                 log.exception("the state of %s cannot be shown", self.axis.drive.name)
@@ -119,6 +137,9 @@ class Monitor:
 
         A drive that a procedure leaves alone is not asked; the last snapshot stands.
         """
+        return await self._poll(self._read)
+
+    async def _poll(self, read: Callable[[], Awaitable[Snapshot]]) -> Snapshot:
         before = self.snapshot
         if await self.axis.repeat_stop():
             text = f"{self.axis.drive.name}: the stop that had not reached it was sent again"
@@ -126,8 +147,9 @@ class Monitor:
         if self.axis.drive.rest.held:
             return before
         try:
-            snapshot = await self._read()
+            snapshot = await read()
         except DriveError as error:
+            self._asked_s = -math.inf
             snapshot = replace(before, time=time.time(), fresh=False, problem=error.message)
         self.snapshot = snapshot
         self._record(before, snapshot)
@@ -135,25 +157,65 @@ class Monitor:
         return snapshot
 
     async def _read(self) -> Snapshot:
-        axis, drive = self.axis, self.axis.drive
-        units = await axis.units()
-        keys = {role: key for role in _VALUE_ROLES.values() if (key := drive.key(role))}
-        status_key = drive.require("status_word")
-        wanted = [status_key, *keys.values()]
-        wanted += [key for key in [drive.key("mode_display")] if key]
+        """Everything, from the drive itself."""
+        drive = self.axis.drive
+        began_s = time.monotonic()
+        wanted = [drive.require("status_word")]
+        wanted += [key for role in _SHOWN_ROLES if (key := drive.key(role))]
         wanted += fault_keys(drive)
-        readings = await drive.read_many(dict.fromkeys(wanted))
-        status = readings[status_key]
+        self._last = await drive.read_many(dict.fromkeys(wanted))
+        self._last_causes, self._waiting = [], list(drive.pending)
+        if self._state() is not State.OPERATION_ENABLED:
+            self._last_causes = await self.axis.blocked_by()
+        self._asked_s = began_s
+        return await self._snapshot()
+
+    async def _read_what_changes(self) -> Snapshot:
+        """The newest process data instead of questions, as long as they tell nothing new.
+
+        The drive itself is still asked every `ASKED_S`: process data may go on where its mailbox,
+        and with it the firmware, is dead. Any change of state or fault has everything asked for.
+        """
+        axis, drive = self.axis, self.axis.drive
+        session = axis.session
+        if session is None or time.monotonic() - self._asked_s >= ASKED_S:
+            return await self._read()
+        shown = {key: role for role in _SHOWN_ROLES if (key := drive.key(role))}
+        telling = [key for role in _TELLING_ROLES if (key := drive.key(role))]
+        newest = drive.take(session.newest(drive, [*telling, *shown], NEWEST_S))
+        if self._tells_other(newest, telling) or self._waiting != list(drive.pending):
+            return await self._read()
+        self._last = self._last | newest
+        asked = [k for k, role in shown.items() if k not in newest and role not in _SLOW_ROLES]
+        if asked:
+            self._last = self._last | await drive.read_many(asked)
+        return await self._snapshot()
+
+    def _tells_other(self, newest: Mapping[str, Reading], telling: Sequence[str]) -> bool:
+        """Whether state, warning or error code are not what they were, or are not known."""
+        drive = self.axis.drive
+        told, known = (
+            [integer(readings.get(key)) for key in telling] for readings in (newest, self._last)
+        )
+        word, before = told[0], known[0]
+        if word is None or before is None or drive.decode_state(word) in _FAULTY:
+            return True
+        return bool((word ^ before) & ~_MODE_SPECIFIC) or told[1:] != known[1:]
+
+    def _state(self) -> State:
+        drive = self.axis.drive
+        status = self._last[drive.require("status_word")]
         if not isinstance(status.raw, int):
             raise DriveError(status.error or "the status word could not be read", drive=drive.name)
-        word = status.raw
-        mode_key = drive.key("mode_display")
-        mode = integer(readings.get(mode_key or ""))
-        state = drive.decode_state(word)
+        return drive.decode_state(status.raw)
+
+    async def _snapshot(self) -> Snapshot:
+        axis, drive = self.axis, self.axis.drive
+        units, readings, state = await axis.units(), self._last, self._state()
+        keys = {role: key for role in _VALUE_ROLES.values() if (key := drive.key(role))}
+        word = integer(readings[drive.require("status_word")]) or 0
+        mode = integer(readings.get(drive.key("mode_display") or ""))
         names = _MODE_BITS.get(mode or 0, ("", ""))
-        blocked: list[str] = []
-        if state is not State.OPERATION_ENABLED:
-            blocked = await axis.blocked_by()
         return Snapshot(
             time=time.time(),
             fresh=True,
@@ -171,7 +233,7 @@ class Monitor:
             },
             units=units.names,
             faults=tuple(active_faults(drive, readings)),
-            blocked_by=tuple(blocked),
+            blocked_by=tuple(self._last_causes),
         )
 
     def _record(self, before: Snapshot, now: Snapshot) -> None:

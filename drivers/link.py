@@ -228,7 +228,7 @@ class Cyclic(Protocol):
         """Controlled stop now, for one station or all; setpoints end."""
 
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
-        """Deliver samples on the event loop's thread."""
+        """Deliver samples on the event loop's thread; NaN stands for inputs of a lost station."""
 
 
 @runtime_checkable
@@ -246,6 +246,16 @@ class RecoversByItself(Protocol):
     @property
     def trouble(self) -> str:
         """Why it does not run although it is wanted, in words; else empty."""
+
+
+@runtime_checkable
+class TellsNewest(Protocol):
+    """An exchange whose newest process data can be had without asking the drive."""
+
+    def newest(self, channels: Sequence[str], within_s: float) -> dict[str, int | float]:
+        """Raw values of the last cycle; what is older than ``within_s``, came in an invalid cycle
+        or is of a station that is lost is not among them.
+        """
 
 
 @runtime_checkable

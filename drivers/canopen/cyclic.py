@@ -245,6 +245,11 @@ class CanopenCyclic:
 
         return leave
 
+    def newest(self, channels: Sequence[str], within_s: float) -> dict[str, int | float]:
+        """See `drivers.link.TellsNewest`."""
+        told = {} if self._loop is None else self._loop.newest(within_s)
+        return {channel: told[channel] for channel in channels if channel in told}
+
     # Power states (drivers.link.OwnsPowerState)
 
     @property

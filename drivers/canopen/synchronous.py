@@ -95,6 +95,8 @@ class SyncLoop:
         self._sent_cycle = -1
         self._arrived: dict[int, bytes] = {}
         self._silent_s = dict.fromkeys(images.stations, 0.0)
+        self._sampled_s: float | None = None
+        self._complete: set[int] = set()
         self._sent: list[int | float] = []
         self._rows: list[list[int | float]] = []
         self._row_valid: list[bool] = []
@@ -205,6 +207,20 @@ class SyncLoop:
         with self._lock:
             self._lock.wait_for(still, 1.5)
 
+    def newest(self, within_s: float) -> dict[str, int | float]:
+        """Inputs of the last cycle by channel, as `drivers.link.TellsNewest`."""
+        with self._lock:
+            sampled_s = self._sampled_s
+            if self._bus_lost or sampled_s is None:
+                return {}
+            if self._clock.now_s() - sampled_s > within_s:
+                return {}
+            return {
+                self.images.channels[slot.column]: self.images.values[slot.column]
+                for (station, _index, _subindex), slot in self.images.inputs.items()
+                if station in self._complete
+            }
+
     def statistics(self) -> dict[str, float | int | str]:
         """Figures for link quality."""
         with self._lock:
@@ -275,7 +291,8 @@ class SyncLoop:
 
     def _close_sample(self) -> None:
         arrived, self._arrived = self._arrived, {}
-        complete = self.images.take(arrived)
+        self._sampled_s = self._clock.now_s()
+        complete = self._complete = self.images.take(arrived)
         valid = len(arrived) == len(self.images.lengths)
         self._statistics.incomplete += not valid
         # Beside what SYNC called for stands what went out in the same cycle, for the next SYNC.

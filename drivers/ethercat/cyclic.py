@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from drivers.ethercat.gridphase import GridPhase
 from drivers.ethercat.mapping import Entry
 from drivers.ethercat.playback import AxisLoop, Phase
-from drivers.ethercat.ring import RESYNCED, VALID, Ring
+from drivers.ethercat.ring import RESYNCED, VALID, Ring, lost_flag
 from drivers.ethercat.segment import Segment
 
 DISTRUST_S = 0.03
@@ -98,6 +98,7 @@ class CyclicLoop:
         self.next_ns = 0
         self.expected_wkc = sum(image.wkc for image in images)
         self._left_out_wkc = 0
+        self._lost_flags = 0
         self._segment = segment
         self._master = segment.master
         self._ring = ring
@@ -177,6 +178,9 @@ class CyclicLoop:
                 self.expected_wkc -= change
                 self._left_out_wkc += change
                 self._invalid_run = 0
+        self._lost_flags = 0
+        for place, image in enumerate(self.images):
+            self._lost_flags |= lost_flag(place) if image.lost else 0
 
     # Parts ---------------------------------------------------------------------------------
 
@@ -255,7 +259,7 @@ class CyclicLoop:
                 self._master.dc_time if self.dc else 0,
                 wkc,
                 self.expected_wkc,
-                (VALID if valid else 0) | self._resynced,
+                (VALID if valid else 0) | self._resynced | self._lost_flags,
                 self._late_ns // 1000,
             ),
             self._payload(),

@@ -29,6 +29,16 @@ VALID = 1
 """Working counter as expected and frame back in time."""
 RESYNCED = 2
 """Grid points were skipped before this cycle: the computer was late."""
+_LOST, _LOST_PLACES = 8, 24
+
+
+def lost_flag(place: int) -> int:
+    """Flag of the station at ``place`` among those exchanged: it is lost, its inputs are old.
+
+    Beyond what the flags have room for one stands for all.
+    """
+    return 1 << _LOST + min(place, _LOST_PLACES - 1)
+
 
 _HEADER_FIELDS = {
     "cycle": ("<u8", 0), "time_ns": ("<i8", 8), "dc_ns": ("<i8", 16), "wkc": ("<i4", 24),
@@ -157,6 +167,15 @@ class RingReader:
         overwritten = max(self.ring.count() - slots + 1 - start, 0)
         self.position = count
         return taken[overwritten:], lost + min(overwritten, len(taken))
+
+    def newest(self) -> npt.NDArray[np.void] | None:
+        """The last sample [1], without taking it; None before the first."""
+        count = self.ring.count()
+        if not count or not len(self.array):
+            return None
+        # The writer is at another slot, and comes round to this one only after all the others.
+        place = (count - 1) % len(self.array)
+        return self.array[place : place + 1].copy()
 
     def release(self) -> None:
         """Let go of the shared memory, so that it can be closed."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -17,7 +18,7 @@ from drivers.ethercat.mapping import Pdo, StationPlan, plan_station
 from drivers.ethercat.playback import Phase
 from drivers.ethercat.protocol import Message
 from drivers.ethercat.recovery import Recovery
-from drivers.ethercat.ring import VALID, RingReader
+from drivers.ethercat.ring import VALID, RingReader, lost_flag
 from drivers.ethercat.samples import contiguous, fields_of
 from drivers.ethercat.trajectory import message_of
 from drivers.link import CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
@@ -66,6 +67,7 @@ class EthercatCyclic:
         self._draining: asyncio.Task[None] | None = None
         self._status: Message = {}
         self._fields: dict[str, tuple[str, int]] = {}
+        self._reader: RingReader | None = None
         self.dc = False
         self.left_over: tuple[tuple[CyclicSignal, str], ...] = ()
         """Signals that did not fit, each with the reason in words; poll them."""
@@ -174,6 +176,21 @@ class EthercatCyclic:
 
         return unsubscribe
 
+    def newest(self, channels: Sequence[str], within_s: float) -> dict[str, int | float]:
+        """See `drivers.link.TellsNewest`."""
+        sample = None if self._reader is None or not self.running else self._reader.newest()
+        if sample is None or not int(sample["flags"][0]) & VALID:
+            return {}
+        # In lockstep the grid is not that of the clock: nothing is known of a sample's age then.
+        if abs(time.monotonic_ns() - int(sample["time_ns"][0])) > within_s * 1e9:
+            return {}
+        lost = {name for _, names in self._lost_in(sample) for name in names}
+        return {
+            name: sample[name][0].item()
+            for name in channels
+            if name in self._fields and name not in lost
+        }
+
     # Beyond the protocol -------------------------------------------------------------------
 
     @property
@@ -260,7 +277,7 @@ class EthercatCyclic:
         self._generation += 1
         if self._draining is not None:
             self._draining.cancel()
-            self._draining = None
+            self._draining = self._reader = None
         self._status = {}
 
     # Parts ---------------------------------------------------------------------------------
@@ -270,7 +287,7 @@ class EthercatCyclic:
         ring = self._host.ring
         if ring is None:
             raise LinkLost("the EtherCAT process ended")
-        reader = ring.reader(self._fields)
+        self._reader = reader = ring.reader(self._fields)
         self._draining = asyncio.get_running_loop().create_task(self._drain(reader))
 
     def _broke_off(self, why: str) -> None:
@@ -361,6 +378,23 @@ class EthercatCyclic:
         finally:
             reader.release()
 
+    def _lost_in(self, part: npt.NDArray[np.void]) -> list[tuple[npt.NDArray[np.bool_], list[str]]]:
+        """Rows in which a station was lost, each with the inputs of that station."""
+        if not (part["flags"] >> 8).any():
+            return []
+        found = []
+        for place, plan in enumerate(self._plans):
+            rows = (part["flags"] & lost_flag(place)).astype(bool)
+            if rows.any():
+                known = {(e.index, e.subindex) for e in plan.tx.entries if e.code != "x"}
+                inputs = [
+                    s.channel
+                    for s in plan.mapped
+                    if (s.address.index, s.address.subindex) in known and s.channel in self._fields
+                ]
+                found.append((rows, inputs))
+        return found
+
     def _missed(self, first_ns: int) -> int:
         """Cycles between the end of an exchange that broke off and the beginning of the next."""
         return max(round((first_ns - self._last_ns) / (self._cycle_s * 1e9)) - 1, 0)
@@ -369,6 +403,9 @@ class EthercatCyclic:
         samples = np.empty((len(part), len(names)), np.float64)
         for column, name in enumerate(names):
             samples[:, column] = part[name]
+        for rows, absent in self._lost_in(part):
+            for name in absent:
+                samples[rows, names.index(name)] = np.nan
         valid = (part["flags"] & VALID).astype(bool)
         for consumer in tuple(self._consumers):
             consumer.deliver(

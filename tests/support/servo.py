@@ -46,6 +46,7 @@ class Servo(MemoryLink):
         self.gate = asyncio.Event()
         self.gate.set()
         self.on_write: Callable[[Place, int], None] = lambda _place, _value: None
+        self.on_read: Callable[[Place], None] = lambda _place: None
 
     def number(self, place: Place) -> int:
         return int.from_bytes(self.objects[place], "little", signed=True)
@@ -62,6 +63,7 @@ class Servo(MemoryLink):
         await asyncio.sleep(0)
         if self.mute:
             raise LinkTimeout("no answer")
+        self.on_read((address.index or 0, address.subindex))
         if (address.index, address.subindex) == POSITION:
             self.set(POSITION, self.number(POSITION) + self.speed_inc)
         return await super().read(station, address)

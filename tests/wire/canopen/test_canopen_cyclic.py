@@ -218,8 +218,11 @@ async def test_a_drive_that_falls_silent_is_given_up(bench: Bench, link: Canopen
     values = np.full(50000, 800, dtype=np.int64)
     await _cyclic(link).play([Trajectory(5, SPEED_TARGET.address, values, Envelope(), renew_s=99)])
     await until(lambda: bench.device.value(0x60FF) == 800)
+    newest = _cyclic(link).newest(["speed", "position", "speed target"], 1.0)
+    assert list(newest) == ["speed", "position"], "what it is told is nothing that it tells"
     bench.node.mute = True
     await until(lambda: bench.device.value(0x6040) == 6)
+    assert _cyclic(link).newest(["speed"], 1.0) == {}
     assert bench.device.value(0x60FF) == 0
     assert "stopped coming" in _cyclic(link).axis_state(5)[2]
     bench.node.mute = False

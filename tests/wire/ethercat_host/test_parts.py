@@ -66,6 +66,21 @@ def test_a_reader_that_is_too_slow_loses_the_oldest_and_counts_them(ring: Ring) 
     reader.release()
 
 
+def test_the_newest_sample_is_looked_at_and_not_taken(ring: Ring) -> None:
+    ring.prepare(6)
+    reader = ring.reader({"position": ("<i4", 0)})
+    assert reader.newest() is None
+    slots = (RING_BYTES - 4096) // ((SLOT.size + 6 + 7) // 8 * 8)
+    for number in range(slots + 3):  # once round
+        put(ring, number)
+    newest = reader.newest()
+    assert newest is not None
+    assert newest["position"].tolist() == [slots + 2]
+    assert len(reader.drain()[0]) > 1
+    reader.release()
+    assert reader.newest() is None
+
+
 def test_signs_of_life(ring: Ring) -> None:
     assert ring.host_deadline_ns() == 0
     ring.host_lives_until(77, "searching the segment")

@@ -10,12 +10,13 @@ import sys
 import textwrap
 import time
 
+import numpy as np
 import pytest
 
 from drivers.errors import LinkLost, NotAllowed
 from drivers.virtual.wires.netns import child_environment
 from tests.wire.ethercat_host.conftest import Rig, repeated, until
-from tests.wire.ethercat_host.test_cyclic import enable, in_state, move, ramp, running
+from tests.wire.ethercat_host.test_cyclic import Track, enable, in_state, move, ramp, running
 
 
 @repeated
@@ -58,9 +59,16 @@ async def test_a_cable_cut_in_motion_stops_the_axis_and_heals(rig: Rig) -> None:
         with pytest.raises((NotAllowed, LinkLost), match="does not answer"):
             await bus.link.process_data.play([move(2, [0])])
         await enable(bus, 1)
+        track = Track(bus)
         await bus.link.process_data.run([move(1, ramp(rig, 0, count=30))])
+        assert np.isnan(track["2.position"]).all(), "what is old is not shown as present"
+        assert not np.isnan(track["1.position"]).any()
+        newest = bus.link.process_data.newest(["1.position", "2.position"], 1.0)
+        assert list(newest) == ["1.position"]
         rig.do("heal")
         await bus.told("station 2 is in OP again")
+        newest = bus.link.process_data.newest(["1.position", "2.position"], 1.0)
+        assert newest["2.position"] == rig.truth(1, 0x6064)
         await bus.link.process_data.reset_fault(2)
         await until(lambda: in_state(bus, 2) == "Switch on disabled", 2.0)
         await enable(bus, 2)

@@ -1,0 +1,142 @@
+"""What is told of an axis beside a cyclic exchange: process data, and the drive itself in time."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Sequence
+from pathlib import Path
+from typing import cast
+
+import pytest
+
+from backend import monitor as watching
+from backend.bench import Bench, Member
+from backend.cyclic import CyclicSession
+from backend.drive import Drive
+from drivers.cia402 import State
+from tests.support.servo import STATUS, Servo, bench_with
+
+STATUS_KEY, POSITION_KEY, ERROR_KEY = "6041:00", "6064:00", "603F:00"
+
+
+class Exchange:
+    """An exchange that brings ``values`` with every cycle."""
+
+    running = True
+
+    def __init__(self, values: dict[str, int | float]) -> None:
+        self.values = values
+
+    def newest(self, drive: Drive, keys: Sequence[str], within_s: float) -> dict[str, int | float]:
+        return {key: raw for key, raw in self.values.items() if key in keys}
+
+    def power(self) -> None:
+        return None
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now_s = 1000.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def time(self) -> float:
+        return 1.7e9 + self.now_s
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(watching, "time", clock)
+    return clock
+
+
+@pytest.fixture
+async def servo() -> Servo:
+    return Servo()
+
+
+@pytest.fixture
+async def bench(servo: Servo, tmp_path: Path) -> AsyncIterator[Bench]:
+    bench, _ = await bench_with(servo, tmp_path)
+    yield bench
+    await bench.close()
+
+
+@pytest.fixture
+async def x(bench: Bench, clock: Clock) -> Member:
+    x = bench.member("x")
+    await x.monitor.close()  # it is polled by hand here
+    return x
+
+
+@pytest.fixture
+async def exchange(x: Member, servo: Servo) -> Exchange:
+    """Of a drive that was looked at as a whole just now."""
+    exchange = Exchange({STATUS_KEY: servo.number(STATUS), POSITION_KEY: 0, ERROR_KEY: 0})
+    x.axis.session = cast(CyclicSession, exchange)
+    await polled(x)
+    return exchange
+
+
+async def polled(x: Member) -> watching.Snapshot:
+    return await x.monitor._poll(x.monitor._read_what_changes)
+
+
+async def test_what_every_cycle_brings_is_not_asked_for(
+    x: Member, servo: Servo, exchange: Exchange, clock: Clock
+) -> None:
+    asked: list[int | None] = []
+    servo.on_read = lambda place: asked.append(place[0])
+    exchange.values[POSITION_KEY] = 12_345
+    clock.now_s += 0.1
+    snapshot = await polled(x)
+    assert snapshot.fresh
+    assert snapshot.values["position"] == (await x.axis.units()).position(12_345)
+    assert not {0x6041, 0x6064, 0x603F} & set(asked)
+    assert x.drive.readings[POSITION_KEY].raw == 12_345, "the parameter table shows it, too"
+
+
+async def test_a_dead_mailbox_is_told_although_process_data_go_on(
+    x: Member, servo: Servo, exchange: Exchange, clock: Clock
+) -> None:
+    servo.mute = True
+    clock.now_s += watching.ASKED_S
+    snapshot = await polled(x)
+    assert not snapshot.fresh
+    assert "no answer" in snapshot.problem
+    clock.now_s += 0.1
+    assert not (await polled(x)).fresh, "until the drive itself has answered"
+    servo.mute = False
+    clock.now_s += 0.1
+    assert (await polled(x)).fresh
+
+
+@pytest.mark.parametrize("key", [STATUS_KEY, ERROR_KEY])
+async def test_a_change_has_everything_asked_for(
+    x: Member, servo: Servo, exchange: Exchange, clock: Clock, key: str
+) -> None:
+    servo.enable()
+    exchange.values[key] = {STATUS_KEY: servo.number(STATUS), ERROR_KEY: 0x7305}[key]
+    clock.now_s += 0.1
+    assert (await polled(x)).state is State.OPERATION_ENABLED, "as the drive itself says"
+
+
+async def test_bits_of_a_motion_are_no_change_of_state(
+    x: Member, servo: Servo, exchange: Exchange, clock: Clock
+) -> None:
+    servo.mute = True
+    exchange.values[STATUS_KEY] = servo.number(STATUS) | 0x0400
+    clock.now_s += 0.1
+    snapshot = await polled(x)
+    assert snapshot.target_reached
+
+
+async def test_process_data_that_end_are_no_values(
+    x: Member, servo: Servo, exchange: Exchange, clock: Clock
+) -> None:
+    """A lost station, an invalid cycle or old data: then the drive is asked, and is silent."""
+    exchange.values.clear()
+    servo.mute = True
+    clock.now_s += 0.1
+    assert not (await polled(x)).fresh
