@@ -239,9 +239,10 @@ class Segment:
                 self.master.config_map()
             except pysoem.ConfigMapError as error:
                 self.forget_errors()
-                told = sorted({_mapping_error(item) for item in error.error_list})
-                # SOEM takes an emergency for the answer that it waited for: once more, then.
-                if told != [_EMERGENCY] or attempt == _MAP_TRIES - 1:
+                # SOEM takes what comes next for its answer, be it an emergency or the answer to
+                # an earlier question: once more, then. What a drive refuses it refuses again.
+                if attempt == _MAP_TRIES - 1:
+                    told = sorted({_mapping_error(item) for item in error.error_list})
                     raise ProtocolError(
                         f"the process data could not be mapped: {'; '.join(told)}"
                     ) from error

@@ -173,7 +173,7 @@ def running(segment: Segment) -> Iterator[Segment]:
     segment.settled()
     segment.start_cyclic()
     station = segment.station
-    with ApiWatch(f"{station.url}/api/v1/drives", station.server_thread) as watch:
+    with ApiWatch(f"{station.url}/api/v1/drives") as watch:
         yield segment
     segment.peace()
     segment.station.http.post("/stop", json={})

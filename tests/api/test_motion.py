@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
 
 import pytest
 
 from tests.api.test_scope_streams import blocks
+from tests.support.machine import OwnTime
 from tests.support.station import Live, Station, until
 
 JOG = {"speed": 300.0, "acceleration": 3000.0, "travel_limit": 20.0, "torque_limit": 150.0}
@@ -17,12 +21,6 @@ LEAD_REV = 5.0 * 0.2 + 5.0**2 / (2 * 50.0)
 
 def position(station: Station, drive: str) -> float:
     return float(station.state(drive)["position"])
-
-
-def hold(page: Live, drive: str, seconds: float) -> None:
-    """Hold the button for a time."""
-    with page.holding(drive):
-        time.sleep(seconds)
 
 
 def moving(station: Station, drive: str) -> bool:
@@ -43,28 +41,49 @@ def start_jog(page: Live, x: str, **changes: object) -> None:
     page.send(type="jog_start", drive=x, direction=1, **(JOG | changes))
 
 
-def jog_until_fast(station: Station, page: Live, x: str) -> None:
-    """Jog until the axis is fast. A machine that stalls for 200 ms ends a jog: then once more."""
+@contextmanager
+def jogged(
+    station: Station, page: Live, x: str, there: Callable[[Any, float], bool], **changes: object
+) -> Iterator[float]:
+    """Jog until it is ``there``, by the axis' state and where it began; still held inside.
+
+    Gives where it began. A machine that stalls for 200 ms ends a jog: then once more.
+    """
     for _ in range(5):
-        start_jog(page, x)
+        start = position(station, x)
+        start_jog(page, x, **changes)
         with page.holding(x):
-            until(lambda: moving(station, x) or not jogging(station, x), 10)
-        if moving(station, x):
-            return
+            page.send(type="ping", n=1)
+            page.wait("pong", n=1)  # what was sent before has begun
+            now = until(partial(seen, station, x, there, start), 20, "it gets there")
+            if now["moving_job"] is not None:
+                yield start
+                return
         page.wait("jog_ended", drive=x)
-    raise AssertionError("the axis does not move")
+    raise AssertionError("the machine stalls too often")
 
 
-def jogging(station: Station, drive: str) -> bool:
-    return station.state(drive)["moving_job"] is not None
+def seen(station: Station, x: str, there: Callable[[Any, float], bool], start: float) -> Any:
+    """The axis' state where it is there or is jogged no more, else None."""
+    now = station.state(x)
+    return now if now["moving_job"] is None or there(now, start) else None
+
+
+def fast(now: Any, _start: float) -> bool:
+    return abs(float(now["velocity"])) > 100
 
 
 def test_jog_moves_at_speed_and_stops_on_release(station: Station, x: str, page: Live) -> None:
-    jog_until_fast(station, page, x)
-    hold(page, x, 0.5)
-    assert float(station.state(x)["velocity"]) == pytest.approx(300, rel=0.05)
-    page.send(type="jog_stop", drive=x)
+    speeds: list[float] = []
+
+    def steady(now: Any, _start: float) -> bool:
+        speeds.append(float(now["velocity"]))
+        return len(speeds) >= 40 and speeds[-40:] == pytest.approx([300] * 40, rel=0.05)
+
+    with jogged(station, page, x, steady):
+        page.send(type="jog_stop", drive=x)
     ended = page.wait("jog_ended", drive=x)
+    assert max(speeds) < 300 * 1.05
     assert ended["problem"] is None
     assert ended["reason"] == "released"
     now = station.state(x)
@@ -73,21 +92,22 @@ def test_jog_moves_at_speed_and_stops_on_release(station: Station, x: str, page:
 
 
 def test_jog_stops_when_the_renewals_stop(station: Station, x: str, page: Live) -> None:
-    jog_until_fast(station, page, x)
-    hold(page, x, 0.3)
-    began = time.monotonic()
-    ended = page.wait("jog_ended", drive=x)
+    with jogged(station, page, x, fast):
+        pass
+    with OwnTime(*station.processes) as took:
+        ended = page.wait("jog_ended", drive=x)
     # 200 ms without a sign of life, then 300 rpm at 3000 rpm/s: 100 ms to stand still.
-    assert time.monotonic() - began < 1.0
+    assert took.s < 1.0
     assert "200 ms" in ended["reason"]
     assert at_rest(station, x)
 
 
 def test_jog_stops_when_the_page_is_gone(station: Station, x: str) -> None:
-    with station.live() as page:
-        jog_until_fast(station, page, x)
-        hold(page, x, 0.2)
-    until(lambda: at_rest(station, x), 1.0, "the axis stands")
+    with station.live() as page, jogged(station, page, x, fast):
+        pass
+    with OwnTime(*station.processes) as took:
+        until(lambda: at_rest(station, x), 10.0, "the axis stands")
+    assert took.s < 1.0
     lease = station.ok(station.http.get(f"/drives/{x}"))["lease"]
     assert lease["holder"] is None
 
@@ -95,10 +115,10 @@ def test_jog_stops_when_the_page_is_gone(station: Station, x: str) -> None:
 def test_stop_works_for_everyone_and_nothing_enables_again(
     station: Station, x: str, page: Live
 ) -> None:
-    jog_until_fast(station, page, x)
-    answer = station.ok(station.http.post("/stop", json={}))  # another client, no lease
-    assert x in answer["stopped"]
-    hold(page, x, 0.5)  # the button is still held
+    with jogged(station, page, x, fast):
+        answer = station.ok(station.http.post("/stop", json={}))  # another client, no lease
+        assert x in answer["stopped"]
+        time.sleep(0.5)  # the button is still held
     page.wait("jog_ended", drive=x)
     now = station.state(x)
     assert abs(now["velocity"]) < 2
@@ -106,12 +126,15 @@ def test_stop_works_for_everyone_and_nothing_enables_again(
 
 
 def test_jog_keeps_the_travel_limit(station: Station, x: str, page: Live) -> None:
-    before = position(station, x)
-    start_jog(page, x, travel_limit=0.5)
-    hold(page, x, 1.0)
-    assert position(station, x) - before == pytest.approx(0.5, abs=0.02)
-    page.send(type="jog_stop", drive=x)
+    with jogged(station, page, x, stands_after_half_a_turn, travel_limit=0.5) as start:
+        time.sleep(0.3)  # and there it stays
+        assert position(station, x) - start == pytest.approx(0.5, abs=0.02)
+        page.send(type="jog_stop", drive=x)
     page.wait("jog_ended", drive=x)
+
+
+def stands_after_half_a_turn(now: Any, start: float) -> bool:
+    return abs(now["velocity"]) < 2 and abs(now["position"] - start - 0.5) < 0.02
 
 
 def test_jog_restores_what_it_changed(station: Station, x: str, page: Live) -> None:
@@ -122,24 +145,28 @@ def test_jog_restores_what_it_changed(station: Station, x: str, page: Live) -> N
         return [row["raw"] for row in rows]
 
     before = read()
-    jog_until_fast(station, page, x)
-    page.send(type="jog_stop", drive=x)
+    with jogged(station, page, x, fast):
+        page.send(type="jog_stop", drive=x)
     page.wait("jog_ended", drive=x)
     assert read() == before
 
 
 def test_pulled_cable_ends_within_the_lead(station: Station, x: str, page: Live) -> None:
     """No watchdog in the drive: its own profile generator must brake (architecture)."""
-    jog_until_fast(station, page, x)
-    hold(page, x, 0.2)
-    near = position(station, x)
-    station.drives.command(do="pull", wire="mlink://virtual0")
-    hold(page, x, 1.0)
+    with jogged(station, page, x, fast):
+        station.drives.command(do="pull", wire="mlink://virtual0")
+        near = past_the_wire(station)
+        time.sleep(1.0)
     station.drives.command(do="heal", wire="mlink://virtual0")
     until(lambda: station.state(x)["fresh"], 15, "the drive answers again")
     until(lambda: at_rest(station, x), 3)
-    # Between the reading and the cut the axis went on for some ten milliseconds.
-    assert position(station, x) - near < LEAD_REV + 5.0 * 0.15
+    assert past_the_wire(station) - near < LEAD_REV
+
+
+def past_the_wire(station: Station) -> float:
+    """The drive's own position, in revolutions."""
+    told = station.drives.command(do="read", axis="Feed screw", index=0x6064, subindex=0)
+    return int.from_bytes(bytes.fromhex(str(told)), "little", signed=True) / 65536
 
 
 def test_somebody_else_cannot_move_a_held_axis(station: Station, x: str, page: Live) -> None:
@@ -194,11 +221,11 @@ def test_a_move_and_a_jog_typed_in_millimetres(station: Station, x: str, page: L
         "+6 mm from the start point is outside the travel limit of 5 mm"
         in (job["problem"]["detail"])
     )
-    before = position(station, x)
-    start_jog(page, x, speed=25.0, acceleration=250.0, travel_limit=1.25, unit="mm")
-    hold(page, x, 1.0)
-    assert position(station, x) - before == pytest.approx(0.5, abs=0.02)
-    page.send(type="jog_stop", drive=x)
+    short = {"speed": 25.0, "acceleration": 250.0, "travel_limit": 1.25, "unit": "mm"}
+    with jogged(station, page, x, stands_after_half_a_turn, **short) as start:
+        time.sleep(0.3)
+        assert position(station, x) - start == pytest.approx(0.5, abs=0.02)
+        page.send(type="jog_stop", drive=x)
     page.wait("jog_ended", drive=x)
     station.ok(station.http.put(f"/drives/{x}/mechanics", json={"mechanics": None}))
 
@@ -294,17 +321,16 @@ def test_scope_delivers_samples_with_their_times(station: Station, x: str, page:
 
 
 def test_power_cut_while_jogging(station: Station, x: str, page: Live) -> None:
-    jog_until_fast(station, page, x)
-    station.drives.command(do="power_cycle", axis="Feed screw", off_s=0.5)
-    hold(page, x, 1.0)
+    with jogged(station, page, x, fast):
+        station.drives.command(do="power_cycle", axis="Feed screw", off_s=0.5)
+        time.sleep(1.0)
     ended = page.wait("jog_ended", drive=x)
     assert ended["problem"] is not None
     until(lambda: station.state(x)["fresh"], 15, "the drive answers again")
     now = until(lambda: at_rest(station, x) and station.state(x), 5)
     assert now["state"] != "Operation enabled"
-    start_jog(page, x)  # and it can be moved again without a restart of anything
-    hold(page, x, 1.0)
-    page.send(type="jog_stop", drive=x)
+    with jogged(station, page, x, fast):  # and it can be moved again without a restart of anything
+        page.send(type="jog_stop", drive=x)
     ended = page.wait("jog_ended", drive=x)
     assert ended["problem"] is None, ended
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import re
 import socket
 import time
@@ -23,6 +22,7 @@ from backend.people.identity import Actor, acting
 from backend.people.rights import RIGHTS, Right, Role
 from tests.security.conftest import Cast
 from tests.support.guarded import Caller, GuardedServer, Page
+from tests.support.machine import OwnTime
 from tests.support.station import until
 
 AXIS: dict[str, object] = {"drive": "x"}
@@ -275,11 +275,13 @@ def test_a_silent_connection_loses_control_within_two_seconds(
     server: GuardedServer, cast: Cast
 ) -> None:
     with cast.operator.live() as page:
-        page.send(type="lease", drive="x", take=True)
-        until(lambda: server.bench.leases.holder("x"), 2)
         began = time.monotonic()
-        until(lambda: server.bench.leases.holder("x") is None, 4, "control is lost")
-        assert 1.0 < time.monotonic() - began < 2.2
+        page.send(type="lease", drive="x", take=True)
+        until(lambda: server.bench.leases.holder("x"), 10)
+        with OwnTime() as silent:
+            until(lambda: server.bench.leases.holder("x") is None, 10, "control is lost")
+        assert time.monotonic() - began > 1.0
+        assert silent.s < 2.2
         assert page.wait("lease_notice", drive="x")["kind"] == "lost"
 
 
@@ -321,10 +323,10 @@ def test_a_line_that_is_dead_but_open_moves_nothing_and_is_given_up(
             page = live.connections[name]
             server.call(lambda: server.bench.leases.take("x", name, "Olaf"))
             job = began_by(server, cast, SimpleNamespace(connection=name))  # type: ignore[arg-type]
-            began = time.monotonic()
-            until(lambda: server.bench.leases.holder("x") is None, 4, "control is lost")
-            until(lambda: job.state == "cancelled", 2, "the motion has ended")
-            assert time.monotonic() - began < 2.2
+            with OwnTime() as silent:
+                until(lambda: server.bench.leases.holder("x") is None, 10, "control is lost")
+                until(lambda: job.state == "cancelled", 2, "the motion has ended")
+            assert silent.s < 2.2
             assert name in live.connections, "and all that while the line still looked open"
             until(lambda: name not in live.connections, 5, "the line is given up")
             assert page.id not in {
@@ -385,28 +387,34 @@ def test_a_guest_gets_what_is_granted_where_and_as_long(server: GuardedServer, c
         cast.operator.ok("DELETE", grant)
 
 
-def test_the_button_on_site_is_dead_within_200_ms(server: GuardedServer, cast: Cast) -> None:
+def test_the_button_on_site_is_dead_within_200_ms(
+    server: GuardedServer, cast: Cast, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """No release comes: the page on site has frozen. What the guest moves is stopped."""
     cast.operator.ok("PUT", f"/invitations/{cast.invitation}/grant",
                      {"rights": ["motion"], "minutes": 5})  # fmt: skip
+    now = [time.monotonic()]
+    monkeypatch.setattr(server.people.support, "_ticks", lambda: now[0])
     with cast.operator.live() as site:
 
         def renew() -> None:
-            site.socket.send(json.dumps({"type": "enable_renew", "invitation": cast.invitation}))
+            site.send(type="enable_renew", invitation=cast.invitation)
+            site.send(type="ping", n=1)
+            site.wait("pong", n=1)  # it was heard
 
         site.send(type="enable_press", invitation=cast.invitation)
-        until(lambda: server.people.support.enabled(cast.invitation), 2)
+        until(lambda: server.people.support.enabled(cast.invitation), 10)
         job = server.call(lambda: _guest_motion(server, cast))
-        for _ in range(10):
-            renew()
-            time.sleep(0.03)
-        assert job.state == "running"
         before = len(server.servo.words())
-        renew()
-        began = time.monotonic()
-        until(lambda: len(server.servo.words()) > before, 2, "the quick stop is written")
-        took = time.monotonic() - began
-        assert took < 0.2 + 0.1, took  # and the time that a busy computer takes
+        for _ in range(10):
+            now[0] += 0.1
+            renew()
+        assert job.state == "running"
+        assert len(server.servo.words()) == before
+        with OwnTime() as took:
+            now[0] += 0.2
+            until(lambda: len(server.servo.words()) > before, 10, "the quick stop is written")
+        assert took.s < 0.1, "it is looked for 50 times a second"
         until(lambda: job.state == "cancelled", 2)
         renew()  # what has expired is not revived
         assert not server.call(lambda: server.people.support.enabled(cast.invitation))

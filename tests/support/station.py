@@ -109,11 +109,11 @@ class Station:
         self.drives.stop()
 
     @property
-    def server_thread(self) -> int:
-        """The system's number of the thread that the server runs in."""
-        assert self._thread is not None
-        assert self._thread.native_id is not None
-        return self._thread.native_id
+    def processes(self) -> list[int]:
+        """Those of the virtual drives; the server is in this one."""
+        host = self.drives._host
+        segments = [segment.pid for segment in self.drives.segments.values()]
+        return segments if host is None else [host.pid, *segments]
 
     @property
     def url(self) -> str:

@@ -144,11 +144,9 @@ def test_a_rewritten_history_is_found_by_an_anchor(tmp_path: Path) -> None:
 
 def test_adding_never_waits_for_a_database_that_hangs(store: SickStore, audit: AuditLog) -> None:
     store.hanging = True
-    began = time.monotonic()
     for number in range(1000):
         audit.add(write(number))
-    # 100 µs for each, on a busy machine: what counts is that none waited for the database.
-    assert time.monotonic() - began < 1.0
+    assert audit.pending == 1000, "none waited for the database, which hangs still"
     store.hanging = False
     flush(audit)
     assert Trail(store).verify().entries == 1000

@@ -150,7 +150,8 @@ def test_killed_process_leaves_all_but_the_last_half_second(tmp_path: Path) -> N
         killed = time.monotonic()
         child.wait()
         child.stdout.close()
-    due = max(n for t, n in put if t <= killed - 0.5)
+    # In half a second of its own it puts 50 at most: it may have stood still in between.
+    due = min(max(n for t, n in put if t <= killed - 0.5), len(put) - 50)
     with RecordingReader(path) as reader:
         blocks = list(reader.blocks())
         assert reader.summary().state == "interrupted"
@@ -182,9 +183,10 @@ def test_full_disk_ends_it_with_a_message(tmp_path: Path, disk_of_20_kb: None) -
         time.sleep(0.001)
     assert failures[0].message.startswith("a.sdrec could not be written: File too large")
     assert failures[0].remedy
-    began = time.monotonic()
-    writer.put(0, block(n))
-    assert time.monotonic() - began < 0.1, "who delivers samples is not disturbed"
+    wait_for(lambda: not writer._thread.is_alive(), "the thread has ended")
+    before = writer.written()
+    writer.put(0, block(n))  # nobody is left whom it could wait for
+    assert writer.written() == before, "who delivers samples is not disturbed"
     with pytest.raises(StorageFailed):
         writer.close({"reason": "stopped"})
     assert len(failures) == 1

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import pysoem
 import pytest
 
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, ProtocolError
 from drivers.ethercat.mapping import plan_station
+from drivers.ethercat.segment import Segment
 from drivers.link import Address, CyclicSignal
 from profiles.schema import DataType, PdoSpec, Profile
 from tests.wire.ethercat_host.servo_device import servo_profile
@@ -78,3 +80,44 @@ def test_a_drive_without_a_profile_gets_a_modest_mapping() -> None:
     plan = plan_station(1, wish, [signal(0x607A)], None)
     assert len(plan.tx.entries) == 8
     assert len(plan.left_over) == 3
+
+
+class Soem:
+    """A master whose mapping fails with these errors in turn, then succeeds."""
+
+    manual_state_change = 0
+
+    def __init__(self, *errors: Exception) -> None:
+        self.errors = list(errors)
+        self.tries = 0
+
+    def config_map(self) -> None:
+        self.tries += 1
+        if self.errors:
+            raise pysoem.ConfigMapError([self.errors.pop(0)])
+
+    def _collect_mailbox_errors(self) -> None:
+        """There are none."""
+
+
+STRAY = pysoem.PacketError(1, 3), pysoem.PacketError(1, 1), Exception("unexpected error")
+REFUSAL = pysoem.SdoError(2, 0x1C12, 1, 0x06090011, "Subindex does not exist")
+
+
+@pytest.mark.parametrize("stray", [*STRAY, REFUSAL], ids=str)
+def test_a_mapping_that_an_answer_to_something_else_spoilt_is_made_again(stray: Exception) -> None:
+    """SOEM looks at the index of an answer at most: any error may be another question's."""
+    segment, master = Segment("none"), Soem(stray, stray)
+    segment._master = master
+    segment.map(64)
+    assert segment.mapped
+    assert master.tries == 3
+
+
+def test_a_mapping_that_a_drive_refuses_ends_in_its_words() -> None:
+    segment, master = Segment("none"), Soem(REFUSAL, REFUSAL, REFUSAL, REFUSAL)
+    segment._master = master
+    with pytest.raises(ProtocolError, match=r"station 2 aborted 1C12:01 \(Subindex does not exist"):
+        segment.map(64)
+    assert not segment.mapped
+    assert master.tries == 3
