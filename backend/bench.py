@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import re
 from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from backend.journal import Journal, Level
 from backend.matching import profile_for
 from backend.measurements import MeasurementStore
 from backend.monitor import Monitor, Snapshot
+from backend.naming import PlaceNames, new_id
 from backend.owed_store import OwedStore
 from backend.people.identity import by_itself
 from backend.ports import Port
@@ -50,7 +50,7 @@ class Bench:
     """Buses and drives of one server.
 
     ``wires`` are the wires of a demo bench: URLs such as ``mlink://virtual0`` and what makes
-    their links.
+    their links. ``names`` are those of its drives by bus URL and station, for who gives none.
     ``state_folder`` keeps the list of drives over restarts, and what `Records` keeps.
     """
 
@@ -61,8 +61,10 @@ class Bench:
         *,
         database: str | None = None,
         blobs: str | None = None,
+        names: Mapping[tuple[str, int], str] | None = None,
     ) -> None:
         self.wires = dict(wires or {})
+        self._names = PlaceNames(names or {})
         self.journal = Journal()
         self.records = Records(state_folder, self.journal, database, blobs)
         self.audit = self.records.audit
@@ -251,7 +253,10 @@ class Bench:
         facts, spec = profile_for(link.kind, profile)
         if isinstance(link, NeedsProfile):
             link.configure_station(station, facts)
-        drive_id = self._new_id(name or f"{profile}-{station}")
+        name = name or self._names.unused(
+            url, station, [m.drive.name for m in self.members.values()]
+        )
+        drive_id = new_id(name or f"{profile}-{station}", self.members)
         drive = Drive(drive_id, name or drive_id, facts, [Port(link, station, spec)])
         drive.found = found
         return self._add(drive)
@@ -323,7 +328,7 @@ class Bench:
         drive.listen_writes(self._witness.wrote)
         drive.listen_commands(self._witness.commanded)
         drive.owed.listen(self.drives_changed)
-        self.returning.begin(drive)
+        self.returning.begin(axis)
         monitor.start()
         self._remember()
         self.journal.add(f"connected {drive.name} ({drive.profile.title})", drive=drive_id)
@@ -402,13 +407,6 @@ class Bench:
         self.drives_changed()
         return member
 
-    def _new_id(self, name: str) -> str:
-        stem = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "drive"
-        number, drive_id = 2, stem
-        while drive_id in self.members:
-            drive_id, number = f"{stem}-{number}", number + 1
-        return drive_id
-
     # --- moving and stopping ----------------------------------------------------------
 
     def _permit(self, drive_id: str) -> None:
@@ -458,6 +456,8 @@ class Bench:
     # --- events -----------------------------------------------------------------------
 
     def _snapshot(self, drive_id: str, snapshot: Snapshot) -> None:
+        if (member := self.members.get(drive_id)) is not None:
+            self.returning.seen(member, snapshot)
         for listener in self.on_snapshot:
             listener(drive_id, snapshot)
 

@@ -53,6 +53,11 @@ class DemoBench:
         #: Sentences for the user about what could not be started.
         self.problems: list[str] = []
 
+    @property
+    def names(self) -> dict[tuple[str, int], str]:
+        """What the bench file calls its drives, by bus URL and station of each port."""
+        return {port: axis.name for axis in self.spec.axis for port in axis.ports}
+
     def start(self) -> None:
         """Start the virtual drives and wait until their wires exist.
 

@@ -16,6 +16,9 @@ from backend.store import DatabaseFailed, Store
 from backend.store.blobs import Blobs
 from backend.store.lock import FolderLock
 
+#: How long a start waits for a database on a server.
+REMOTE_S = 1.0
+
 
 class Records:
     """Database, audit and library of one station. Making it touches nothing.
@@ -36,6 +39,7 @@ class Records:
         self._lock = FolderLock(folder)
         self._journal = journal
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._taking_up: asyncio.Task[None] | None = None
 
     async def open(self) -> None:
         """Open the database and take up what was left over. A station without it still works:
@@ -48,14 +52,23 @@ class Records:
                 level="error",
             )
         self.audit.start()
+        self._taking_up = asyncio.create_task(self._take_up(), name="records")
+        # A database far away that does not answer keeps no drive waiting.
+        await asyncio.wait({self._taking_up}, timeout=None if self.store.sqlite_file else REMOTE_S)
+
+    async def _take_up(self) -> None:
         try:
+            await self.store.call(self.store.open)
             await self.store.call(self.sets.take_in)
         except DatabaseFailed as error:
-            self._journal.add(error.message, level="error")
+            text = f"{error.message}; {error.remedy}. Until it answers, drives can be used"
+            self._journal.add(f"{text}, the library cannot, and the audit waits", level="error")
 
     async def close(self) -> None:
         """Write down what is left."""
         self._loop = None
+        if self._taking_up is not None:
+            await self._taking_up
         await asyncio.to_thread(self.audit.close)
         await asyncio.to_thread(self.store.close)
         self._lock.give()

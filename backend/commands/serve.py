@@ -14,6 +14,7 @@ import uvicorn
 from backend.api.app import make_app
 from backend.api.security_protocol import PatientProtocol, PatientSocket
 from backend.bench import Bench
+from backend.journal import Entry
 from backend.people.station import People
 from backend.people.tls import Certificate, machine_names, own_certificate, station_certificate
 from backend.store.database import FILE
@@ -172,10 +173,17 @@ def _tell(shown: str, people: People, certificate: Certificate | None) -> None:
 
 
 def _tell_problems(bench: Bench) -> None:
-    """What went wrong at the start, such as a state folder that cannot be written."""
-    for entry in reversed(bench.journal.entries()):
-        if entry.level == "error":
+    """What is wrong with the station and not with a drive, such as a database out of reach: what
+    was so at the start, and what becomes so.
+    """
+
+    def tell(entry: Entry) -> None:
+        if entry.level == "error" and entry.drive is None:
             print(f"  note: {entry.text}", flush=True)
+
+    for entry in reversed(bench.journal.entries()):
+        tell(entry)
+    bench.journal.listen(tell)
 
 
 def _listen(host: str, port: int) -> socket.socket:

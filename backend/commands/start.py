@@ -97,7 +97,9 @@ def demo(
                     print(f"  {url}  is  {real}")
                 for problem in drives.problems:
                     print(f"  note: {problem}")
-                server_bench = Bench(state, drives.wires, database=database, blobs=blobs)
+                server_bench = Bench(
+                    state, drives.wires, database=database, blobs=blobs, names=drives.names
+                )
                 await run_server(server_bench, serving)
 
     until_interrupted(work)

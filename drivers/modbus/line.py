@@ -12,7 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NoReturn
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError, Rejected
@@ -127,6 +127,20 @@ class Line:
             LinkTimeout, LinkLost, ProtocolError (damaged answer), Rejected, OutOfRange
         """
         return self._ask(read_query(station, start, count), timeout_s)[3:-2]
+
+    def seek(self, station: int, start: int, count: int, timeout_s: float) -> bytes:
+        """`read` where perhaps nobody is.
+
+        The silence of an address that never answered is no fault of the line: it does not count.
+        """
+        counters = self._count(station)
+        before = replace(counters)
+        try:
+            return self.read(station, start, count, timeout_s)
+        except LinkTimeout:
+            if counters.round_trip_ms is None:
+                self._counters[station] = before
+            raise
 
     def write(
         self, station: int, start: int, words: tuple[int, ...], *, at_any_rate: bool = False

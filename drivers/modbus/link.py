@@ -265,7 +265,7 @@ class RegisterLink:
         place = self._layout.place(station, self._layout.identity()[0])
         for _ in range(2):
             try:
-                self._line.read(station, place.start, place.count, self._settings.scan_timeout_s)
+                self._line.seek(station, place.start, place.count, self._settings.scan_timeout_s)
             except ProtocolError:
                 continue
             except LinkTimeout:

@@ -6,6 +6,7 @@ import asyncio
 import io
 import json
 import signal
+import socket
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
@@ -75,6 +76,38 @@ async def test_a_state_folder_that_cannot_be_used_is_told_in_the_terminal(
         await bench.close()
     assert "  note: " in (said := capsys.readouterr().out)
     assert f"{tmp_path}/file" in said
+
+
+async def test_a_database_out_of_reach_is_told_at_once_and_keeps_no_drive_waiting(
+    tmp_path: Path, link: MemoryLink, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # and not listening: it refuses
+        place = f"127.0.0.1:{taken.getsockname()[1]}/audit"
+        url = f"postgresql://me:secret@{place}"
+        bench = Bench(tmp_path, {"mlink://virtual0": lambda: link}, database=url)
+        await bench.restore()
+        try:
+            _tell_problems(bench)
+            said = capsys.readouterr().out
+            await bench.connect("mlink://virtual0", 1, "mms7")
+        finally:
+            await bench.close()
+    assert f"me:***@{place} failed:" in said
+    assert "check free space" in said
+    assert "secret" not in said
+
+
+async def test_what_goes_wrong_later_is_told_too_but_not_every_drives_trouble(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench = Bench(tmp_path)
+    _tell_problems(bench)
+    bench.journal.add("the audit waits: the disk is full", level="error")
+    bench.journal.add("it may still be enabled", level="error", drive="x")
+    bench.journal.add("opened mlink:///dev/ttyUSB0")
+    assert capsys.readouterr().out == "  note: the audit waits: the disk is full\n"
+    await bench.close()
 
 
 @pytest.mark.parametrize("text", ["nan", "inf", "-inf", "1e400", "five"])

@@ -98,6 +98,19 @@ def test_mute_drive_times_out_after_wire_time_and_patience() -> None:
     assert line.quality(2).timeouts == 0
 
 
+def test_an_address_that_was_only_searched_is_no_fault_of_the_line() -> None:
+    line = line_on(ScriptedPort(MUTE, MUTE, [(0.002, answer(7))], MUTE))
+    for station in (2, 3):
+        with pytest.raises(LinkTimeout):
+            line.seek(station, 0, 1, 0.03)
+    assert (line.quality(None).timeouts, line.quality(None).transactions) == (0, 0)
+    # What has answered and then does not is a time-out, also where it was searched.
+    assert line.seek(1, 0, 1, 0.03) == b"\0\x07"
+    with pytest.raises(LinkTimeout):
+        line.seek(1, 0, 1, 0.03)
+    assert (line.quality(1).timeouts, line.quality(None).transactions) == (1, 2)
+
+
 def test_slow_baud_rate_extends_the_deadline() -> None:
     # 125 registers at 9600 baud: (8 + 255) * 10 / 9600 = 274 ms on the wire alone.
     words = tuple(range(125))

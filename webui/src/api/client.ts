@@ -1,4 +1,5 @@
 import createClient from 'openapi-fetch'
+import { counted } from './outstanding'
 import { patient } from './patience'
 import type { components, paths } from './schema'
 
@@ -56,7 +57,7 @@ export async function ask<T>(
 ): Promise<T> {
   let answer: { data?: T; error?: unknown; response: Response }
   try {
-    answer = await request
+    answer = await counted(request)
   } catch {
     throw new ProblemError(unreachable())
   }

@@ -4,6 +4,7 @@ import { useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useDrives, useLink } from '../live/store'
 import { OwedNote } from '../widgets/OwedNote'
+import { Arriving } from './Arriving'
 import { Frame } from './Frame'
 import { AXIS, BENCH, fetchAhead } from './pages'
 import { isAxisPage, useRoute } from './router'
@@ -45,7 +46,9 @@ function Page() {
     const Shown = BENCH[page]
     return (
       <Guard key={page}>
-        <Shown />
+        <Arriving drive={null}>
+          <Shown />
+        </Arriving>
       </Guard>
     )
   }
@@ -62,8 +65,10 @@ function Page() {
   const Shown = AXIS[page]
   return (
     <Guard key={`${page} ${drive}`}>
-      <OwedNote drive={drive} />
-      <Shown drive={drive} />
+      <Arriving drive={drive}>
+        <OwedNote drive={drive} />
+        <Shown drive={drive} />
+      </Arriving>
     </Guard>
   )
 }

@@ -119,7 +119,9 @@ function Pages() {
   const drive = useChosen()
   const hasIo = useHasIo(drive)
   const canTune = useCanTune(drive)
-  const offered = (name: Page) =>
+  // What the axis has not stays in its place: the entries below would move under a finger, each
+  // time another axis is chosen. The page says why there is nothing.
+  const has = (name: Page) =>
     name === 'io' ? hasIo : name === 'tune' || name === 'response' ? canTune : true
   return (
     <>
@@ -131,8 +133,8 @@ function Pages() {
       </div>
       {drives.length === 0 && <p className="dim">{t('frame.noAxes')}</p>}
       <h2>{t('frame.axisPages')}</h2>
-      {AXIS_PAGES.filter(offered).map((name) => (
-        <PageLink key={name} name={name} />
+      {AXIS_PAGES.map((name) => (
+        <PageLink key={name} name={name} faint={drive !== null && !has(name)} />
       ))}
       <h2>{t('frame.bench')}</h2>
       {BENCH_PAGES.map((name) => (
@@ -173,7 +175,15 @@ function AxisEntry({ id }: { id: string }) {
   )
 }
 
-function PageLink({ name, short = false }: { name: Page; short?: boolean }) {
+function PageLink({
+  name,
+  short = false,
+  faint = false,
+}: {
+  name: Page
+  short?: boolean
+  faint?: boolean
+}) {
   const t = useT()
   const { page, drive } = useRoute()
   const drives = useDrives() ?? []
@@ -188,7 +198,7 @@ function PageLink({ name, short = false }: { name: Page; short?: boolean }) {
     </span>
   ) : (
     <a
-      className="entry"
+      className={faint ? 'entry faint' : 'entry'}
       href={href(name, target)}
       aria-current={page === name ? 'page' : undefined}
     >
