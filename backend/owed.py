@@ -77,6 +77,11 @@ class Owed:
         return tuple((lent | self._debts).values())
 
     @property
+    def in_motion(self) -> bool:
+        """A motion goes on that has changed something for its length."""
+        return bool(self._lent)
+
+    @property
     def debts(self) -> tuple[Debt, ...]:
         """All that is owed."""
         return tuple(self._debts.values())

@@ -8,6 +8,7 @@ every motion begins and ends with it.
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -16,6 +17,11 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from backend.files import StorageFailed, write_atomically
 from backend.owed import Debt
 from profiles.schema import Raw
+
+
+#: What moves is this long after the last note still the doing of the server that was killed; later
+#: somebody else may have the machine.
+A_MOMENT_S = 600.0
 
 
 class _Kept(BaseModel):
@@ -32,6 +38,7 @@ class _Note(BaseModel):
 
     serial: int | None
     debts: tuple[_Kept, ...]
+    in_motion: bool = False
 
 
 class OwedStore:
@@ -56,7 +63,19 @@ class OwedStore:
         )
         return tuple(debts), serial if note.serial is None else note.serial
 
-    def put(self, drive: str, serial: int | None, debts: Sequence[Debt]) -> None:
+    def was_moved(self, drive: str) -> bool:
+        """Whether a server ended a moment ago in the middle of a motion of this drive."""
+        file = self._file(drive)
+        try:
+            note = _Note.model_validate_json(file.read_text("utf-8"))
+            age_s = time.time() - file.stat().st_mtime
+        except (OSError, ValidationError):
+            return False
+        return note.in_motion and abs(age_s) < A_MOMENT_S
+
+    def put(
+        self, drive: str, serial: int | None, debts: Sequence[Debt], *, in_motion: bool = False
+    ) -> None:
         """Note what is owed now instead of what was.
 
         Raises:
@@ -71,7 +90,7 @@ class OwedStore:
             return
         kept = tuple(_Kept(key=d.key, raw=d.raw, left=tuple(d.left), unapplied=d.unapplied)
                      for d in debts)  # fmt: skip
-        note = _Note(serial=serial, debts=kept)
+        note = _Note(serial=serial, debts=kept, in_motion=in_motion)
         write_atomically(file, note.model_dump_json(indent=1).encode(), durable=False)
 
     def _file(self, drive: str) -> Path:

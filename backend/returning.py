@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from backend.axis import Axis
 from backend.drive import Drive
 from backend.files import StorageFailed
 from backend.jobs import Job, JobResult, Progress
+from backend.monitor import Snapshot
 from backend.owed_store import OwedStore
 from backend.tools.settling import settle
+from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from drivers.link import Found
 
 if TYPE_CHECKING:
     from backend.bench import Bench, Member
+
+_STANDS_S, _STANDS_RPM = 0.5, 5.0
 
 
 class Returning:
@@ -23,10 +28,19 @@ class Returning:
         self._bench = bench
         self._notes = notes
         self._noted = True
+        #: Drives to which something is owed, and whose axis did not stand free when they answered.
+        self._awaited: set[str] = set()
 
-    def begin(self, drive: Drive) -> None:
-        """Recall what an earlier server left in a drive; note from now on what is owed to it."""
+    def begin(self, axis: Axis) -> None:
+        """Recall what an earlier server left in a drive; note from now on what is owed to it.
+
+        An axis that was moved by a server which was killed a moment ago is stopped: what a drive
+        carries out by itself (a homing that looks for a switch) goes on without anybody.
+        """
+        drive = axis.drive
         debts, serial = self._notes.get(drive.id, _serial(drive))
+        if debts and self._notes.was_moved(drive.id):
+            axis.owes_stop = True
         drive.owed.recall(debts)
         drive.owed.keep(lambda: self._note(drive))
         if drive.found is None and serial is not None:
@@ -35,7 +49,8 @@ class Returning:
 
     def _note(self, drive: Drive) -> None:
         try:
-            self._notes.put(drive.id, _serial(drive), drive.owed.outstanding)
+            owed = drive.owed
+            self._notes.put(drive.id, _serial(drive), owed.outstanding, in_motion=owed.in_motion)
         except StorageFailed as error:
             if self._noted:
                 text = (
@@ -77,10 +92,31 @@ class Returning:
         return True
 
     async def _settled(self, member: Member) -> None:
-        """Put back by itself, unless something else has the axis; then it stays on offer."""
-        if self._bench.jobs.moving(member.drive.id) is not None:
+        """Put back by itself, unless something else has the axis; then when it stands free."""
+        drive_id = member.drive.id
+        if self._bench.jobs.moving(drive_id) is not None:
+            self._awaited.add(drive_id)
+            return
+        enabled = await member.axis.state() is State.OPERATION_ENABLED
+        if enabled or not await member.axis.standstill(_STANDS_S):
+            self._awaited.add(drive_id)
             return
         await self.start(member, asked=False).wait()
+
+    def seen(self, member: Member, snapshot: Snapshot) -> None:
+        """An axis that was enabled when its drive answered stands free now: put back what is owed.
+
+        Once; what cannot be put back then stays on offer.
+        """
+        drive = member.drive
+        if drive.id not in self._awaited or not snapshot.fresh:
+            return
+        turns = abs(snapshot.values.get("velocity") or 0.0) > _STANDS_RPM
+        if snapshot.state is State.OPERATION_ENABLED or turns or self._bench.jobs.moving(drive.id):
+            return
+        self._awaited.discard(drive.id)
+        if drive.owed:
+            self.start(member, asked=False)
 
     def start(self, member: Member, *, asked: bool) -> Job:
         """Put back what is owed, as a job that holds the axis where it is.

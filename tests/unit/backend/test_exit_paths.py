@@ -106,7 +106,7 @@ async def test_the_end_of_a_measurement_leaves_the_exchange_to_an_axis_that_borr
     await lent.end()
     await turns()
     assert loop.stopped == 0
-    assert bench.sessions[URL] is loop
+    assert bench.sessions[URL] == loop
     await bench.jobs.cancel(moving)
     await turns()
     assert loop.stopped == 0, "its own job has not come to its end yet"
@@ -127,7 +127,7 @@ async def test_its_own_job_does_not_keep_an_exchange(bench: Bench, x: Member) ->
 async def test_a_measurement_borrows_what_runs_and_does_not_end_it(bench: Bench, x: Member) -> None:
     _y, loop = await two_axes(bench, x)
     borrowed = await exchange_for(bench, x, 0.001)
-    assert borrowed.session is loop
+    assert borrowed.session == loop
     await borrowed.end()
     assert loop.stopped == 0
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import shutil
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
@@ -16,7 +18,7 @@ from backend.restoring import RestoreFailed
 from backend.tools.temporary import temporary
 from drivers.errors import LinkLost
 from drivers.link import Found
-from tests.support.servo import CONTROL, Servo, bench_with
+from tests.support.servo import CONTROL, STATUS, Servo, bench_with
 
 #: Largest torque, and the bandwidth of the speed loop, which acts after "write settings".
 TORQUE, SPEED = "6072:00", "2005:03"
@@ -171,6 +173,23 @@ async def test_an_axis_that_does_not_stand_free_is_left_alone(
     assert {debt.key for debt in x.drive.owed.debts} == set(WAS)
 
 
+async def test_it_is_put_back_as_soon_as_the_axis_stands_free(
+    bench: Bench, x: Member, servo: Servo
+) -> None:
+    """A drive that answered while it was still enabled kept what it was lent until it was lost."""
+    await lost_in_the_middle(x, servo)
+    servo.enable()
+    await back(bench, servo)
+    await x.monitor.refresh()
+    await asyncio.gather(*(job.wait() for job in bench.jobs.all()))
+    assert held(servo) == {TORQUE: 800, SPEED: 200}
+    servo.set(STATUS, 0x250)
+    await x.monitor.refresh()
+    await asyncio.gather(*(job.wait() for job in bench.jobs.all()))
+    assert held(servo) == WAS
+    assert not x.drive.owed
+
+
 async def test_another_drive_at_its_place_gets_nothing(
     bench: Bench, x: Member, servo: Servo
 ) -> None:
@@ -227,6 +246,25 @@ async def test_the_next_server_puts_back_what_a_killed_one_left(
     assert held(servo) == WAS
     assert not member.drive.owed
     assert not any((state / "owed").iterdir())
+    await again.close()
+
+
+@pytest.mark.parametrize(("age_s", "stops"), [(0.0, True), (3600.0, False)])
+async def test_the_next_server_stops_what_a_killed_one_left_moving(
+    x: Member, servo: Servo, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory,
+    age_s: float, stops: bool,
+) -> None:  # fmt: skip
+    """A homing that looks for a switch goes on in the drive; later it may be somebody else's."""
+    state = tmp_path_factory.mktemp("killed") / "state"
+    await killed(x, servo, tmp_path, state)
+    for note in (state / "owed").iterdir():
+        os.utime(note, (time.time() - age_s,) * 2)
+    servo.enable()
+    servo.written.clear()
+    again, member = await bench_with(servo, state)
+    await member.monitor.refresh()
+    assert servo.words() == ([2] if stops else [])
+    assert not member.axis.owes_stop
     await again.close()
 
 
