@@ -1,7 +1,9 @@
 """The slave information interface (EEPROM): access, identity words, checksum.
 
 Transactions of steps; no I/O. While the master reads, the EEPROM is taken from the slave's own
-processor, and always given back: some drives refuse states without it (AL status 0050h).
+processor, and always given back: some drives refuse states without it (AL status 0050h). Every
+frame that does not come back is sent again: after a command that was lost the data register would
+still hold another word.
 Source: ETG.1000.4 clause 6.4 (registers 0500h to 0508h), ETG.1000.6 clause 5.4 and ETG.2010.
 """
 
@@ -27,7 +29,8 @@ _READ, _WRITE, _ENABLE_WRITE = 0x0100, 0x0200, 0x0001
 _BUSY, _FAILED = 0x8000, 0x6000
 _TAKE, _MASTER, _SLAVE = b"\x02", b"\x00", b"\x01"
 _TIMEOUT_S, _POLL_S = 0.5, 0.0005
-_TRIES = 3
+_TRIES, _GONE_S, _AGAIN_S = 3, 1.0, 0.005
+"""Frames that came back untouched, and for how long lost ones are sent again, as in `station`."""
 _LEAST_MAILBOX, _RAM = 16, 0x1000
 
 
@@ -73,29 +76,29 @@ def read(word: int, count: int, clock: Callable[[], float]) -> Steps[bytes]:
         ProtocolError: the controller reports an error.
     """
     data = bytearray()
-    yield from _take()
+    yield from _take(clock)
     try:
         for place in range(word, word + count, 2):
             yield from _command(_READ, place, clock)
-            data += yield from _register(_DATA, 4)
+            data += yield from _register(_DATA, 4, clock)
     except DriveError:
-        yield Write(_OWNER, _SLAVE)
+        yield from _give_back()
         raise
-    yield Write(_OWNER, _SLAVE)
+    yield from _give_back()
     return bytes(data[: 2 * count])
 
 
 def write(word: int, value: int, clock: Callable[[], float]) -> Steps[None]:
     """Write one word; errors as `read`."""
-    yield from _take()
+    yield from _take(clock)
     try:
         yield from _ready(clock)
-        yield Write(_DATA, struct.pack("<H", value))
+        yield from _put(_DATA, struct.pack("<H", value), clock)
         yield from _command(_WRITE | _ENABLE_WRITE, word, clock)
     except DriveError:
-        yield Write(_OWNER, _SLAVE)
+        yield from _give_back()
         raise
-    yield Write(_OWNER, _SLAVE)
+    yield from _give_back()
 
 
 def write_alias(alias: int, clock: Callable[[], float]) -> Steps[int]:
@@ -144,15 +147,27 @@ def process_data_places(clock: Callable[[], float]) -> Steps[int]:
     return 0
 
 
-def _take() -> Steps[None]:
+def _take(clock: Callable[[], float]) -> Steps[None]:
     """From the slave's processor, by force: one that was switched off holds it for ever."""
-    yield Write(_OWNER, _TAKE)
-    yield Write(_OWNER, _MASTER)
+    yield from _put(_OWNER, _TAKE, clock)
+    yield from _put(_OWNER, _MASTER, clock)
+
+
+def _give_back() -> Steps[None]:
+    for _ in range(_TRIES):
+        if (yield Write(_OWNER, _SLAVE)) is not None:
+            return
 
 
 def _command(command: int, word: int, clock: Callable[[], float]) -> Steps[None]:
-    yield from _ready(clock)
-    yield Write(_CONTROL, struct.pack("<HI", command, word))
+    deadline = clock() + _GONE_S
+    while True:
+        # It may be carried out although its frame did not come back: never into a busy EEPROM.
+        yield from _ready(clock)
+        if (yield Write(_CONTROL, struct.pack("<HI", command, word))) is not None:
+            break
+        if clock() > deadline:
+            raise _gone()
     status = yield from _ready(clock)
     if status & _FAILED:
         raise ProtocolError(
@@ -164,10 +179,11 @@ def _command(command: int, word: int, clock: Callable[[], float]) -> Steps[None]
 def _ready(clock: Callable[[], float]) -> Steps[int]:
     deadline = clock() + _TIMEOUT_S
     while True:
-        status = int.from_bytes((yield from _register(_CONTROL, 2)), "little")
+        asked = clock()
+        status = int.from_bytes((yield from _register(_CONTROL, 2, clock)), "little")
         if not status & _BUSY:
             return status
-        if clock() > deadline:
+        if asked > deadline:  # not what was asked before this computer stood still for a moment
             raise LinkTimeout(
                 f"the drive's EEPROM stays busy for {_TIMEOUT_S:g} s",
                 remedy="try again; if it stays so, switch the drive off and on",
@@ -175,9 +191,26 @@ def _ready(clock: Callable[[], float]) -> Steps[int]:
         yield Pause(_POLL_S)
 
 
-def _register(register: int, size: int) -> Steps[bytes]:
-    for _ in range(_TRIES):
-        data = yield Read(register, size)
-        if data is not None:
-            return data
-    raise LinkLost("the station does not answer", remedy="check its supply and cable")
+def _put(register: int, data: bytes, clock: Callable[[], float]) -> Steps[None]:
+    """Write a register; what was written twice does no harm here."""
+    deadline = clock() + _GONE_S
+    while (yield Write(register, data)) is None:
+        if clock() > deadline:
+            raise _gone()
+        yield Pause(_AGAIN_S)
+
+
+def _register(register: int, size: int, clock: Callable[[], float]) -> Steps[bytes]:
+    deadline = clock() + _GONE_S
+    untouched = 0
+    while not (data := (yield Read(register, size, may_be_empty=True))):
+        untouched += data is not None
+        if untouched >= _TRIES or clock() > deadline:
+            raise _gone()
+        if data is None:
+            yield Pause(_AGAIN_S)
+    return data
+
+
+def _gone() -> LinkLost:
+    return LinkLost("the station does not answer", remedy="check its supply and cable")
