@@ -115,7 +115,8 @@ export function Frame({ children }: { children: ReactNode }) {
 
 function Pages() {
   const t = useT()
-  const drives = useDrives() ?? []
+  const known = useDrives()
+  const drives = known ?? []
   const drive = useChosen()
   const hasIo = useHasIo(drive)
   const canTune = useCanTune(drive)
@@ -124,7 +125,8 @@ function Pages() {
   const has = (name: Page) =>
     name === 'io' ? hasIo : name === 'tune' || name === 'response' ? canTune : true
   return (
-    <>
+    // The list of axes pushes the pages away when it comes.
+    <div className={known === null ? 'arriving' : 'arrived'}>
       <h2>{t('frame.axes')}</h2>
       <div className="axes">
         {drives.map((each) => (
@@ -140,7 +142,7 @@ function Pages() {
       {BENCH_PAGES.map((name) => (
         <PageLink key={name} name={name} />
       ))}
-    </>
+    </div>
   )
 }
 

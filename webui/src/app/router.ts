@@ -28,6 +28,8 @@ export interface Route {
   page: Page
   /** The axis of an axis page; on other pages the axis chosen last. */
   drive: string | null
+  /** What of the page was asked for, as a parameter's key; null for the page as it is. */
+  part: string | null
 }
 
 let lastDrive: string | null = null
@@ -38,9 +40,10 @@ function read(): Route {
   if (parts[0] === 'axis' && parts[1]) {
     lastDrive = parts[1]
     const page = AXIS_PAGES.find((name) => name === parts[2]) ?? 'overview'
-    return { page, drive: lastDrive }
+    return { page, drive: lastDrive, part: parts[3] || null }
   }
-  return { page: BENCH_PAGES.find((name) => name === parts[0]) ?? 'connect', drive: lastDrive }
+  const page = BENCH_PAGES.find((name) => name === parts[0]) ?? 'connect'
+  return { page, drive: lastDrive, part: null }
 }
 
 /** A guest's place is followed by a click: what is no address must not keep the page from opening. */
@@ -55,8 +58,10 @@ function decoded(part: string): string {
 export const isAxisPage = (page: Page): page is AxisPage =>
   (AXIS_PAGES as readonly string[]).includes(page)
 
-export function href(page: Page, drive: string | null): string {
-  return isAxisPage(page) ? `#/axis/${encodeURIComponent(drive ?? '')}/${page}` : `#/${page}`
+export function href(page: Page, drive: string | null, part = ''): string {
+  if (!isAxisPage(page)) return `#/${page}`
+  const whole = `#/axis/${encodeURIComponent(drive ?? '')}/${page}`
+  return part === '' ? whole : `${whole}/${encodeURIComponent(part)}`
 }
 
 export function go(page: Page, drive: string | null = lastDrive): void {
@@ -74,7 +79,8 @@ const listeners = new Set<() => void>()
 
 function changed(): void {
   const next = read()
-  if (next.page !== route.page || next.drive !== route.drive) route = next
+  const same = next.page === route.page && next.drive === route.drive && next.part === route.part
+  if (!same) route = next
   for (const listener of listeners) listener()
 }
 

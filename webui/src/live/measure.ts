@@ -8,7 +8,7 @@ export interface Measurement {
   mean: number
   rms: number
   peakToPeak: number
-  /** Of the first whole transition, 10 % to 90 %, seconds; null without one. */
+  /** Of the first whole transition, 10 % to 90 %, seconds; null without one, and for noise. */
   riseTime: number | null
   /** How far it goes beyond its new level, per cent of the step; null without a transition. */
   overshoot: number | null
@@ -101,6 +101,32 @@ function levels(values: Float64Array, min: number, max: number): [number, number
   return [level(0, LEVEL_BINS / 2), level(LEVEL_BINS / 2, LEVEL_BINS)]
 }
 
+/** A sample is at a level within this part of the step. */
+const AT_LEVEL = 0.2
+/** Mean square of the change from sample to sample, as part of the variance: 2 for white noise. */
+const RESTLESS = 0.5
+
+/**
+ * Whether the signal stays at its two levels, at least half of the time, and goes from sample to
+ * sample by little: noise, also the flicker of a last digit, has levels and edges without end but
+ * no step. The second is von Neumann's ratio (Ann. Math. Statist. 12, 1941, p. 367).
+ */
+function dwells(values: Float64Array, low: number, size: number): boolean {
+  let sum = 0
+  let squares = 0
+  let changes = 0
+  let at = 0
+  for (let i = 0; i < values.length; i++) {
+    const part = ((values[i] as number) - low) / size
+    if (Math.min(Math.abs(part), Math.abs(part - 1)) <= AT_LEVEL) at++
+    sum += part
+    squares += part * part
+    if (i > 0) changes += (part - ((values[i - 1] as number) - low) / size) ** 2
+  }
+  const variance = squares - (sum * sum) / values.length
+  return at >= values.length / 2 && changes <= RESTLESS * variance
+}
+
 const NO_STEP = { riseTime: null, overshoot: null, settling: null }
 
 function step(
@@ -112,7 +138,7 @@ function step(
   if (!(max > min) || values.length < 4) return NO_STEP
   const [low, high] = levels(values, min, max)
   const size = high - low
-  if (!(size > 0)) return NO_STEP
+  if (!(size > 0) || !dwells(values, low, size)) return NO_STEP
   const found = transition(times, values, low, size)
   if (!found) return NO_STEP
   const { begin, end, rising } = found

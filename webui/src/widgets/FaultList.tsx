@@ -1,9 +1,10 @@
 import type { ActiveFault } from '../api/schema'
 import { useT } from '../i18n'
 import { Icon } from './Icon'
+import { ParameterText } from './ParameterText'
 
 /** Faults and warnings with cause and remedy from the manual. */
-export function FaultList({ faults }: { faults: ActiveFault[] }) {
+export function FaultList({ drive, faults }: { drive: string; faults: ActiveFault[] }) {
   const t = useT()
   return (
     <ul className="faults">
@@ -18,7 +19,9 @@ export function FaultList({ faults }: { faults: ActiveFault[] }) {
               <h4>{t('faults.causes')}</h4>
               <ul>
                 {fault.causes.map((text) => (
-                  <li key={text}>{text}</li>
+                  <li key={text}>
+                    <ParameterText drive={drive} text={text} />
+                  </li>
                 ))}
               </ul>
             </>
@@ -28,14 +31,17 @@ export function FaultList({ faults }: { faults: ActiveFault[] }) {
               <h4>{t('faults.remedies')}</h4>
               <ul>
                 {fault.remedies.map((text) => (
-                  <li key={text}>{text}</li>
+                  <li key={text}>
+                    <ParameterText drive={drive} text={text} />
+                  </li>
                 ))}
               </ul>
             </>
           )}
           {fault.reset && (
             <p>
-              <strong>{t('faults.resetHow')}</strong> {fault.reset}
+              <strong>{t('faults.resetHow')}</strong>{' '}
+              <ParameterText drive={drive} text={fault.reset} />
             </p>
           )}
           <p className="dim">{t('source', { source: fault.source })}</p>

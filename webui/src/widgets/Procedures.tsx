@@ -8,6 +8,7 @@ import { JobNote, useJobEnd } from './JobNote'
 import { Panel } from './Panel'
 import { ProblemNote } from './ProblemNote'
 import { useAction } from './useAction'
+import { WaitingValues } from './WaitingValues'
 
 /** The procedures of a drive's profile; null until they are known. */
 export function useProcedures(drive: string): ProcedureInfo[] | null {
@@ -89,9 +90,9 @@ export function ProcedureDialog({
   return (
     <Modal opened onClose={onClose} title={known(t, 'procedure', procedure.title)}>
       <p>{procedure.help}</p>
+      <WaitingValues drive={drive} procedure={procedure.name} />
       {procedure.warning && <p className="note warn">{procedure.warning}</p>}
       {procedure.requires_stop && <p>{t('procedures.stopped')}</p>}
-      {procedure.notes && <p className="dim">{procedure.notes}</p>}
       <details>
         <summary>{t('procedures.steps', { count: procedure.steps.length })}</summary>
         <ol>
@@ -99,6 +100,7 @@ export function ProcedureDialog({
             <li key={i}>{step}</li>
           ))}
         </ol>
+        {procedure.notes && <p className="dim">{procedure.notes}</p>}
         <p className="dim">{t('source', { source: procedure.source })}</p>
       </details>
       {procedure.confirm.map((text, i) => (

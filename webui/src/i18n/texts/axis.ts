@@ -61,7 +61,34 @@ export const axis = {
   'log.warning': ['warning', '警告'],
   'log.error': ['error', '错误'],
   'procedures.title': ['Procedures', '操作流程'],
-  'procedures.stopped': ['The axis must stand still.', '轴必须静止。'],
+  'procedures.stopped': [
+    'Nothing moves: it is refused while the axis is enabled.',
+    '不会产生运动：轴使能时会被拒绝。',
+  ],
+  'procedures.which.write_settings': [
+    'Changed values in the drive that act from then on ({count}):',
+    '以下 {count} 个已修改的值已在驱动器中，执行后生效：',
+  ],
+  'procedures.none.write_settings': [
+    'No changed value waits for it: nothing will be different.',
+    '没有等待生效的修改值：执行后不会有任何变化。',
+  ],
+  'procedures.safe.write_settings': [
+    'No other value changes, and nothing is stored: switching the drive off and on brings back what was saved last.',
+    '其他值不变，也不会存储：驱动器断电重启后恢复上次保存的值。',
+  ],
+  'procedures.which.save': [
+    'Values that are not saved yet and will be there after the next start ({count}):',
+    '以下 {count} 个值尚未保存，保存后下次启动仍有效：',
+  ],
+  'procedures.none.save': [
+    'No value is known to be unsaved: what the drive has now is stored once more.',
+    '没有已知的未保存值：将再次存储驱动器当前的全部值。',
+  ],
+  'procedures.safe.save': [
+    'The drive stores all its other parameters along with them, as they are.',
+    '驱动器会同时存储其余所有参数的当前值。',
+  ],
   'procedures.steps': ['What is done ({count} {count|step|steps})', '执行内容（{count} 步）'],
   'procedures.run': ['Run', '执行'],
   'motion.tab.jog': ['Jog', '点动'],

@@ -48,6 +48,7 @@ export const scope = {
   'measure.rise': ['Rise 10–90 % [ms]', '上升 10–90 % [ms]'],
   'measure.overshoot': ['Overshoot [%]', '超调 [%]'],
   'measure.settling': ['Settling 2 % [ms]', '调节时间 2 % [ms]'],
+  'measure.noStep': ['no step', '无阶跃'],
   'measure.frequency': ['Frequency [Hz]', '频率 [Hz]'],
   'spectrum.window': ['Window', '窗函数'],
   'spectrum.hann': ['Hann', '汉宁 (Hann)'],

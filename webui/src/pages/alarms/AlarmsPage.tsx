@@ -35,11 +35,11 @@ export function AlarmsPage({ drive }: { drive: string }) {
       >
         <FaultResetProblem reset={reset} />
         {state?.fresh && faults.length === 0 && <p className="good-text">{t('faults.none')}</p>}
-        <FaultList faults={faults} />
+        <FaultList drive={drive} faults={faults} />
       </Panel>
       {warnings.length > 0 && (
         <Panel title={t('faults.warnings')}>
-          <FaultList faults={warnings} />
+          <FaultList drive={drive} faults={warnings} />
         </Panel>
       )}
       <div className="columns">

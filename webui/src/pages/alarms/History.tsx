@@ -6,6 +6,7 @@ import { useT } from '../../i18n'
 import { useRows } from '../../live/store'
 import { dateTime, shown } from '../../widgets/format'
 import { Panel } from '../../widgets/Panel'
+import { ParameterText } from '../../widgets/ParameterText'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProcedureButton } from '../../widgets/Procedures'
 import { useAction } from '../../widgets/useAction'
@@ -123,13 +124,17 @@ function Past({ drive, entry }: { drive: string; entry: PastFaultInfo }) {
           <h4>{t('faults.causes')}</h4>
           <ul>
             {entry.causes.map((text) => (
-              <li key={text}>{text}</li>
+              <li key={text}>
+                <ParameterText drive={drive} text={text} />
+              </li>
             ))}
           </ul>
           <h4>{t('faults.remedies')}</h4>
           <ul>
             {entry.remedies.map((text) => (
-              <li key={text}>{text}</li>
+              <li key={text}>
+                <ParameterText drive={drive} text={text} />
+              </li>
             ))}
           </ul>
         </details>

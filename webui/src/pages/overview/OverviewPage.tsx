@@ -45,7 +45,7 @@ export function OverviewPage({ drive }: { drive: string }) {
       )}
       {state && state.faults.length > 0 && (
         <Panel title={t('faults.active')} className="fault-panel">
-          <FaultList faults={state.faults} />
+          <FaultList drive={drive} faults={state.faults} />
           <FaultResetButton reset={reset} />
           <FaultResetProblem reset={reset} />
         </Panel>

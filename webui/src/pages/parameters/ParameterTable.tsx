@@ -17,17 +17,20 @@ import { Grid } from './Grid'
 export function ParameterTable({
   drive,
   rows: inProfileOrder,
+  asked,
 }: {
   drive: DriveSummary
   rows: ParameterRow[]
+  /** Key of the parameter that a link led to. */
+  asked: string | null
 }) {
   const t = useT()
-  const [search, setSearch] = useState('')
+  const [search, setSearch] = useState(asked ?? '')
   const [filter, setFilter] = useState<Filter>('all')
   const [group, setGroup] = useState<string | null>(null)
   const [asRaw, setAsRaw] = useState(false)
   const [live, setLive] = useState(false)
-  const [chosen, setChosen] = useState<string | null>(null)
+  const [chosen, setChosen] = useState<string | null>(asked)
   const searchBox = useRef<HTMLInputElement>(null)
   const rows = useMemo(() => settingsFirst(inProfileOrder), [inProfileOrder])
   const readings = useReadings(drive.id)

@@ -1,6 +1,7 @@
 import { SegmentedControl } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
+import { useRoute } from '../../app/router'
 import { useT } from '../../i18n'
 import { loadRows } from '../../live/live'
 import { contents, setJob, useDrive, useLink, useRows } from '../../live/store'
@@ -41,6 +42,7 @@ export function ParametersPage({ drive }: { drive: string }) {
   const summary = useDrive(drive)
   const link = useLink()
   const load = useAction()
+  const { part } = useRoute()
   const [view, setView] = useState<'table' | 'compare'>('table')
   useEffect(() => {
     if (link.open) {
@@ -67,7 +69,9 @@ export function ParametersPage({ drive }: { drive: string }) {
       </div>
       <ProblemNote problem={load.problem} onClose={load.clear} />
       {rows === null && load.busy && <p className="dim">{t('loading')}</p>}
-      {rows && summary && view === 'table' && <ParameterTable drive={summary} rows={rows} />}
+      {rows && summary && view === 'table' && (
+        <ParameterTable key={part} drive={summary} rows={rows} asked={part} />
+      )}
       {rows && summary && view === 'compare' && <Compare drive={summary} rows={rows} />}
     </div>
   )

@@ -22,6 +22,15 @@ describe('the camera of the scene', () => {
     }
   })
 
+  it('has the nearest of many axes before it, as far away as the nearest of three', () => {
+    for (const aspect of [1.6, 0.5]) {
+      const before = (count: number) =>
+        -cameraFor(-1, count, aspect).position[1] - ((count - 1) / 2) * 0.9
+      expect(before(7)).toBeGreaterThan(1.4 - 1e-9)
+      expect(before(7) * Math.min(aspect, 1.25)).toBeCloseTo(1.75, 5)
+    }
+  })
+
   it('never stands so far away that nothing can be told apart', () => {
     expect(distance(-1, 0.1)).toBeCloseTo(2.5 * distance(-1, 1.25))
   })

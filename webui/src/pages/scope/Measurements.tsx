@@ -7,15 +7,15 @@ import type { Shown } from './setup'
 /** Older than this counts as “nothing comes”. */
 const SILENT_S = 1
 
-const FIGURES: { name: string; of: (m: Measurement) => number | null; unit?: string }[] = [
+const FIGURES: { name: string; of: (m: Measurement) => number | null; step?: boolean }[] = [
   { name: 'min', of: (m) => m.min },
   { name: 'max', of: (m) => m.max },
   { name: 'mean', of: (m) => m.mean },
   { name: 'rms', of: (m) => m.rms },
   { name: 'pp', of: (m) => m.peakToPeak },
-  { name: 'rise', of: (m) => scaled(m.riseTime, 1000) },
-  { name: 'overshoot', of: (m) => m.overshoot },
-  { name: 'settling', of: (m) => scaled(m.settling, 1000) },
+  { name: 'rise', of: (m) => scaled(m.riseTime, 1000), step: true },
+  { name: 'overshoot', of: (m) => m.overshoot, step: true },
+  { name: 'settling', of: (m) => scaled(m.settling, 1000), step: true },
   { name: 'frequency', of: (m) => m.frequency },
 ]
 
@@ -90,9 +90,13 @@ export function Measurements({
                     </td>
                   </>
                 )}
-                {FIGURES.map(({ name, of }) => (
+                {FIGURES.map(({ name, of, step }) => (
                   <td key={name} className="num right" data-figure={name}>
-                    {figure(m && of(m))}
+                    {step && m && m.riseTime === null ? (
+                      <span className="dim">{t('measure.noStep')}</span>
+                    ) : (
+                      figure(m && of(m))
+                    )}
                   </td>
                 ))}
               </tr>

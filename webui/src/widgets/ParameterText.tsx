@@ -1,0 +1,20 @@
+import type { ParameterRow } from '../api/schema'
+import { href } from '../app/router'
+import { useRows } from '../live/store'
+import { namedParameters } from './named-parameters'
+
+const NONE: ParameterRow[] = []
+
+/** A text of the manual in which every parameter that it names leads to that parameter. */
+export function ParameterText({ drive, text }: { drive: string; text: string }) {
+  const rows = useRows(drive) ?? NONE
+  return namedParameters(text, rows).map((part, i) =>
+    part.row === null ? (
+      part.text
+    ) : (
+      <a key={i} href={href('parameters', drive, part.row.key)} title={part.row.name}>
+        {part.text}
+      </a>
+    ),
+  )
+}
