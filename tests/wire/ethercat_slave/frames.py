@@ -27,8 +27,11 @@ class ManualClock:
     def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
         return self.time_ns
 
-    def now(self) -> int:
-        return self.time_ns
+    def now(self, until_ns: int | None = None) -> int:
+        return self.time_ns if until_ns is None else min(self.time_ns, until_ns)
+
+    def ahead_s(self, wire_ns: int) -> float | None:
+        return (wire_ns - self.time_ns) * 1e-9
 
     def grid(self, start_ns: int, cycle_ns: int) -> int:
         return start_ns

@@ -16,8 +16,11 @@ class WireClock(Protocol):
         cycle of the segment (0 while there is none), ``age_ns`` how long ago the kernel saw it.
         """
 
-    def now(self) -> int:
-        """Present time without a frame."""
+    def now(self, until_ns: int | None = None) -> int:
+        """Present time without a frame; at most ``until_ns``, where that is given."""
+
+    def ahead_s(self, wire_ns: int) -> float | None:
+        """How long until this time of the wire; None where time follows the frames."""
 
     def grid(self, start_ns: int, cycle_ns: int) -> int:
         """Where a SYNC0 grid that the master placed at ``start_ns`` really begins."""
@@ -36,10 +39,15 @@ class RealClock:
         self._last = max(self._last, time.monotonic_ns() - self._start - age_ns)
         return self._last
 
-    def now(self) -> int:
+    def now(self, until_ns: int | None = None) -> int:
         """Present time."""
-        self._last = max(self._last, time.monotonic_ns() - self._start)
+        present = time.monotonic_ns() - self._start
+        self._last = max(self._last, present if until_ns is None else min(present, until_ns))
         return self._last
+
+    def ahead_s(self, wire_ns: int) -> float | None:
+        """From now."""
+        return (wire_ns + self._start - time.monotonic_ns()) * 1e-9
 
     def grid(self, start_ns: int, cycle_ns: int) -> int:
         """Where the master placed it."""
@@ -83,9 +91,15 @@ class LockstepClock:
             self._now += self.idle_frame_ns if idle else self.frame_ns
         return self._now
 
-    def now(self) -> int:
+    def now(self, until_ns: int | None = None) -> int:
         """Time of the last frame."""
+        del until_ns
         return self._now
+
+    def ahead_s(self, wire_ns: int) -> float | None:
+        """Nobody knows."""
+        del wire_ns
+        return None
 
     def grid(self, start_ns: int, cycle_ns: int) -> int:
         """The next whole multiple of the cycle: the master's own clock must not matter here."""
@@ -129,12 +143,18 @@ class SteadyClock:
             self._now = max(self._now, real - age_ns - self._behind)
         return self._now
 
-    def now(self) -> int:
+    def now(self, until_ns: int | None = None) -> int:
         """Time of the last frame while process data flow, else real time from there on."""
+        del until_ns
         real = self._real()
         if not self._flowing(real):
             self._now = max(self._now, real - self._behind)
         return self._now
+
+    def ahead_s(self, wire_ns: int) -> float | None:
+        """Nobody knows while process data flow, and without them there is nothing to wait for."""
+        del wire_ns
+        return None
 
     def grid(self, start_ns: int, cycle_ns: int) -> int:
         """The next whole multiple of the cycle."""

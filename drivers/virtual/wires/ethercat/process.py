@@ -131,6 +131,11 @@ class ProcessData:
         return self._seen_sync0 or not self._clock.sync0_requested
 
     @property
+    def operational(self) -> bool:
+        """It takes outputs and latches inputs at every SYNC0."""
+        return self._operational
+
+    @property
     def next_tick_ns(self) -> int | None:
         """Next SYNC0 that has work to do."""
         return self._clock.next_sync0(self._ticked_ns) if self._running else None

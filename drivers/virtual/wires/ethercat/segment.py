@@ -104,9 +104,18 @@ class Segment:
         buffer[6] |= 0x02  # a controller marks the source address as locally administered
         return bytes(buffer)
 
-    def settle(self) -> int:
-        """Let time pass for every slave without a frame; returns the present time."""
-        now = self.clock.now()
+    def next_tick_ns(self) -> int | None:
+        """When every slave in Op will have had its next SYNC0; None where none waits for one."""
+        latest = None
+        for slave in self.slaves:
+            tick = slave.process.next_tick_ns if slave.process.operational else None
+            if tick is not None and (latest is None or tick > latest):
+                latest = tick
+        return latest
+
+    def settle(self, until_ns: int | None = None) -> int:
+        """Let time pass for every slave without a frame, at most to ``until_ns``; returns it."""
+        now = self.clock.now(until_ns)
         self.line.update(now)
         for slave in self.slaves:
             slave.run(now)

@@ -95,33 +95,36 @@ class SegmentServer:
 
     def run(self) -> None:
         """Serve. Returns when told to stop."""
-        with select.epoll() as waiting:
-            wire = self._socket.fileno()
-            waiting.register(wire, select.EPOLLIN)
-            waiting.register(self._commands, select.EPOLLIN)
-            self._control.ready()
-            while not self._control.stopped:
-                events = waiting.poll(self._wait_s())
-                for descriptor, _ in events:
-                    if descriptor == wire:
-                        # One at a time: where one follows the other's answer none waits behind.
-                        self._answer()
-                    elif not self._command():
-                        return
-                if self._late:
-                    self._finish_late()
-                if not events:
-                    self._segment.settle()
+        wire, descriptors = self._socket.fileno(), (self._socket.fileno(), self._commands)
+        self._control.ready()
+        while not self._control.stopped:
+            # Drives work at their SYNC0, and not when the next frame waits for its answer.
+            tick = self._segment.next_tick_ns()
+            ready, _, _ = select.select(descriptors, (), (), self._wait_s(tick))
+            if wire in ready:
+                # One at a time: where one follows the other's answer none waits behind.
+                self._answer()
+            if self._commands in ready and not self._command():
+                return
+            if self._late:
+                self._finish_late()
+            if not ready:
+                # What the socket holds by now came after this SYNC0, and is to find it so.
+                self._segment.settle(tick)
 
     def close(self) -> None:
         """Free socket and interface."""
         self._socket.close()
         self._lock.release()
 
-    def _wait_s(self) -> float:
-        if not self._late:
-            return _IDLE_S
-        return max(0.0, min(_IDLE_S, (self._late[0][0] - time.monotonic_ns()) / 1e9))
+    def _wait_s(self, tick_ns: int | None) -> float:
+        wait_s = _IDLE_S
+        ahead_s = None if tick_ns is None else self._segment.clock.ahead_s(tick_ns)
+        if ahead_s is not None:
+            wait_s = min(wait_s, ahead_s)
+        if self._late:
+            wait_s = min(wait_s, (self._late[0][0] - time.monotonic_ns()) / 1e9)
+        return max(0.0, wait_s)
 
     def _command(self) -> bool:
         data = os.read(self._commands, 65536)
