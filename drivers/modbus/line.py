@@ -69,6 +69,8 @@ class Line:
         self.settings = settings
         self.echo: bool | None = None
         self.losses = 0
+        self.strays = 0
+        """How often something came that answered no question, such as an answer given up before."""
         self._on_change = on_change
         self._clock = clock
         self._sleep = sleep
@@ -275,7 +277,8 @@ class Line:
             own_echo_due = self.echo and not self._echo_taken
             if not own_echo_due and _looks_damaged(buffer, query, answer):
                 left = min(left, self.settings.gap_s)
-            data = port.read(left) if left > 0 else b""
+            # What came while this computer stood still is taken all the same.
+            data = port.read(max(left, 0.0)) if left > -_BABBLE_S else b""
             if not data:
                 return answer, bytes(buffer)
             buffer += data
@@ -300,6 +303,7 @@ class Line:
         self._last_failed = query.frame
         if received:
             self._restless = True
+            self.strays += 1
             counters.framing_errors += not answer.crc_errors
             shown = received[:24].hex(" ") + (" …" if len(received) > 24 else "")
             raise ProtocolError(
@@ -320,6 +324,7 @@ class Line:
             self.echo = False
         if answer.start or answer.end != len(received):
             counters.framing_errors += 1
+            self.strays += 1
             self._restless = self._restless or answer.end != len(received)
         took_ms = (self._quiet_since - sent_at) * 1000
         old = counters.round_trip_ms
@@ -341,8 +346,10 @@ class Line:
 
     def _settle(self, port: Port) -> None:
         """Throw away stray bytes; if there were any, wait until the line is silent."""
-        if not self._restless and not port.read(0.0):
-            return
+        if not self._restless:
+            if not port.read(0.0):
+                return
+            self.strays += 1
         until = self._clock() + _BABBLE_S
         pause = 0.0 if not self._counters else self.settings.gap_s
         while port.read(pause):

@@ -51,6 +51,8 @@ T = TypeVar("T")
 _TURN_S = 0.005
 _REOPEN_S = 0.25
 _STATIONS = range(1, 248)
+_ASKED_AGAIN = 4
+"""Silent addresses before something came that nobody asked for just then: one may be its sender."""
 _PLANS_KEPT = 256
 
 
@@ -143,21 +145,36 @@ class RegisterLink:
     ) -> list[Found]:
         """Ask each address once (1 to 247 unless told) and identify those that answer.
 
-        A refusal counts as an answer. ``stop_after`` ends the search after so many drives.
+        A refusal counts as an answer. Where an answer seems to have come too late, those that it
+        may be of are asked again at the end. ``stop_after`` ends the search after so many drives.
         """
         found: list[Found] = []
         damaged: list[int] = []
-        wanted = list(stations if stations is not None else _STATIONS)
-        for number, station in enumerate(wanted):
-            progress(number / max(1, len(wanted)), f"asking address {station}")
-            there = await self._run(partial(self._is_there, station))
+        silent: list[int] = []
+        again: list[int] = []
+        wanted = deque(stations if stations is not None else _STATIONS)
+        number, share, strays = 0, 0.0, self._line.strays
+        while wanted and (stop_after is None or len(found) < stop_after):
+            station = wanted.popleft()
+            share = max(share, number / (number + 1 + len(wanted)))
+            progress(share, f"asking address {station}")
+            number += 1
+            # Behind the last one nobody is kept waiting: late answers come in this time.
+            brief = wanted and station not in again
+            limit_s = self._settings.scan_timeout_s if brief else self._settings.timeout_s
+            there = await self._run(partial(self._is_there, station, limit_s))
             if there is None:
                 damaged.append(station)
-            if not there:
-                continue
-            found.append(await self._identify(station))
-            if stop_after is not None and len(found) >= stop_after:
-                break
+            elif there:
+                found.append(await self._identify(station))
+            if self._line.strays != strays:
+                strays = self._line.strays
+                again += silent[-_ASKED_AGAIN:]
+                wanted.extend(silent[-_ASKED_AGAIN:])
+                silent.clear()
+            if there is False and station not in again:
+                silent.append(station)
+        found.sort(key=lambda drive: drive.station)
         progress(1.0, _summary(found, damaged))
         return found
 
@@ -260,12 +277,12 @@ class RegisterLink:
                     batch.results[item] = _again(error)
             batch.todo.clear()
 
-    def _is_there(self, station: int) -> bool | None:
+    def _is_there(self, station: int, limit_s: float) -> bool | None:
         """True if it answers, False if not, None if something comes that is no good answer."""
         place = self._layout.place(station, self._layout.identity()[0])
         for _ in range(2):
             try:
-                self._line.seek(station, place.start, place.count, self._settings.scan_timeout_s)
+                self._line.seek(station, place.start, place.count, limit_s)
             except ProtocolError:
                 continue
             except LinkTimeout:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import struct
 import threading
 from collections.abc import Iterator
@@ -59,9 +58,9 @@ async def test_our_link_on_a_pymodbus_server(port: Path, opened: OpenLink) -> No
     )
     with null_modem(port, far):
         server = ModbusSerialServer(device, port=str(far))
-        serving_task = asyncio.create_task(server.serve_forever())
+        await server.serve_forever(background=True)  # it listens when this comes back
         try:
-            link = await opened(f"modbus://{port}?timeout_ms=500&retries=0")
+            link = await opened(f"modbus://{port}?timeout_ms=5000&retries=0")
             places = [Address(None, 0, "UINT16", 0x6400 + i) for i in (0, 1, 2)]
             long = Address(None, 0, "UINT32", 0x6403)
             assert await link.read_many(1, [*places, long]) == [
@@ -76,7 +75,6 @@ async def test_our_link_on_a_pymodbus_server(port: Path, opened: OpenLink) -> No
             assert caught.value.code == 2
         finally:
             await server.shutdown()
-            await serving_task
 
 
 def test_pymodbus_client_on_our_slave(port: Path) -> None:
