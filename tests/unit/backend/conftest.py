@@ -1,7 +1,13 @@
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import httpx
 import pytest
 
+from backend.api.app import make_app
+from backend.bench import Bench, Member
 from backend.drive import Drive
 from backend.ports import Port
 from drivers.link import Found
@@ -17,6 +23,7 @@ from profiles.schema import (
     WriteStep,
 )
 from tests.support.memory_link import MemoryLink
+from tests.support.servo import Servo, bench_with
 
 SPEC = LinkSpec(kind="mlink", watchdog=Watchdog(present=False), source="test")
 
@@ -91,6 +98,33 @@ def drive(profile: Profile, link: MemoryLink) -> Drive:
     drive = Drive("x", "X axis", profile, [Port(link, 1, SPEC)])
     drive.found = Found(1, serial=7, firmware="1.0")
     return drive
+
+
+@pytest.fixture
+async def servo() -> Servo:
+    return Servo()
+
+
+@pytest.fixture
+async def bench(servo: Servo, tmp_path: Path) -> AsyncIterator[Bench]:
+    """A bench with the servo as axis ``x``, whose monitor is at rest."""
+    bench, _ = await bench_with(servo, tmp_path)
+    yield bench
+    servo.mute = False
+    servo.gate.set()
+    await bench.close()
+
+
+@pytest.fixture
+def x(bench: Bench) -> Member:
+    return bench.member("x")
+
+
+@pytest.fixture
+async def http(bench: Bench) -> AsyncIterator[httpx.AsyncClient]:
+    transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
+    async with httpx.AsyncClient(transport=transport, base_url="http://test/api/v1") as client:
+        yield client
 
 
 def changed(profile: Profile, **fields: object) -> Profile:

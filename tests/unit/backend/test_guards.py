@@ -9,7 +9,6 @@ from pathlib import Path
 import httpx
 import pytest
 
-from backend.api.app import make_app
 from backend.bench import Bench
 from tests.support.servo import URL, Servo, bench_with
 
@@ -20,13 +19,6 @@ async def bench(tmp_path: Path) -> AsyncIterator[Bench]:
     bench.leases.take("x", "somebody else", "Anna")
     yield bench
     await bench.close()
-
-
-@pytest.fixture
-async def http(bench: Bench) -> AsyncIterator[httpx.AsyncClient]:
-    transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
-    async with httpx.AsyncClient(transport=transport, base_url="http://test/api/v1") as client:
-        yield client
 
 
 @pytest.mark.parametrize(

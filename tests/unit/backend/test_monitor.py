@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import cast
 
 import pytest
 
 from backend import monitor as watching
-from backend.bench import Bench, Member
+from backend.bench import Member
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from drivers.cia402 import State
-from tests.support.servo import STATUS, Servo, bench_with
+from tests.support.servo import STATUS, Servo
 
 STATUS_KEY, POSITION_KEY, ERROR_KEY = "6041:00", "6064:00", "603F:00"
 
@@ -52,26 +51,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 @pytest.fixture
-async def servo() -> Servo:
-    return Servo()
-
-
-@pytest.fixture
-async def bench(servo: Servo, tmp_path: Path) -> AsyncIterator[Bench]:
-    bench, _ = await bench_with(servo, tmp_path)
-    yield bench
-    await bench.close()
-
-
-@pytest.fixture
-async def x(bench: Bench, clock: Clock) -> Member:
-    x = bench.member("x")
-    await x.monitor.close()  # it is polled by hand here
-    return x
-
-
-@pytest.fixture
-async def exchange(x: Member, servo: Servo) -> Exchange:
+async def exchange(x: Member, servo: Servo, clock: Clock) -> Exchange:
     """Of a drive that was looked at as a whole just now."""
     exchange = Exchange({STATUS_KEY: servo.number(STATUS), POSITION_KEY: 0, ERROR_KEY: 0})
     x.axis.session = cast(CyclicSession, exchange)

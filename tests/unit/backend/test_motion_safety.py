@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
-from pathlib import Path
 from typing import Literal
 
 import httpx
 import pytest
 
-from backend.api.app import make_app
 from backend.axis import Envelope
 from backend.bench import Bench, Member
 from backend.cyclic import CyclicState
@@ -30,7 +27,6 @@ from tests.support.servo import (
     TARGET,
     VELOCITY_TARGET,
     Servo,
-    bench_with,
 )
 
 ENVELOPE = Envelope(5.0, 100.0, 50.0, 10.0)
@@ -38,37 +34,12 @@ JOG = JogSettings(1, 60.0, 600.0, 5.0, 50.0)
 ENABLES = 0x0F
 
 
-@pytest.fixture
-async def servo() -> Servo:
-    return Servo()
-
-
-@pytest.fixture
-async def bench(servo: Servo, tmp_path: Path) -> AsyncIterator[Bench]:
-    bench, _ = await bench_with(servo, tmp_path)
-    yield bench
-    servo.mute = False
-    await bench.close()
-
-
-@pytest.fixture
-def x(bench: Bench) -> Member:
-    return bench.member("x")
-
-
-@pytest.fixture
-async def http(bench: Bench) -> AsyncIterator[httpx.AsyncClient]:
-    transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
-    async with httpx.AsyncClient(transport=transport, base_url="http://test/api/v1") as client:
-        yield client
-
-
 def enabling(servo: Servo) -> int:
     return sum(word & ENABLES == ENABLES for word in servo.words())
 
 
 async def eventually(condition: object) -> None:
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(60):
         while not condition():  # type: ignore[operator]  # noqa: ASYNC110
             await asyncio.sleep(0.005)
 

@@ -6,13 +6,11 @@ import asyncio
 import os
 import shutil
 import time
-from collections.abc import AsyncIterator
 from pathlib import Path
 
 import httpx
 import pytest
 
-from backend.api.app import make_app
 from backend.bench import Bench, Member
 from backend.restoring import RestoreFailed
 from backend.tools.temporary import temporary
@@ -32,26 +30,6 @@ async def servo() -> Servo:
     for key, raw in WAS.items():
         servo.set(place(key), raw)
     return servo
-
-
-@pytest.fixture
-async def bench(servo: Servo, tmp_path: Path) -> AsyncIterator[Bench]:
-    bench, _ = await bench_with(servo, tmp_path)
-    yield bench
-    servo.mute = False
-    await bench.close()
-
-
-@pytest.fixture
-def x(bench: Bench) -> Member:
-    return bench.member("x")
-
-
-@pytest.fixture
-async def http(bench: Bench) -> AsyncIterator[httpx.AsyncClient]:
-    transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
-    async with httpx.AsyncClient(transport=transport, base_url="http://test/api/v1") as client:
-        yield client
 
 
 def place(key: str) -> tuple[int, int]:

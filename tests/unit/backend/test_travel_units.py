@@ -41,11 +41,6 @@ async def bench(tmp_path: Path) -> AsyncIterator[Bench]:
     await bench.close()
 
 
-@pytest.fixture
-def x(bench: Bench) -> Member:
-    return bench.member("x")
-
-
 def quiet() -> Progress:
     return lambda _share, _text: None
 
