@@ -105,13 +105,11 @@ class Segment:
         return bytes(buffer)
 
     def next_tick_ns(self) -> int | None:
-        """When every slave in Op will have had its next SYNC0; None where none waits for one."""
-        latest = None
-        for slave in self.slaves:
-            tick = slave.process.next_tick_ns if slave.process.operational else None
-            if tick is not None and (latest is None or tick > latest):
-                latest = tick
-        return latest
+        """Next SYNC0 of the last slave in Op, as they share their grid; None without one."""
+        for slave in reversed(self.slaves):
+            if slave.process.operational:
+                return slave.process.next_tick_ns
+        return None
 
     def settle(self, until_ns: int | None = None) -> int:
         """Let time pass for every slave without a frame, at most to ``until_ns``; returns it."""
