@@ -22,6 +22,9 @@ from drivers.link import Progress
 _WATCH_S = 0.1
 _RESTART_PAUSE_S = (0.2, 1.0, 3.0, 10.0)
 _FAREWELL_S = 3.0
+START_S = 30.0
+"""A child that hangs as it starts; one that dies is noticed at once. Loading alone takes a busy
+computer ten seconds, and a shorter time would have it begin anew for ever."""
 
 
 class HostProcess:
@@ -69,7 +72,7 @@ class HostProcess:
         """Process number of the child."""
         return None if self._process is None else self._process.pid
 
-    async def start(self, timeout_s: float) -> None:
+    async def start(self) -> None:
         """Start the child and wait until it has opened the interface.
 
         Raises:
@@ -79,7 +82,7 @@ class HostProcess:
             return
         self._wanted = True
         try:
-            await self._spawn(timeout_s)
+            await self._spawn()
         except BaseException:
             self._wanted = False
             await self._end(kill=True)
@@ -133,7 +136,7 @@ class HostProcess:
                 # Told to whoever waited, by this way or by what kept the request from being sent.
                 future.exception()
 
-    async def _spawn(self, timeout_s: float) -> None:
+    async def _spawn(self, timeout_s: float = START_S) -> None:
         loop = asyncio.get_running_loop()
         try:
             ours = await self._launch()
@@ -154,7 +157,8 @@ class HostProcess:
                 await asyncio.shield(self._ready)
         except TimeoutError:
             raise LinkTimeout(
-                f"the EtherCAT process for {self._interface} did not start within {timeout_s:g} s"
+                f"the EtherCAT process for {self._interface} did not start within {timeout_s:g} s",
+                remedy="end other programs that keep this computer busy, then try again",
             ) from None
         self.words = "open"
 
@@ -272,7 +276,7 @@ class HostProcess:
         for pause_s in itertools.chain(_RESTART_PAUSE_S, itertools.repeat(_RESTART_PAUSE_S[-1])):
             await asyncio.sleep(pause_s)
             try:
-                await self._spawn(8.0)
+                await self._spawn()
             except DriveError as error:
                 await self._end(kill=True)
                 self.words = error.message

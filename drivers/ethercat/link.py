@@ -28,7 +28,7 @@ from profiles.schema import LinkKind, Profile
 _Item = tuple[int, int, int | None]
 _CHUNK, _CHUNKS_AHEAD = 32, 2
 _SCHEME = "ethercat://"
-_OPEN_S, _ANSWER_S, _SCAN_S, _FOE_S = 8.0, 15.0, 60.0, 1800.0
+_ANSWER_S, _SCAN_S, _FOE_S = 15.0, 60.0, 1800.0
 
 
 class EthercatLink:
@@ -77,7 +77,7 @@ class EthercatLink:
             LinkLost: no such interface, switched off, or a permission is missing; with commands.
             Busy: another servodeck has it.
         """
-        await self._host.start(_OPEN_S)
+        await self._host.start()
 
     async def close(self) -> None:
         """Brake, leave OP, end the host. Calling again does nothing."""

@@ -18,7 +18,8 @@ from backend.demo import DemoBench
 from drivers.link import Address
 from drivers.urls import link_for
 from profiles.schema import DataType
-from tests.support.station import Live, until
+from tests.support.jogging import fast, jogged
+from tests.support.station import HANG_S, Live, until
 
 SPEED_RPM, RAMP_RPM_S = 300.0, 3000.0
 #: v·T + v²/2a with T = 0.2 s, in increments of 65536 to the revolution (004: default).
@@ -95,16 +96,12 @@ def test_killed_server_leaves_an_axis_that_stops_by_itself(
     server = ServerProcess(tmp_path / "state")
     x = add_drive(server, url)
     page = server.live()
-    page.send(type="jog_start", drive=x, direction=1, speed=SPEED_RPM, acceleration=RAMP_RPM_S,
-              travel_limit=30, torque_limit=150)  # fmt: skip
-    end = time.monotonic() + 1.5
-    while time.monotonic() < end:
-        page.send(type="jog_renew", drive=x)
-        time.sleep(0.02)
-    state = server.http.get(f"/drives/{x}/state").json()
-    assert abs(state["velocity"] - SPEED_RPM) < 30
-    page.socket.socket.close()
-    server.kill()
+    limits = {"speed": SPEED_RPM, "acceleration": RAMP_RPM_S, "travel_limit": 30,
+              "torque_limit": 150}  # fmt: skip
+    with jogged(server.http, page, x, lambda now, _: abs(now["velocity"] - SPEED_RPM) < 30,
+                **limits):  # fmt: skip
+        server.kill()
+    page.close()
     seen = asyncio.run(positions(url, 1.5))
     (_, first), (_, last) = seen[0], seen[-1]
     still = [t for t, p in seen if abs(p - last) > 65536 * 0.002]
@@ -120,7 +117,7 @@ def test_server_finds_its_drives_again_after_a_kill(drives: DemoBench, tmp_path:
     again = ServerProcess(tmp_path / "state")
     try:
         assert [drive["id"] for drive in again.http.get("/drives").json()] == [x]
-        until(lambda: again.http.get(f"/drives/{x}/state").json()["fresh"], 5)
+        until(lambda: again.http.get(f"/drives/{x}/state").json()["fresh"], HANG_S)
     finally:
         again.end()
 
@@ -134,28 +131,23 @@ def test_what_a_killed_server_left_in_the_drive_is_put_back(
     server = ServerProcess(tmp_path / "state")
     x = add_drive(server, url)
     page = server.live()
-    page.send(type="jog_start", drive=x, direction=1, speed=SPEED_RPM, acceleration=1500.0,
-              travel_limit=30, torque_limit=150)  # fmt: skip
-
-    def jogs() -> bool:
-        page.send(type="jog_renew", drive=x)
-        speed = server.http.get(f"/drives/{x}/state").json()["velocity"]
-        return speed is not None and abs(speed) > 0.5 * SPEED_RPM
-
-    until(jogs, 10)
-    page.socket.socket.close()
-    server.kill()
-    jogged = asyncio.run(number(url, 0x6083, "UINT32"))
-    assert jogged != before
+    limits = {"speed": SPEED_RPM, "acceleration": 1500.0, "travel_limit": 30, "torque_limit": 150}
+    with jogged(server.http, page, x, fast, **limits):
+        server.kill()
+    page.close()
+    changed = asyncio.run(number(url, 0x6083, "UINT32"))
+    assert changed != before
     again = ServerProcess(tmp_path / "state")
     try:
-        until(lambda: again.http.get(f"/drives/{x}/state").json()["fresh"], 5)
+        until(lambda: again.http.get(f"/drives/{x}/state").json()["fresh"], HANG_S)
         owed = {each["key"]: each["raw"] for each in again.http.get(f"/drives/{x}").json()["owed"]}
         assert owed["6083:00"] == before
         body = {"goal": "Switch on disabled"}
         again.http.post(f"/drives/{x}/transition", json=body).raise_for_status()
-        until(lambda: again.http.post(f"/drives/{x}/jobs/put-back").status_code in (202, 409), 5)
-        until(lambda: again.http.get(f"/drives/{x}").json()["owed"] == [], 10)
+        until(
+            lambda: again.http.post(f"/drives/{x}/jobs/put-back").status_code in (202, 409), HANG_S
+        )
+        until(lambda: again.http.get(f"/drives/{x}").json()["owed"] == [], HANG_S)
     finally:
         again.end()
     assert asyncio.run(number(url, 0x6083, "UINT32")) == before
@@ -168,7 +160,7 @@ def test_ended_server_stops_the_axis_first(drives: DemoBench, tmp_path: Path) ->
     body = {"mode": "PV", "target": 200, "acceleration": 3000, "deceleration": 3000,
             "travel_limit": 30, "torque_limit": 150, "timeout_s": 60, "consent": True}  # fmt: skip
     server.http.post(f"/drives/{x}/jobs/move", json=body).raise_for_status()
-    until(lambda: server.http.get(f"/drives/{x}/state").json()["velocity"] > 100, 5)
+    until(lambda: server.http.get(f"/drives/{x}/state").json()["velocity"] > 100, HANG_S)
     server.end()
     seen = asyncio.run(positions(url, 0.3))
     assert abs(seen[-1][1] - seen[0][1]) < 65536 * 0.002

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import partial
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from typing import Any
 
 import pytest
 
 from tests.api.test_scope_streams import blocks
-from tests.support.machine import OwnTime
-from tests.support.station import Live, Station, until
+from tests.support import jogging
+from tests.support.jogging import There, fast
+from tests.support.machine import OwnTime, within
+from tests.support.station import HANG_S, Live, Station, until
 
 JOG = {"speed": 300.0, "acceleration": 3000.0, "travel_limit": 20.0, "torque_limit": 150.0}
 #: v·T + v²/2a of JOG in revolutions, with T = 0.2 s.
@@ -41,36 +42,10 @@ def start_jog(page: Live, x: str, **changes: object) -> None:
     page.send(type="jog_start", drive=x, direction=1, **(JOG | changes))
 
 
-@contextmanager
 def jogged(
-    station: Station, page: Live, x: str, there: Callable[[Any, float], bool], **changes: object
-) -> Iterator[float]:
-    """Jog until it is ``there``, by the axis' state and where it began; still held inside.
-
-    Gives where it began. A machine that stalls for 200 ms ends a jog: then once more.
-    """
-    for _ in range(5):
-        start = position(station, x)
-        start_jog(page, x, **changes)
-        with page.holding(x):
-            page.send(type="ping", n=1)
-            page.wait("pong", n=1)  # what was sent before has begun
-            now = until(partial(seen, station, x, there, start), 20, "it gets there")
-            if now["moving_job"] is not None:
-                yield start
-                return
-        page.wait("jog_ended", drive=x)
-    raise AssertionError("the machine stalls too often")
-
-
-def seen(station: Station, x: str, there: Callable[[Any, float], bool], start: float) -> Any:
-    """The axis' state where it is there or is jogged no more, else None."""
-    now = station.state(x)
-    return now if now["moving_job"] is None or there(now, start) else None
-
-
-def fast(now: Any, _start: float) -> bool:
-    return abs(float(now["velocity"])) > 100
+    station: Station, page: Live, x: str, there: There, **changes: object
+) -> AbstractContextManager[float]:
+    return jogging.jogged(station.http, page, x, there, **(JOG | changes))
 
 
 def test_jog_moves_at_speed_and_stops_on_release(station: Station, x: str, page: Live) -> None:
@@ -94,7 +69,7 @@ def test_jog_moves_at_speed_and_stops_on_release(station: Station, x: str, page:
 def test_jog_stops_when_the_renewals_stop(station: Station, x: str, page: Live) -> None:
     with jogged(station, page, x, fast):
         pass
-    with OwnTime(*station.processes) as took:
+    with OwnTime(with_children=True) as took:
         ended = page.wait("jog_ended", drive=x)
     # 200 ms without a sign of life, then 300 rpm at 3000 rpm/s: 100 ms to stand still.
     assert took.s < 1.0
@@ -105,9 +80,7 @@ def test_jog_stops_when_the_renewals_stop(station: Station, x: str, page: Live) 
 def test_jog_stops_when_the_page_is_gone(station: Station, x: str) -> None:
     with station.live() as page, jogged(station, page, x, fast):
         pass
-    with OwnTime(*station.processes) as took:
-        until(lambda: at_rest(station, x), 10.0, "the axis stands")
-    assert took.s < 1.0
+    within(1.0, lambda: at_rest(station, x), "the axis stands")
     lease = station.ok(station.http.get(f"/drives/{x}"))["lease"]
     assert lease["holder"] is None
 
@@ -158,8 +131,8 @@ def test_pulled_cable_ends_within_the_lead(station: Station, x: str, page: Live)
         near = past_the_wire(station)
         time.sleep(1.0)
     station.drives.command(do="heal", wire="mlink://virtual0")
-    until(lambda: station.state(x)["fresh"], 15, "the drive answers again")
-    until(lambda: at_rest(station, x), 3)
+    until(lambda: station.state(x)["fresh"], HANG_S, "the drive answers again")
+    until(lambda: at_rest(station, x), HANG_S)
     assert past_the_wire(station) - near < LEAD_REV
 
 
@@ -171,7 +144,7 @@ def past_the_wire(station: Station) -> float:
 
 def test_somebody_else_cannot_move_a_held_axis(station: Station, x: str, page: Live) -> None:
     page.send(type="lease", drive=x, take=True)
-    until(lambda: station.ok(station.http.get(f"/drives/{x}"))["lease"]["holder"], 5)
+    until(lambda: station.ok(station.http.get(f"/drives/{x}"))["lease"]["holder"], HANG_S)
     answer = station.http.put(f"/drives/{x}/parameters/6081:00", json={"raw": 1})
     assert answer.status_code == 409
     assert "has control" in answer.json()["detail"]
@@ -268,7 +241,7 @@ def test_cancelled_move_stops_and_restores(station: Station, x: str) -> None:
     body = {"mode": "PP", "target": 15.0, "relative": True, "speed": 120, "acceleration": 3000,
             "deceleration": 3000, "travel_limit": 20, "torque_limit": 200}  # fmt: skip
     job = station.ok(station.http.post(f"/drives/{x}/jobs/move", json=body))
-    until(lambda: moving(station, x), 5)
+    until(lambda: moving(station, x), HANG_S)
     ended = station.ok(station.http.delete(f"/jobs/{job['id']}"))
     assert ended["state"] == "cancelled"
     now = station.state(x)
@@ -288,7 +261,7 @@ def test_two_motions_at_once_are_refused(station: Station, x: str) -> None:
 
 def test_enabling_while_a_fault_is_present_gives_the_cause(station: Station, x: str) -> None:
     station.drives.command(do="inject", axis="Feed screw", what="over_temperature")
-    until(lambda: station.state(x)["faults"], 5, "the fault shows")
+    until(lambda: station.state(x)["faults"], HANG_S, "the fault shows")
     now = station.state(x)
     assert now["state"] == "Fault"
     assert now["faults"][0]["causes"]
@@ -304,7 +277,7 @@ def test_scope_delivers_samples_with_their_times(station: Station, x: str, page:
     page.send(type="scope_start", subscription=5, channels=channels)
     info = page.wait("scope_info", subscription=5)
     assert [c["synchronous"] for c in info["channels"]] == [False, False]
-    until(lambda: page.receive() and len(page.binary) >= 5, 10)
+    until(lambda: page.receive() and len(page.binary) >= 5, HANG_S)
     page.send(type="scope_stop", subscription=5)
     import struct
 
@@ -326,8 +299,8 @@ def test_power_cut_while_jogging(station: Station, x: str, page: Live) -> None:
         time.sleep(1.0)
     ended = page.wait("jog_ended", drive=x)
     assert ended["problem"] is not None
-    until(lambda: station.state(x)["fresh"], 15, "the drive answers again")
-    now = until(lambda: at_rest(station, x) and station.state(x), 5)
+    until(lambda: station.state(x)["fresh"], HANG_S, "the drive answers again")
+    now = until(lambda: at_rest(station, x) and station.state(x), HANG_S)
     assert now["state"] != "Operation enabled"
     with jogged(station, page, x, fast):  # and it can be moved again without a restart of anything
         page.send(type="jog_stop", drive=x)

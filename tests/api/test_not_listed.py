@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
@@ -12,6 +11,7 @@ import pytest
 
 from profiles import load_profile
 from profiles.importer import export_eds
+from tests.support.jogging import jogged
 from tests.support.station import Station, until
 
 CAN = "canopen://virtual0"
@@ -90,20 +90,16 @@ def test_from_the_makers_file_to_a_moving_axis(station: Station) -> None:
 
 
 def _jog(station: Station, drive: str) -> None:
-    before = float(station.state(drive)["position"])
+    def at_speed(now: Any, start: float) -> bool:
+        return now["velocity"] == pytest.approx(120, rel=0.1) and now["position"] - start > 0.5
+
+    limits = {"speed": 120, "acceleration": 1200, "travel_limit": 10, "torque_limit": 100}
     with station.live() as page:
-        page.send(type="jog_start", drive=drive, direction=1, speed=120, acceleration=1200,
-                  travel_limit=10, torque_limit=100)  # fmt: skip
-        end = time.monotonic() + 1.2
-        while time.monotonic() < end:
-            page.send(type="jog_renew", drive=drive)
-            time.sleep(0.02)
-        moving = float(station.state(drive)["velocity"])
-        page.send(type="jog_stop", drive=drive)
+        with jogged(station.http, page, drive, at_speed, **limits) as before:
+            page.send(type="jog_stop", drive=drive)
         ended = page.wait("jog_ended", drive=drive)
     assert ended["problem"] is None, ended
-    assert moving == pytest.approx(120, rel=0.1)
-    until(lambda: abs(float(station.state(drive)["velocity"])) < 2, 3, "it stands again")
+    until(lambda: abs(float(station.state(drive)["velocity"])) < 2, 30, "it stands again")
     assert float(station.state(drive)["position"]) - before > 0.5
 
 

@@ -16,7 +16,8 @@ import pytest
 
 from backend.recording import capture
 from profiles import load_profile
-from tests.support.station import Station, until
+from tests.support.jogging import jogged
+from tests.support.station import HANG_S, Station, until
 
 CAN, MODBUS = "canopen://virtual0", "modbus://virtual0"
 AXIS, POSITION = "Low-voltage axis", "6064:00"
@@ -91,14 +92,12 @@ def test_units_are_rpm_and_times(station: Station, z: str) -> None:
 
 def test_jog_and_move(station: Station, z: str) -> None:
     with station.live() as page:
-        page.send(type="jog_start", drive=z, direction=1, speed=200, acceleration=4000,
-                  travel_limit=10, torque_limit=100)  # fmt: skip
-        with page.holding(z):
-            until(lambda: 180 < float(station.state(z)["velocity"]) < 220, 5, "200 rpm")
-        page.send(type="jog_stop", drive=z)
+        limits = {"speed": 200, "acceleration": 4000, "travel_limit": 10, "torque_limit": 100}
+        with jogged(station.http, page, z, lambda now, _: 180 < now["velocity"] < 220, **limits):
+            page.send(type="jog_stop", drive=z)
         ended = page.wait("jog_ended", drive=z)
         assert ended["problem"] is None, ended
-    until(lambda: abs(station.state(z)["velocity"]) < 5, 3)
+    until(lambda: abs(station.state(z)["velocity"]) < 5, HANG_S)
     before = float(station.state(z)["position"])
     body = {"mode": "PP", "target": 1.5, "relative": True, "speed": 600, "acceleration": 6000,
             "deceleration": 6000, "travel_limit": 3, "torque_limit": 100}  # fmt: skip
@@ -138,9 +137,9 @@ def test_the_scope_knows_which_bit_is_the_alarm(station: Station, z: str) -> Non
 
 def test_unplugged_adapter_recovers(station: Station, z: str) -> None:
     station.drives.command(do="pull", wire=CAN)
-    until(lambda: not station.state(z)["fresh"], 5)
+    until(lambda: not station.state(z)["fresh"], HANG_S)
     station.drives.command(do="heal", wire=CAN)
-    until(lambda: station.state(z)["fresh"], 20, "the drive answers again")
+    until(lambda: station.state(z)["fresh"], HANG_S, "the drive answers again")
 
 
 def test_the_missing_port_is_named_with_what_only_it_reaches(station: Station, z: str) -> None:
@@ -169,15 +168,15 @@ def test_a_restarted_node_is_told_and_read_anew(station: Station, z: str) -> Non
         texts = [entry["text"] for entry in station.ok(station.http.get("/log"))]
         return any("restarted" in text for text in texts)
 
-    until(told, 10, "the log tells of the restart")
+    until(told, HANG_S, "the log tells of the restart")
 
     # What was not saved is gone, and the page must not show it any more.
     def row() -> Any:
         rows = station.ok(station.http.get(f"/drives/{z}/parameters"))
         return next(r["reading"] for r in rows if r["key"] == key)
 
-    until(lambda: row()["raw"] not in (None, 777), 10, "the value that the drive has now")
-    until(lambda: station.state(z)["fresh"], 10)
+    until(lambda: row()["raw"] not in (None, 777), HANG_S, "the value that the drive has now")
+    until(lambda: station.state(z)["fresh"], HANG_S)
     assert not station.ok(station.http.get(f"/drives/{z}"))["unsaved"]
 
 
@@ -194,7 +193,7 @@ def test_a_mute_node_is_named_with_a_remedy(station: Station, z: str) -> None:
         assert problem["remedy"]
     finally:
         station.drives.command(do="mute", wire=CAN, on=False)
-    until(lambda: station.state(z)["fresh"], 20)
+    until(lambda: station.state(z)["fresh"], HANG_S)
 
 
 # --- what a fault leaves ----------------------------------------------------------------
@@ -241,7 +240,7 @@ def bundle_of(
             rows = station.ok(station.http.get("/bundles"))["bundles"]
             return next((row["name"] for row in rows if row["name"] not in old), None)
 
-        name = until(fresh, 30, "the bundle of the fault")
+        name = until(fresh, HANG_S, "the bundle of the fault")
         station.ok(station.http.post(f"/drives/{drive}/fault-reset", json={}))
         return opened(station.http.get(f"/bundles/{name}").raise_for_status().content)
 
@@ -271,7 +270,7 @@ def test_a_fault_keeps_what_was_read(
 ) -> None:
     drive = station.add(number, url, "ds_c", f"Broken {url[:3]}")
     try:
-        until(lambda: station.state(drive)["fresh"], 10)
+        until(lambda: station.state(drive)["fresh"], HANG_S)
         bundle = bundle_of(drive)
     finally:
         station.ok(station.http.delete(f"/drives/{drive}"))
@@ -291,7 +290,7 @@ def test_a_fault_keeps_every_cycle_of_a_can_bus(
     bus = station.ok(station.http.post("/buses/cyclic", json=body))
     assert bus["cyclic"]["running"]
     try:
-        until(lambda: station.state(z)["fresh"], 10)
+        until(lambda: station.state(z)["fresh"], HANG_S)
         bundle = bundle_of(z)
     finally:
         station.http.delete("/buses/cyclic", params={"url": CAN})

@@ -21,7 +21,7 @@ from backend.people.passwords import Passwords
 from backend.people.rights import Right, Role
 from backend.people.station import People
 from tests.support.servo import Servo, bench_with
-from tests.support.station import Live
+from tests.support.station import HANG_S, Live
 
 T = TypeVar("T")
 PASSWORD = "eleven blue horses"
@@ -40,7 +40,7 @@ class Caller:
         headers = {"Authorization": f"Bearer {token}"} if token else {}
         self.server = server
         self.http = httpx.Client(
-            base_url=f"{server.url}/api/v1", timeout=30, headers=headers,
+            base_url=f"{server.url}/api/v1", timeout=HANG_S, headers=headers,
             cookies={"servodeck": cookie} if cookie else None,
         )  # fmt: skip
         server.callers.append(self)
@@ -139,19 +139,19 @@ class GuardedServer:
 
         self._thread = threading.Thread(target=lambda: asyncio.run(main()), daemon=True)
         self._thread.start()
-        assert started.wait(20)
+        assert started.wait(HANG_S)
         return self
 
     def stop(self) -> None:
         for caller in self.callers:
             caller.http.close()
         self._server.should_exit = True
-        self._thread.join(15)
+        self._thread.join(HANG_S)
         assert not self._thread.is_alive(), "the server does not shut down"
 
     def run(self, work: Coroutine[Any, Any, T]) -> T:
         """Do something on the server's loop."""
-        return asyncio.run_coroutine_threadsafe(work, self._loop).result(20)
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result(HANG_S)
 
     def call(self, work: Callable[[], T]) -> T:
         """Call something on the server's loop."""
@@ -172,7 +172,7 @@ class GuardedServer:
         made = httpx.post(
             f"{self.url}/api/v1/session",
             json={"name": NAMES[role], "password": PASSWORD},
-            timeout=30,
+            timeout=HANG_S,
         )
         assert made.is_success, made.text
         return Caller(self, cookie=made.cookies["servodeck"])
@@ -190,6 +190,6 @@ class GuardedServer:
                        {"guest": "Gert", "allowed": allowed, "minutes": minutes})  # fmt: skip
         link = made["link"].removeprefix("/guest/")
         asked = {"link": link, "code": made["invitation"]["code"]}
-        joined = httpx.post(f"{self.url}/api/v1/guests", json=asked, timeout=30)
+        joined = httpx.post(f"{self.url}/api/v1/guests", json=asked, timeout=HANG_S)
         assert joined.is_success, joined.text
         return Caller(self, cookie=joined.cookies["servodeck"]), made["invitation"]["id"]

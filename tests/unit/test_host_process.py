@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from drivers.errors import LinkLost
+from drivers.errors import LinkLost, LinkTimeout
 from drivers.ethercat import protocol
 from drivers.ethercat.hostprocess import HostProcess
 from drivers.ethercat.ring import Ring
@@ -55,7 +55,7 @@ async def test_a_halt_comes_whole_after_a_motion_that_was_cancelled_while_it_was
     halt = asyncio.create_task(process.call({"op": "halt", "station": 1}, 5.0))
     unpacker = protocol.Unpacker()
     got: list[protocol.Message] = []
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(60):
         while not any(message["op"] == "halt" for message in got):
             data = await asyncio.get_running_loop().sock_recv(child, 1 << 16)
             got += unpacker.feed(data)
@@ -84,6 +84,40 @@ async def test_a_process_that_cannot_be_started_is_a_lost_link_and_leaves_nothin
         with pytest.raises(LinkLost, match=r"eth9 cannot be started: Too many open files"):
             await host()._spawn(1.0)
     assert descriptors() == before
+
+
+async def test_a_process_that_is_slow_to_start_is_waited_for_and_one_that_hangs_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A restart that gave up while the child was still loading would begin anew for ever."""
+    process = host()
+    sockets: list[socket.socket] = []
+
+    async def launched() -> socket.socket:
+        child = await connected(process)
+        assert process._socket is not None
+        sockets.extend((process._socket, child))
+        return process._socket
+
+    async def over() -> None:
+        assert process._reader is not None
+        process._reader.cancel()
+        await asyncio.wait([process._reader])
+        for end in sockets:
+            end.close()
+
+    monkeypatch.setattr(process, "_launch", launched)
+    with pytest.raises(LinkTimeout, match=r"did not start within 0\.01 s") as caught:
+        await process._spawn(0.01)
+    assert "keep this computer busy" in (caught.value.remedy or "")
+    await over()
+    starting = asyncio.create_task(process._spawn())
+    await asyncio.sleep(0.05)
+    assert not starting.done()
+    ready = protocol.pack({"event": "ready", "fifo": 0, "notes": []})
+    await asyncio.get_running_loop().sock_sendall(sockets[-1], ready)
+    await starting
+    await over()
 
 
 def test_a_ring_that_gets_no_memory_leaves_no_descriptor(monkeypatch: pytest.MonkeyPatch) -> None:

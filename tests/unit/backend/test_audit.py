@@ -154,7 +154,7 @@ def test_adding_never_waits_for_a_database_that_hangs(store: SickStore, audit: A
 
 async def test_an_answer_waits_until_its_entry_is_safe(store: SickStore, audit: AuditLog) -> None:
     audit.add(write(1))
-    assert await audit.settled(10.0)
+    assert await audit.settled(60.0)
     assert Trail(store).verify().entries == 1
     store.hanging = True
     audit.add(write(2))
@@ -169,7 +169,7 @@ async def test_a_database_that_fails_is_told_and_nothing_is_lost(
     store.sick = True
     audit.add(write(1))
     audit.add(write(2))
-    assert await audit.settled(10.0)  # safe in the file
+    assert await audit.settled(60.0)  # safe in the file
     assert "disk full" in audit.problem
     store.sick = False
     flush(audit)
