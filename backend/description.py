@@ -84,7 +84,9 @@ async def import_in_process(task: Task, limit_s: float = IMPORT_LIMIT_S) -> dict
         ) from None
     if "error" in answer:
         raise BadDescription(
-            str(answer["error"]), remedy="see “My drive is not listed” in the documentation"
+            str(answer["error"]),
+            remedy="check that it is the maker's ESI, EDS or DCF file for this very drive and was "
+            "copied whole, or ask the maker for it again",
         )
     result: dict[str, Any] = answer["ok"]
     return result

@@ -9,7 +9,7 @@ from pathlib import Path
 from playwright.sync_api import Page, expect
 
 from tests.browser.cable import Cable
-from tests.browser.driving import Bench, open_axis
+from tests.browser.driving import TOLD_MS, Bench, open_axis
 from tests.support.station import until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -49,6 +49,16 @@ CLASSES = """() => {
  const used = new Set([...document.querySelectorAll('[class*=m_]')].flatMap(e => [...e.classList]));
  const known = [...document.styleSheets].flatMap(s => [...s.cssRules]).map(r => r.cssText).join();
  return [...used].filter(c => /^m_[0-9a-f]+$/.test(c) && !known.includes(c))}"""
+
+#: Cumulative layout shift (Chromium's own measure) of what was drawn since; each page its own.
+SHIFTS = """() => {
+ window.shift = 0;
+ new PerformanceObserver(list => {
+  for (const entry of list.getEntries()) window.shift += entry.value;
+ }).observe({type: 'layout-shift'})}"""
+MOST_SHIFT = 0.05
+#: Round trip of a bad line, at which what a page asks for comes in several steps.
+SLOW_LINE_MS = 100
 
 
 def _pages(page: Page, drive: str) -> Iterator[str]:
@@ -107,9 +117,9 @@ def test_what_is_shown_is_not_taken_for_current_without_a_connection(
     expect(state).to_contain_text("Switch on disabled")
     expect(page.locator(".quantities")).to_be_visible()
     cable.cut()
-    expect(page.get_by_text("What is shown is from")).to_be_visible()
-    expect(state).to_contain_text("No answer")
-    expect(page.locator(".quantities")).to_have_class(re.compile("stale"))
+    expect(page.get_by_text("What is shown is from")).to_be_visible(timeout=TOLD_MS)
+    expect(state).to_contain_text("No answer", timeout=TOLD_MS)
+    expect(page.locator(".quantities")).to_have_class(re.compile("stale"), timeout=TOLD_MS)
     cable.mend()
     expect(state).to_contain_text("Switch on disabled")
 
@@ -189,3 +199,23 @@ def test_scope_draws_and_measures(laptop: Page, bench: Bench) -> None:
     lines = until(lambda: found if len(found := export()) > 20 else None, 15, "twenty samples")
     assert lines[0].startswith('"time_s","X Velocity actual value')
     assert all(line.count(",") == 3 for line in lines[1:])
+
+
+def test_nothing_moves_under_a_finger_while_a_page_opens(laptop: Page, x: str) -> None:
+    """Also where the answers come late: the pages that moved most before they were waited for."""
+    open_axis(laptop, x, "overview")
+    laptop.get_by_role("heading", level=1).wait_for()
+    network = laptop.context.new_cdp_session(laptop)
+    network.send("Network.enable")
+    slow = {"offline": False, "latency": SLOW_LINE_MS, "downloadThroughput": -1}
+    network.send("Network.emulateNetworkConditions", {**slow, "uploadThroughput": -1})
+    laptop.evaluate(SHIFTS)
+    moved: dict[str, float] = {}
+    for name in ("response", "io", "alarms", "tune", "audit", "connect"):
+        laptop.evaluate("window.shift = 0")
+        place = f"/axis/{x}/{name}" if name in AXIS else f"/{name}"
+        laptop.evaluate(f"location.hash = '#{place}'")
+        laptop.locator("main .arrived").get_by_role("heading", level=1).wait_for()
+        laptop.wait_for_timeout(4 * SLOW_LINE_MS)  # what comes late, comes now
+        moved[name] = laptop.evaluate("window.shift")
+    assert {name: shift for name, shift in moved.items() if shift > MOST_SHIFT} == {}

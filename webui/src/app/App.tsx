@@ -46,7 +46,7 @@ function Page() {
     const Shown = BENCH[page]
     return (
       <Guard key={page}>
-        <Arriving drive={null}>
+        <Arriving page={page} drive={null}>
           <Shown />
         </Arriving>
       </Guard>
@@ -65,7 +65,7 @@ function Page() {
   const Shown = AXIS[page]
   return (
     <Guard key={`${page} ${drive}`}>
-      <Arriving drive={drive}>
+      <Arriving page={page} drive={drive}>
         <OwedNote drive={drive} />
         <Shown drive={drive} />
       </Arriving>

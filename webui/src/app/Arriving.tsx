@@ -3,19 +3,33 @@ import { moment, outstanding } from '../api/outstanding'
 import { useT } from '../i18n'
 import { contents } from '../live/store'
 import './arriving.css'
+import type { Page } from './router'
 
 /** Looked at so often; a question that follows from an answer is asked within two looks. */
 const LOOK_MS = 30
 const QUIET_LOOKS = 2
-/** A page whose drive or network lets it wait longer shows what it has. */
-export const LONGEST_MS = 4000
+/**
+ * A page whose drive or network lets it wait longer shows what it has. What is wrong with a drive
+ * stands first on its page, so that nothing moves it, and must not wait for a drive that is dead.
+ */
+const LONGEST_MS = 8000
+const ALARMS_MS = 1000
 
 /**
  * A page is built out of sight until what it asked for on opening is there: parts that come
  * later would push away what a finger is on its way to, on a page that moves metal.
  */
-export function Arriving({ drive, children }: { drive: string | null; children: ReactNode }) {
+export function Arriving({
+  page,
+  drive,
+  children,
+}: {
+  page: Page
+  drive: string | null
+  children: ReactNode
+}) {
   const t = useT()
+  const longest = page === 'alarms' ? ALARMS_MS : LONGEST_MS
   // Taken before the page's own effects ask for anything.
   const [since] = useState(moment)
   const [there, setThere] = useState(false)
@@ -27,10 +41,10 @@ export function Arriving({ drive, children }: { drive: string | null; children: 
       const waits =
         !contents.link.open || (drive !== null && !contents.states.has(drive)) || outstanding(since)
       quiet = waits ? 0 : quiet + 1
-      if (quiet >= QUIET_LOOKS || performance.now() - begun > LONGEST_MS) setThere(true)
+      if (quiet >= QUIET_LOOKS || performance.now() - begun > longest) setThere(true)
     }, LOOK_MS)
     return () => clearInterval(timer)
-  }, [there, since, drive])
+  }, [there, since, drive, longest])
   return (
     <>
       {!there && (

@@ -50,6 +50,10 @@ export function ImportForm({
     look.run(async () => {
       setFile(chosen)
       setDevices([])
+      // What was said of another file must not be taken for this one's.
+      setId(null)
+      setMade(null)
+      start.clear()
       const told = await ask(
         api.POST('/api/v1/descriptions/devices', {
           params: { query: { file: chosen.name } },
