@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from backend.elapsed import elapsed_s
 from drivers.errors import Busy, NotAllowed
 
 #: A request that the holder does not answer passes control on after this long, if nothing moves.
@@ -18,7 +19,7 @@ LONGEST_HAND_OVER_S = 8 * 3600.0
 class Holder:
     """Who controls an axis. ``connection`` is the live websocket, ``since`` epoch seconds.
 
-    ``until`` ends a hand-over for a time (epoch seconds); then the axis goes back to ``giver``.
+    ``until`` ends a hand-over for a time (`elapsed_s`); then the axis goes back to ``giver``.
     """
 
     connection: str
@@ -30,11 +31,10 @@ class Holder:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """A request for control; epoch seconds. ``until`` is when silence counts as consent."""
+    """A request for control. ``until`` (`elapsed_s`) is when silence counts as consent."""
 
     connection: str
     person: str
-    since: float
     until: float
 
 
@@ -57,12 +57,12 @@ class Leases:
     def __init__(
         self,
         changed: Callable[[str], None] = lambda _drive: None,
-        clock: Callable[[], float] = time.time,
+        ticks: Callable[[], float] = elapsed_s,
     ) -> None:
         self._holders: dict[str, Holder] = {}
         self._asked: dict[str, Asked] = {}
         self._changed = changed
-        self._clock = clock
+        self._ticks = ticks
         #: Called with what somebody must be told of.
         self.on_notice: list[Callable[[Notice], None]] = []
 
@@ -87,7 +87,7 @@ class Leases:
         self.require(drive, connection)
         holder = self._holders.get(drive)
         if holder is None:
-            holder = self._set(drive, Holder(connection, person, self._clock()))
+            holder = self._set(drive, Holder(connection, person, time.time()))
         return holder
 
     def give(self, drive: str, connection: str) -> None:
@@ -97,7 +97,7 @@ class Leases:
             return
         asked = self._asked.get(drive)
         if asked is not None:
-            self._set(drive, Holder(asked.connection, asked.person, self._clock()))
+            self._set(drive, Holder(asked.connection, asked.person, time.time()))
             self._tell(asked.connection, drive, "given", holder.person)
         elif holder.giver is not None:
             self._return(drive, holder)
@@ -140,8 +140,8 @@ class Leases:
                 remedy="wait for the answer",
             )
         if other is None:
-            now = self._clock()
-            self._asked[drive] = Asked(connection, person, now, now + ANSWER_WITHIN_S)
+            until = self._ticks() + ANSWER_WITHIN_S
+            self._asked[drive] = Asked(connection, person, until)
             self._tell(holder.connection, drive, "asked", person)
             self._changed(drive)
 
@@ -172,11 +172,10 @@ class Leases:
             )
         if to == connection:
             return
-        now = self._clock()
-        until = None if time_s is None else now + time_s
+        until = None if time_s is None else self._ticks() + time_s
         # Back to whoever gave it first: a chain of loans would end nobody knows where.
         giver = None if time_s is None else holder.giver or holder
-        self._set(drive, Holder(to, person, now, until, giver))
+        self._set(drive, Holder(to, person, time.time(), until, giver))
         self._tell(to, drive, "given", holder.person)
 
     def override(self, drive: str, connection: str, person: str) -> None:
@@ -184,7 +183,7 @@ class Leases:
         before = self._holders.get(drive)
         if before is not None and before.connection == connection:
             return
-        self._set(drive, Holder(connection, person, self._clock()))
+        self._set(drive, Holder(connection, person, time.time()))
         if before is not None:
             self._tell(before.connection, drive, "overridden", person)
 
@@ -213,7 +212,7 @@ class Leases:
 
     def tick(self, moves: Callable[[str], bool]) -> None:
         """Let hand-overs and requests end whose time has come, where nothing moves."""
-        now = self._clock()
+        now = self._ticks()
         for drive, holder in list(self._holders.items()):
             if holder.until is not None and now >= holder.until and not moves(drive):
                 self._tell(holder.connection, drive, "expired", "")
@@ -224,7 +223,7 @@ class Leases:
         for drive, asked in list(self._asked.items()):
             held = self._holders.get(drive)
             if held is not None and now >= asked.until and not moves(drive):
-                self._set(drive, Holder(asked.connection, asked.person, now))
+                self._set(drive, Holder(asked.connection, asked.person, time.time()))
                 self._tell(held.connection, drive, "overridden", asked.person)
                 self._tell(asked.connection, drive, "given", held.person)
 
@@ -232,7 +231,7 @@ class Leases:
         giver = holder.giver
         if giver is None:
             raise ValueError("nobody to return it to")
-        self._set(drive, Holder(giver.connection, giver.person, self._clock()))
+        self._set(drive, Holder(giver.connection, giver.person, time.time()))
         self._tell(giver.connection, drive, "returned", holder.person)
 
     def _set(self, drive: str, holder: Holder) -> Holder:

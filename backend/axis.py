@@ -240,6 +240,37 @@ class Axis(PowerState):
             self.owes_stop = True
             raise
 
+    @asynccontextmanager
+    async def enabled_cyclic(
+        self, session: CyclicSession, mode: Mode, timeout_s: float
+    ) -> AsyncIterator[None]:
+        """Operation enabled through the loop; braked and disabled on every way out.
+
+        Raises:
+            NotAllowed: it cannot be enabled, or the loop ended the motion. Where the drive has a
+                fault, the message names it.
+        """
+        try:
+            await self.go_to_cyclic(session, State.OPERATION_ENABLED, mode, timeout_s)
+            yield
+        except NotAllowed as error:
+            await self._name_fault(error)
+            raise
+        finally:
+            await self.leave_cyclic(session, timeout_s)
+
+    async def _name_fault(self, error: NotAllowed) -> None:
+        """The loop knows only that the drive left Operation enabled; the drive knows why."""
+        try:
+            if await self.state() not in (State.FAULT, State.FAULT_REACTION):
+                return
+            faults = [f"{fault.code} {fault.name}" for fault in await self.active_faults()]
+        except DriveError:
+            return
+        if faults and faults[0] not in error.message:
+            error.message += f" ({', '.join(faults)})"
+            error.args = (error.message,)
+
     async def leave_cyclic(self, session: CyclicSession, timeout_s: float) -> None:
         """Brake and take the power off through the loop; nothing interrupts this.
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
+import logging
+from collections import Counter
+from collections.abc import Awaitable, Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,6 +37,8 @@ from drivers.link import Found, Link, LinkEvent, NeedsProfile
 from drivers.modbus.link import RegisterLink
 from drivers.urls import link_for
 from profiles.loader import ProfileError
+
+log = logging.getLogger(__name__)
 
 
 class Member:
@@ -78,6 +82,8 @@ class Bench:
         self.on_drives: list[Callable[[], None]] = []
         self.jobs = JobRunner(self._job_changed, self._permit)
         self._stops: set[asyncio.Task[dict[str, str]]] = set()
+        #: Drives of which something is changed that no motion may begin with.
+        self._still: Counter[str] = Counter()
         #: Drives that are being removed.
         self._parting: set[str] = set()
         #: Bus and station of drives that left the bench and never took their stop.
@@ -209,6 +215,20 @@ class Bench:
         """
         await self.exchanges.stop(url)
 
+    @contextlib.contextmanager
+    def keeping_still(self, member: Member) -> Iterator[None]:
+        """Nothing begins to move this axis meanwhile, as what it relies on is changed. STOP works.
+
+        Raises:
+            Busy: something moves it already.
+        """
+        self.require_idle(member)
+        self._still[member.drive.id] += 1
+        try:
+            yield
+        finally:
+            self._still[member.drive.id] -= 1
+
     def require_idle(self, member: Member) -> None:
         """Nothing moves this axis.
 
@@ -295,6 +315,7 @@ class Bench:
         if check is not None:
             await check(drive, port)
             self._require_free(link, url, station)
+            self.require_idle(member)
         drive.ports = (*drive.ports, port)
         self._remember()
         self.journal.add(f"{drive.name} is reached over {url} too", drive=drive.id)
@@ -417,6 +438,12 @@ class Bench:
         """
         member = self.member(drive_id)
         self._require_stays(member)
+        if self._still[drive_id]:
+            raise Busy(
+                f"{member.drive.name}: its settings are just being changed",
+                drive=member.drive.name,
+                remedy="try again when they have been",
+            )
         self.exchanges.require_calm(member.drive.name, self._urls(member.drive))
         member.axis.permit()
 
@@ -467,7 +494,11 @@ class Bench:
 
     def _job_changed(self, job: Job) -> None:
         for listener in self.on_job:
-            listener(job)
+            try:
+                listener(job)
+            except Exception:
+                # The next one may be who stops it, and the job itself must come to its end.
+                log.exception("a change of the job %s could not be told", job.id)
 
     def _lease_changed(self, drive_id: str) -> None:
         self._witness.lease_changed(drive_id, self.leases.holder(drive_id))

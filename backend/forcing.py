@@ -283,8 +283,17 @@ class ForcingSessions:
                     await shielded(session.shut, CLEANUP_TIMEOUT_S, axis.drive.name)
         finally:
             # The real terminals must count again even if somebody enabled the axis meanwhile.
-            await shielded(lambda: apply_settings(axis, keys), CLEANUP_TIMEOUT_S, axis.drive.name)
+            await shielded(lambda: self._act(session), CLEANUP_TIMEOUT_S, axis.drive.name)
         return {"reason": session.reason}
+
+    async def _act(self, session: ForcingSession) -> None:
+        """Make what was put back act; where that fails it is owed like the values themselves."""
+        drive = session.axis.drive
+        try:
+            await apply_settings(session.axis, session.keys)
+        except BaseException:
+            drive.owed.add(session.before, unapplied=True)
+            raise
 
     async def _watch(self, session: ForcingSession, progress: Progress) -> None:
         """Until there is a reason to end."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from backend.axis import Axis
 from backend.mechanics_calc import GearPlan, GearValue, Mechanics, plan_gear
+from backend.restoring import CLEANUP_TIMEOUT_S, shielded
 from backend.units import encoder_counts
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed, Rejected
@@ -67,39 +68,51 @@ async def write_gear(axis: Axis, values: Sequence[GearValue]) -> GearChange:
     for value in values:
         before[value.parameter.key] = await drive.raw(value.parameter.key)
     done: list[str] = []
-    try:
-        for value in values:
-            key = value.parameter.key
-            if before[key] == value.raw:
-                continue
-            done.append(key)
-            kept: Raw | None = (await drive.write(key, value.raw)).raw
-            if kept != value.raw:
-                raise Rejected(
-                    f"{drive.name}: {key} {value.parameter.name} keeps {kept} instead of "
-                    f"{value.raw}",
-                    code=0,
-                    drive=drive.name,
-                    parameter=key,
-                    value=value.raw,
-                    remedy="see its range; the gear is as it was before",
-                )
-    except DriveError as error:
-        await _put_back(axis, {key: before[key] for key in reversed(done)}, error)
-        raise
-    finally:
-        axis.forget()
+    # For the next server, should this one be killed with half a gear written.
+    with drive.owed.lent(before):
+        try:
+            await _write_all(axis, values, before, done)
+        except BaseException as error:
+            # Half a gear is another scale: whoever moves next would go to another place.
+            taken_back = _put_back(axis, {key: before[key] for key in reversed(done)}, error)
+            await shielded(lambda: taken_back, CLEANUP_TIMEOUT_S, drive.name)
+            raise
+        finally:
+            axis.forget()
     waits = {key: why for key, why in drive.pending.items() if key in done}
     return GearChange({key: before[key] for key in done}, waits)
 
 
-async def _put_back(axis: Axis, before: dict[str, int], error: DriveError) -> None:
+async def _write_all(
+    axis: Axis, values: Sequence[GearValue], before: dict[str, int], done: list[str]
+) -> None:
+    """``done`` gets the key of every write before it goes out."""
+    drive = axis.drive
+    for value in values:
+        key = value.parameter.key
+        if before[key] == value.raw:
+            continue
+        done.append(key)
+        kept: Raw | None = (await drive.write(key, value.raw)).raw
+        if kept != value.raw:
+            raise Rejected(
+                f"{drive.name}: {key} {value.parameter.name} keeps {kept} instead of {value.raw}",
+                code=0,
+                drive=drive.name,
+                parameter=key,
+                value=value.raw,
+                remedy="see its range; the gear is as it was before",
+            )
+
+
+async def _put_back(axis: Axis, before: dict[str, int], error: BaseException) -> None:
     left: list[str] = []
     for key, raw in before.items():
         try:
             await axis.drive.write(key, raw)
         except DriveError as other:
             left.append(f"{key} (was {raw}): {other.message}")
-    if left:
+            axis.drive.owed.add({key: raw})
+    if left and isinstance(error, DriveError):
         error.message += f"; not put back: {'; '.join(left)}"
         error.args = (error.message,)

@@ -8,6 +8,7 @@ from backend.api import models
 from backend.api.errors import problem_of
 from backend.bench import Bench, Member
 from backend.drive import Drive
+from backend.elapsed import moment_of
 from backend.jobs import Job
 from backend.journal import Entry
 from backend.matching import match_profiles
@@ -76,9 +77,9 @@ def lease(bench: Bench, drive: str, connection: str | None) -> models.Lease:
         since=moment(holder.since),
         mine=holder.connection == connection,
         connection=holder.connection,
-        until=None if holder.until is None else moment(holder.until),
+        until=None if holder.until is None else moment(moment_of(holder.until)),
         asked_by=None if asked is None else asked.person,
-        asked_until=None if asked is None else moment(asked.until),
+        asked_until=None if asked is None else moment(moment_of(asked.until)),
     )
 
 

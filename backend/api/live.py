@@ -101,8 +101,10 @@ class LiveHub:
         finally:
             del self.connections[name]
             self._sockets.disown(name)
-            self.people.left(connection)
-            await connection.close()
+            try:
+                self.people.left(connection)
+            finally:
+                await connection.close()
 
     def _ended(self, session: str) -> None:
         """A session is over: its pages hold nothing any more, and hear nothing."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import time
-from collections.abc import Coroutine, Mapping
+from collections.abc import Coroutine, Iterator, Mapping
 from datetime import UTC, datetime
 from functools import partial
 from typing import Protocol
@@ -38,6 +39,7 @@ from backend.api.live_people_messages import (
 from backend.api.live_shared import Shared, only
 from backend.api.people_record import PeopleRecord
 from backend.bench import Bench
+from backend.elapsed import moment_of
 from backend.jobs import Job
 from backend.people.errors import Forbidden, TooOften
 from backend.people.identity import Identity
@@ -47,6 +49,8 @@ from backend.people.support import Invitation, Said
 from backend.people.throttle import Bucket
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
+
+log = logging.getLogger(__name__)
 
 #: With the quarter second between looks, a silent connection loses control within 2 s, and what
 #: moves by its command ends.
@@ -144,14 +148,14 @@ class PeopleLive:
             allowed=sorted(each.allowed),
             by=each.by,
             created=_moment(each.created),
-            expires=_moment(each.expires),
+            expires=_moment(moment_of(each.expires)),
             state=each.state,
             why_ended=each.why_ended,
             grant=None
             if grant is None
             else GrantView(
                 rights=sorted(grant.rights),
-                until=_moment(grant.until),
+                until=_moment(moment_of(grant.until)),
                 drive=grant.drive,
                 by=grant.by,
             ),
@@ -161,13 +165,17 @@ class PeopleLive:
         )
 
     def left(self, page: Page) -> None:
-        """A page is gone: what it moved stops, what it held is free."""
-        self._support.release_all(page.id, "the connection on site closed")
-        self._end_motions(page, "is gone")
-        self._let_go(page, "is gone")
-        self._talk.pop(page.id, None)
-        self._bench.leases.drop(page.id)
-        self.changed()
+        """A page is gone: what it moved stops, what it held is free.
+
+        Each of it whatever becomes of the rest: a defect in what is told must not leave a motion.
+        """
+        with contextlib.ExitStack() as then:
+            then.callback(self.changed)
+            then.callback(self._bench.leases.drop, page.id)
+            then.callback(self._let_go, page, "is gone")
+            then.callback(self._end_motions, page, "is gone")
+            self._talk.pop(page.id, None)
+            self._support.release_all(page.id, "the connection on site closed")
 
     def _fell_silent(self, page: Page) -> None:
         """A page says nothing any more, though its line may look open for some seconds yet."""
@@ -408,9 +416,12 @@ class PeopleLive:
             now = time.monotonic()
             for page in list(self._pages.values()):
                 if now - page.heard > SILENCE_S:
-                    self._fell_silent(page)
-            leases.tick(lambda drive: self._bench.jobs.moving(drive) is not None)
-            self._support.tick()
+                    with _going_on():
+                        self._fell_silent(page)
+            with _going_on():
+                leases.tick(lambda drive: self._bench.jobs.moving(drive) is not None)
+            with _going_on():
+                self._support.tick()
             await asyncio.sleep(_LOOK_S)
 
     async def _watch_holds(self) -> None:
@@ -418,7 +429,8 @@ class PeopleLive:
             await self._hold_pressed.wait()
             self._hold_pressed.clear()
             while self._support.any_hold:
-                self._support.watch()
+                with _going_on():
+                    self._support.watch()
                 await asyncio.sleep(_HOLD_LOOK_S)
 
     async def _tend(self) -> None:
@@ -432,6 +444,15 @@ class PeopleLive:
         task: asyncio.Task[object] = asyncio.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+
+
+@contextlib.contextmanager
+def _going_on() -> Iterator[None]:
+    """One defect must not end the watch over everything that moves: it is logged."""
+    try:
+        yield
+    except Exception:
+        log.exception("what ends by itself could not be ended")
 
 
 def require_control(people: People, identity: Identity, drive: str) -> None:

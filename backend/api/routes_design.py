@@ -109,10 +109,10 @@ async def preview_notches(member: TheMember, request: NotchPreviewRequest) -> No
 @router.put("/drives/{drive_id}/notches")
 async def write_notches(bench: TheBench, member: Controlled, request: NotchWrite) -> Undo:
     """Write all notches and make them act; saving is another step."""
-    bench.require_idle(member)
-    before = await notch.write_notches(
-        member.axis, _notches(request.notches), meaning_of(member.drive)
-    )
+    with bench.keeping_still(member):
+        before = await notch.write_notches(
+            member.axis, _notches(request.notches), meaning_of(member.drive)
+        )
     await _note(bench, member, "notches", before)
     bench.journal.add(f"{member.drive.name}: notches written", drive=member.drive.id)
     return Undo(before=before)
@@ -137,7 +137,6 @@ async def read_gains(member: TheMember) -> GainInfo:
 @router.put("/drives/{drive_id}/gains")
 async def write_gains(bench: TheBench, member: Controlled, request: GainWrite) -> Undo:
     """Write gains or a stiffness level and make them act; saving is another step."""
-    bench.require_idle(member)
     if (request.gains is None) == (request.level is None):
         raise OutOfRange("give either gains or a level", drive=member.drive.name)
     if request.gains is not None:
@@ -148,7 +147,8 @@ async def write_gains(bench: TheBench, member: Controlled, request: GainWrite) -
         )
     else:
         raw = gains.plan_level(member.drive, request.level or 0)
-    before = await write_settings(member.axis, raw)
+    with bench.keeping_still(member):
+        before = await write_settings(member.axis, raw)
     await _note(bench, member, "gains", before)
     bench.journal.add(f"{member.drive.name}: gains written", drive=member.drive.id)
     return Undo(before=before)
@@ -161,9 +161,9 @@ def _gains(speed_hz: float, integral_hz: float, position_1_s: float, inertia_kgm
 @router.post("/drives/{drive_id}/tune/undo")
 async def undo_tuning(bench: TheBench, member: Controlled, request: Undo) -> Undo:
     """Put back what a change returned as `before`; returns what was there until now."""
-    bench.require_idle(member)
-    now = {key: await member.drive.raw(key) for key in request.before}
-    await put_back(member.axis, request.before)
+    with bench.keeping_still(member):
+        now = {key: await member.drive.raw(key) for key in request.before}
+        await put_back(member.axis, request.before)
     await _note(bench, member, "undo", now)
     bench.journal.add(f"{member.drive.name}: tuning taken back", drive=member.drive.id)
     return Undo(before=now)

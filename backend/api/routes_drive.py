@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Awaitable, Callable, Iterable
 
 from fastapi import APIRouter
@@ -186,16 +187,13 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
             remedy="send exactly one of the two",
         )
     parameter = drive.parameter(key)
-    if drive.matters_to_motion(parameter.key):
-        bench.require_idle(member)
-    if drive.commands_motion(parameter.key):
-        await _require_disabled(member, parameter.key)
     old = drive.readings.get(parameter.key)
-    if request.raw is not None:
-        reading = await drive.write(key, request.raw)
-    else:
-        reading = await drive.write(key, request.value if request.value is not None else 0,
-                                    raw=False)  # fmt: skip
+    value, raw = (request.value, False) if request.raw is None else (request.raw, True)
+    matters = drive.matters_to_motion(parameter.key)
+    with bench.keeping_still(member) if matters else contextlib.nullcontext():
+        if drive.commands_motion(parameter.key):
+            await _require_disabled(member, parameter.key)
+        reading = await drive.write(key, 0 if value is None else value, raw=raw)
     bench.journal.add(
         f"{drive.name}: {parameter.key} {parameter.name}: "
         f"{old.value if old else 'not read'} → {reading.value} {parameter.unit}".rstrip(),

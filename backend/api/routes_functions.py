@@ -264,9 +264,9 @@ async def write_gear(
     bench: TheBench, member: Controlled, store: TheStore, request: Mechanics
 ) -> GearWritten:
     """Write the gear for these mechanics, all or nothing, and keep the mechanics."""
-    bench.require_idle(member)
-    plan = await gear.plan(member.axis, request)
-    change = await gear.write_gear(member.axis, plan.values)
+    with bench.keeping_still(member):
+        plan = await gear.plan(member.axis, request)
+        change = await gear.write_gear(member.axis, plan.values)
     old = store.get(member.drive.id)
     store.put(member.drive.id, old.model_copy(update={"mechanics": request}))
     for value in plan.values:

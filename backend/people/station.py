@@ -7,6 +7,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from backend.elapsed import moment_of
 from backend.people.accounts import Accounts
 from backend.people.errors import NotLoggedIn
 from backend.people.identity import LOCAL, Identity
@@ -94,7 +95,7 @@ class People:
         """When this person's session ends; None where it does not."""
         if identity.is_guest:
             found = self.support.of_session(identity.session)
-            return None if found is None else datetime.fromtimestamp(found.expires, UTC)
+            return None if found is None else datetime.fromtimestamp(moment_of(found.expires), UTC)
         return self.accounts.expires(identity.session)
 
     def admit(self, identity: Identity, message: str) -> Identity:

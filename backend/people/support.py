@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from backend.elapsed import elapsed_s
 from backend.people.credentials import checked_person, digest, new_secret, same_code, spoken_code
 from backend.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
 from backend.people.identity import Identity
@@ -37,7 +38,7 @@ State = Literal["open", "joined", "ended"]
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What a guest may do beyond looking, until when (epoch seconds), and on which axis.
+    """What a guest may do beyond looking, until when (`elapsed_s`), and on which axis.
 
     ``drive`` None is every axis.
     """
@@ -50,7 +51,7 @@ class Grant:
 
 @dataclass(slots=True)
 class Invitation:
-    """One guest. ``expires`` in epoch seconds; ``allowed`` bounds what grants may give."""
+    """One guest. ``expires`` by `elapsed_s`; ``allowed`` bounds what grants may give."""
 
     id: str
     guest: str
@@ -81,14 +82,10 @@ class Said:
 
 
 class Support:
-    """Invitations of a station. ``clock`` is epoch seconds, ``ticks`` the monotonic clock."""
+    """Invitations of a station. ``ticks`` counts seconds that pass, whatever clocks are set to."""
 
-    def __init__(
-        self,
-        clock: Callable[[], float] = time.time,
-        ticks: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._clock, self._ticks = clock, ticks
+    def __init__(self, ticks: Callable[[], float] = elapsed_s) -> None:
+        self._ticks = ticks
         self._invitations: dict[str, Invitation] = {}
         self._throttle = Throttle(10, ticks)
         #: Invitation to the on-site connection that holds the button, and when it was last heard.
@@ -141,14 +138,14 @@ class Support:
             raise NotAllowed(
                 f"{MOST_OPEN} invitations are open", remedy="end those that are not needed"
             )
-        secret, now = new_secret(), self._clock()
+        secret = new_secret()
         made = Invitation(
             id=secrets.token_hex(6),
             guest=guest,
             allowed=allowed,
             by=by,
-            created=now,
-            expires=now + lifetime_s,
+            created=time.time(),
+            expires=self._ticks() + lifetime_s,
             code=spoken_code(2),
             link=digest(secret),
         )
@@ -204,7 +201,7 @@ class Support:
             (
                 i
                 for i in self._invitations.values()
-                if i.session == session and i.state == "joined" and self._clock() < i.expires
+                if i.session == session and i.state == "joined" and self._ticks() < i.expires
             ),
             None,
         )
@@ -270,7 +267,7 @@ class Support:
                 value=time_s,
                 limit=f"10 to {LONGEST_GRANT_S:.0f} s",
             )
-        found.grant = Grant(rights, self._clock() + time_s, drive, by)
+        found.grant = Grant(rights, self._ticks() + time_s, drive, by)
         self._changed()
         return found
 
@@ -286,7 +283,7 @@ class Support:
     def running(self, found: Invitation) -> Grant | None:
         """The grant of this moment, or None."""
         grant = found.grant
-        return grant if grant is not None and self._clock() < grant.until else None
+        return grant if grant is not None and self._ticks() < grant.until else None
 
     # --- the enabling button ----------------------------------------------------------
 
@@ -356,7 +353,7 @@ class Support:
         if not 1 <= len(text) <= CHAT_LENGTH:
             raise NotAllowed("a line has 1 to 500 signs", limit=f"{CHAT_LENGTH} signs")
         self._said += 1
-        said = Said(self._said, self._clock(), identity.person, identity.is_guest, text)
+        said = Said(self._said, time.time(), identity.person, identity.is_guest, text)
         self._chat.append(said)
         return said
 
@@ -368,7 +365,7 @@ class Support:
 
     def tick(self) -> None:
         """Let invitations and grants end whose time has come."""
-        now = self._clock()
+        now = self._ticks()
         for found in list(self._invitations.values()):
             if found.state != "ended" and now >= found.expires:
                 self._end(found, "expired")

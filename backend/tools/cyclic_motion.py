@@ -9,8 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,7 +23,7 @@ from backend.jobs import JobResult, Progress
 from backend.ports import address_of
 from backend.tools.jog import Hold, JogSettings, require_scale
 from drivers import link as bus
-from drivers.cia402 import Mode, State
+from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
 
 _RENEW_S = 0.05
@@ -139,7 +138,7 @@ async def generate(
     values = signal(settings, cycle_s)
     mode = Mode[settings.mode]
     _require_inside(drive, settings)
-    async with _enabled(axis, session, mode):
+    async with axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S):
         start = await axis.position_raw()
         if settings.mode == "CSP":
             raw = start + np.round(values * units.position_raw(1.0)).astype(np.int64)
@@ -191,7 +190,7 @@ async def jog_cyclic(
     cycle_s = _cycle(session)
     require_scale(axis, units, settings)
     progress(0.0, "enabling")
-    async with _enabled(axis, session, Mode.CSP):
+    async with axis.enabled_cyclic(session, Mode.CSP, _STATE_TIMEOUT_S):
         start = await axis.position_raw()
         speed = settings.speed_rpm / 60.0
         slope = settings.acceleration_rpm_s / 60.0
@@ -303,13 +302,3 @@ def _raise_if_ended(session: CyclicSession, station: int) -> None:
         raise NotAllowed(
             f"station {station}: {reason}", remedy="see the Alarms page; check the envelope"
         )
-
-
-@asynccontextmanager
-async def _enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterator[None]:
-    """Operation enabled through the loop; disabled again on every way out."""
-    try:
-        await axis.go_to_cyclic(session, State.OPERATION_ENABLED, mode, _STATE_TIMEOUT_S)
-        yield
-    finally:
-        await axis.leave_cyclic(session, _STATE_TIMEOUT_S)

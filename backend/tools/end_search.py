@@ -47,7 +47,7 @@ async def find_ends(
     for role in ("torque_limit_positive", "torque_limit_negative", "max_torque"):
         if (key := drive.key(role)) is not None:
             wanted = units.torque_raw(settings.search_torque_percent)
-            limits[key] = min(wanted, await drive.raw(key))
+            limits[key] = limited(await drive.raw(key), wanted)
     if not limits:
         raise NotAllowed(
             f"{drive.name}: this family has no torque limit that could protect the ends",
@@ -59,6 +59,11 @@ async def find_ends(
             progress(0.1 + 0.15 * number, "looking for an end at limited torque")
             found.append(await _creep(axis, session, settings, facts, direction))
     return found[0], found[1]
+
+
+def limited(now: int, wanted: int) -> int:
+    """A torque limit no wider than ``wanted``; some families keep the negative one below zero."""
+    return min(now, wanted) if now >= 0 else max(now, -wanted)
 
 
 @dataclass

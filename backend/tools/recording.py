@@ -20,7 +20,7 @@ from backend.cyclic import CyclicSession, channel
 from backend.jobs import Progress
 from backend.ports import address_of
 from drivers import link as bus
-from drivers.cia402 import Mode, State
+from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed
 
 FloatArray = npt.NDArray[np.float64]
@@ -156,12 +156,9 @@ async def enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterat
 
     On every way out the axis is braked and disabled.
     """
-    try:
-        await axis.go_to_cyclic(session, State.OPERATION_ENABLED, mode, _STATE_TIMEOUT_S)
+    async with axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S):
         await _forgotten(axis, session)
         yield await axis.position_raw()
-    finally:
-        await axis.leave_cyclic(session, _STATE_TIMEOUT_S)
 
 
 async def _forgotten(axis: Axis, session: CyclicSession) -> None:

@@ -183,6 +183,8 @@ class Operations:
         if self.roster.exchange.route_write(station.number, index, subindex, data):
             done(None, None)
             return
+        if (index, subindex) == (_CONTROL_WORD, 0):
+            self.roster.commanded(station.number, _word(data))
         if (index, subindex) == (_CONTROL_WORD, 0) and cia402.stops(_word(data)):
             station.box.stopping = True
             steps = coe.stop_write(station.box, index, subindex, data)

@@ -23,6 +23,11 @@ _FIND_S, _WATCH_S, _REOPEN_S = 30.0, 0.25, 1.0
 _LET_END_S = 0.3
 _MIN_MAILBOX = 16
 _FIND_TRIES = 5
+_PAUSES_S = (1.0, 3.0, 10.0)
+"""Between tries to mend what a search left out, or left wrong: each costs the others a moment."""
+_MENDINGS = 2
+"""After so many tries on its own a station is searched for anew: what is known may be wrong."""
+_ENABLES = 0x0F
 
 Send = Callable[[Message], None]
 
@@ -43,6 +48,10 @@ class Roster:
         self._next_watch = 0.0
         self._next_open = 0.0
         self._search_due = False
+        self._wanted, self._wanted_at = 0, 0.0
+        self._mending: dict[int, tuple[int, float]] = {}
+        #: Stations whose last control word by mailbox enables: no search may reset them.
+        self._powered: set[int] = set()
         self._managers: dict[int, bytes] = {}
         self._emergencies: dict[int, tuple[bytes, float]] = {}
 
@@ -83,14 +92,14 @@ class Roster:
                 self.lanes.submit(station.number, "mailbox", station.box.drain(), _ignore)
 
     def _search_again(self, now: float) -> None:
-        if now < self._next_open or self.exchange.loop is not None:
+        if now < self._next_open or self.exchange.loop is not None or self._powered:
             return
         self._next_open = now + _REOPEN_S
         before = len(self.stations)
         self._search_due = False
         self.attach_and_identify()
         if len(self.stations) != before:
-            self._search_due = True
+            self._wanted, self._search_due = 0, True
         elif not self._search_due:
             for number in self.new_aliases:
                 self.event("back", number, f"station {number} was switched on again")
@@ -126,8 +135,28 @@ class Roster:
         elif self.exchange.operational and station.number in self.exchange.setups:
             if station.al_state != AlState.OP:
                 self._fell_back(station, before)
-        elif station.al_state != before and station.al_state & ERROR_BIT:
+            return
+        if station.al_state != before and station.al_state & ERROR_BIT:
             self.event("state", station.number, self.al_words(station))
+        if station.al_state == AlState.INIT | ERROR_BIT:
+            self._mend(station)
+        else:
+            self._mending.pop(station.number, None)
+
+    def _mend(self, station: Station) -> None:
+        """It fell out of PREOP, as when a frame of the search was lost: nobody could stop it so."""
+        number, now = station.number, time.monotonic()
+        # No search takes anything from it that it still had.
+        self._powered.discard(number)
+        tries, due = self._mending.get(number, (0, now))
+        if now < due or self.exchange.loop is not None or self.lanes.busy(number, "mailbox"):
+            return
+        self._mending[number] = tries + 1, now + _PAUSES_S[min(tries, len(_PAUSES_S) - 1)]
+        if tries == _MENDINGS:
+            self._search_due = True
+        elif station.mailbox is not None:
+            steps = restore_mailbox(station, self._managers[number], time.monotonic)
+            self.lanes.submit(number, "mailbox", steps, _ignore)
 
     def _fell_back(self, station: Station, before: int) -> None:
         if self.exchange.healing(station.number):
@@ -140,6 +169,7 @@ class Roster:
     def _missing(self, station: Station) -> None:
         if not station.lost:
             station.lost = True
+            self._powered.discard(station.number)
             station.al_state = 0
             self.event(
                 "lost", station.number,
@@ -194,6 +224,20 @@ class Roster:
             self.event("emergency", number, text, code)
 
         return received
+
+    def commanded(self, number: int, control_word: int) -> None:
+        """A control word went to a station by mailbox."""
+        if control_word & _ENABLES == _ENABLES:
+            self._powered.add(number)
+        else:
+            self._powered.discard(number)
+
+    def _want_search(self) -> None:
+        """Search again soon, with growing pauses for as long as that does not help."""
+        now = time.monotonic()
+        if now >= self._wanted_at:
+            self._wanted_at = now + _PAUSES_S[min(self._wanted, len(_PAUSES_S) - 1)]
+            self._wanted, self._search_due = self._wanted + 1, True
 
     # Finding -------------------------------------------------------------------------------
 
@@ -269,10 +313,13 @@ class Roster:
             self.attach_and_identify()
         if not 1 <= number <= len(self.stations):
             self.attached = self.attached and bool(self.stations)
+            # A drive that was without supply, or behind a cut cable, when the others were found.
+            self._want_search()
             raise LinkLost(
                 f"there is no station {number} on {self.segment.interface}:"
                 f" {len(self.stations)} were found",
-                remedy="check supply and cables, then scan again",
+                remedy="check supply and cables; it is looked for again by itself while no axis is "
+                "enabled",
             )
         station = self.stations[number - 1]
         if station.lost:

@@ -370,7 +370,7 @@ def test_a_guest_gets_what_is_granted_where_and_as_long(server: GuardedServer, c
     write = {"value": 40}
     path = "/drives/x/parameters/2005:03"
     grant = f"/invitations/{cast.invitation}/grant"
-    clock = server.people.support._clock
+    ticks = server.people.support._ticks
     assert cast.guest.ask("PUT", path, json=write).status_code == 403
     assert cast.operator.ask(
         "PUT", grant, json={"rights": ["station"], "minutes": 5}
@@ -380,10 +380,10 @@ def test_a_guest_gets_what_is_granted_where_and_as_long(server: GuardedServer, c
     other = cast.guest.ask("PUT", "/drives/y/parameters/2005:03", json=write)
     assert other.status_code == 403
     try:
-        server.people.support._clock = lambda: clock() + 301
+        server.people.support._ticks = lambda: ticks() + 301
         assert cast.guest.ask("PUT", path, json=write).status_code == 403
     finally:
-        server.people.support._clock = clock
+        server.people.support._ticks = ticks
         cast.operator.ok("DELETE", grant)
 
 

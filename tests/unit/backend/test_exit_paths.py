@@ -3,43 +3,38 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+import time
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
+from backend.access import Leases
+from backend.api.app import make_app
+from backend.api.live import LiveHub
+from backend.api.security_socket import OpenSockets
 from backend.bench import Bench, Member
 from backend.cyclic import CyclicState
+from backend.elapsed import elapsed_s, moment_of
+from backend.gear import write_gear
 from backend.jobs import Progress
 from backend.measuring import Exchange, exchange_for
+from backend.mechanics_calc import GearValue
+from backend.owed_store import OwedStore
+from backend.people.identity import LOCAL, Actor, acting
+from backend.people.rights import Right
+from backend.people.station import People
+from backend.people.support import Support
 from backend.tools.cyclic_motion import jog_cyclic
+from backend.tools.end_search import limited
 from backend.tools.jog import Hold, JogSettings
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, LinkTimeout, NotAllowed
-from tests.support.servo import STATUS, URL, Servo, bench_with
+from tests.support.servo import STATUS, URL, Servo
 
 ENABLED = 0x237
 JOG = JogSettings(1, 60.0, 600.0, 5.0, 50.0)
-
-
-@pytest.fixture
-async def servo() -> Servo:
-    return Servo()
-
-
-@pytest.fixture
-async def bench(servo: Servo, tmp_path: Path) -> AsyncIterator[Bench]:
-    bench, _ = await bench_with(servo, tmp_path)
-    yield bench
-    servo.mute = False
-    servo.gate.set()
-    await bench.close()
-
-
-@pytest.fixture
-def x(bench: Bench) -> Member:
-    return bench.member("x")
 
 
 async def turns(count: int = 20) -> None:
@@ -235,3 +230,236 @@ async def test_an_exchange_that_was_ended_in_order_owes_none(x: Member) -> None:
     loop.running = False
     await x.axis.leave_cyclic(loop, 1.0)  # type: ignore[arg-type]
     assert not x.axis.owes_stop
+
+
+# --- settings that change together --------------------------------------------------------
+
+
+async def test_nothing_begins_to_move_while_its_settings_change(
+    bench: Bench, x: Member, servo: Servo
+) -> None:
+    """The gear was asked for as the axis stood, and written as a jog had begun."""
+    transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
+    servo.gate.clear()
+    async with httpx.AsyncClient(transport=transport, base_url="http://test/api/v1") as http:
+        ramp = asyncio.create_task(http.put("/drives/x/parameters/6083:00", json={"raw": 70000}))
+        while not bench._still["x"]:  # noqa: ASYNC110 - a count has no event
+            await asyncio.sleep(0)
+        with pytest.raises(Busy, match="settings are just being changed"):
+            bench.jobs.start("move", "Move X", forever, drive="x", motion=True)
+        servo.gate.set()
+        assert (await ramp).is_success
+    bench.jobs.start("move", "Move X", forever, drive="x", motion=True)
+
+
+async def half_a_gear(x: Member, servo: Servo) -> tuple[asyncio.Task[object], dict[str, int]]:
+    """The second of two values is on its way to the drive."""
+    keys = ("6091:01", "6091:02")
+    before = {key: await x.drive.raw(key) for key in keys}
+    values = [GearValue(x.drive.parameter(key), raw + 1) for key, raw in before.items()]
+
+    def hold(_place: tuple[int, int], _value: int) -> None:
+        servo.gate.clear()
+
+    servo.on_write = hold
+    writing = asyncio.create_task(write_gear(x.axis, values))
+    while servo.gate.is_set():  # noqa: ASYNC110 - is cleared by a write
+        await asyncio.sleep(0)
+    servo.on_write = lambda _place, _value: None
+    await turns()
+    return writing, before
+
+
+async def test_a_gear_whose_writing_is_cancelled_is_as_it_was(x: Member, servo: Servo) -> None:
+    """Half a gear is another scale: the next move would go to another place."""
+    writing, before = await half_a_gear(x, servo)
+    writing.cancel()
+    await turns()
+    servo.gate.set()
+    await asyncio.wait([writing])
+    assert writing.cancelled()
+    assert {key: await x.drive.raw(key) for key in before} == before
+    assert not x.drive.owed
+
+
+async def test_a_gear_that_cannot_be_taken_back_is_owed(x: Member, servo: Servo) -> None:
+    writing, before = await half_a_gear(x, servo)
+    servo.mute = True
+    servo.gate.set()
+    with pytest.raises(LinkTimeout, match="not put back"):
+        await writing
+    assert {debt.key: debt.raw for debt in x.drive.owed.debts} == before
+
+
+async def test_a_server_killed_with_half_a_gear_has_noted_it(
+    bench: Bench, x: Member, servo: Servo, tmp_path: Path
+) -> None:
+    del bench
+    writing, before = await half_a_gear(x, servo)
+    noted, _ = OwedStore(tmp_path / "owed").get("x", None)
+    assert {debt.key: debt.raw for debt in noted} == before
+    servo.gate.set()
+    await writing
+    assert not OwedStore(tmp_path / "owed").get("x", None)[0], "a gear that was written stays"
+
+
+@pytest.mark.parametrize(
+    ("now", "allowed"), [(3000, 200), (100, 100), (-3000, -200), (-100, -100), (0, 0)]
+)
+def test_the_search_for_an_end_is_weak_both_ways(now: int, allowed: int) -> None:
+    """A negative limit that is kept below zero stayed at its −300 %."""
+    assert limited(now, 200) == allowed
+
+
+async def test_a_motion_that_a_fault_ended_names_the_fault(x: Member, servo: Servo) -> None:
+    """The loop sees only that the drive left Operation enabled; 603Fh says why (004: 3230h)."""
+    servo.enable()
+
+    async def motion() -> None:
+        async with x.axis.enabled_cyclic(Loop(x), Mode.CSP, 1.0):  # type: ignore[arg-type]
+            servo.trip()
+            servo.set((0x603F, 0), 0x3230)
+            raise NotAllowed("station 1: the drive left Operation enabled: Fault")
+
+    with pytest.raises(NotAllowed, match=r"enabled: Fault \(0x3230 Overload\)"):
+        await motion()
+
+
+# --- clocks that are set ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("jump_s", [-86_400.0, 86_400.0])
+def test_what_lasts_so_long_lasts_so_long_whatever_the_clock_is_set_to(
+    monkeypatch: pytest.MonkeyPatch, jump_s: float
+) -> None:
+    """Set back by a day, a grant of five minutes lasted a day and five minutes."""
+    now, wall = [1000.0], [1.7e9]
+    monkeypatch.setattr("time.time", lambda: wall[0])
+    support, leases = Support(lambda: now[0]), Leases(ticks=lambda: now[0])
+    secret, made = support.invite("Anna", "Guest", frozenset({Right.MOTION}), 3600.0)
+    support.join(secret, made.code, "10.0.0.1")
+    support.grant(made.id, "Anna", frozenset({Right.MOTION}), 300.0, None)
+    leases.take("x", "c1", "Anna")
+    leases.hand("x", "c1", "c2", "Ben", 300.0)
+    leases.take("y", "c1", "Anna")
+    leases.ask("y", "c2", "Ben")
+
+    def tick() -> tuple[bool, str, str]:
+        support.tick()
+        leases.tick(lambda _drive: False)
+        holders = [leases.holder(drive) for drive in "xy"]
+        x, y = (holder.person if holder else "" for holder in holders)
+        return support.running(made) is not None, x, y
+
+    wall[0] += jump_s
+    now[0] += 29.0
+    assert tick() == (True, "Ben", "Anna")
+    now[0] += 2.0
+    assert tick() == (True, "Ben", "Ben")
+    now[0] += 268.0
+    assert tick() == (True, "Ben", "Ben")
+    now[0] += 2.0
+    assert tick() == (False, "Anna", "Ben")
+    states = [str(made.state)]
+    now[0] += 3600.0
+    tick()
+    assert [*states, made.state] == ["joined", "ended"]
+
+
+def test_moments_are_shown_by_the_clock_of_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    end = elapsed_s() + 60.0
+    monkeypatch.setattr("time.time", lambda: 5000.0)
+    assert moment_of(end) == pytest.approx(5060.0, abs=1.0)
+
+
+# --- the watch over pages -----------------------------------------------------------------
+
+
+class Page:
+    """A live connection that was heard of ``ago_s`` ago."""
+
+    def __init__(self, name: str, ago_s: float) -> None:
+        self.id, self.identity, self.page = name, LOCAL, ""
+        self.heard = time.monotonic() - ago_s
+        self.released: list[str] = []
+
+    def send(self, _message: object) -> None: ...
+
+    def later(self, *_what: object) -> None: ...
+
+    def release(self, _drive: str | None, reason: str) -> None:
+        self.released.append(reason)
+
+
+@pytest.fixture
+def hub(bench: Bench, tmp_path: Path) -> LiveHub:
+    return LiveHub(bench, People(tmp_path), OpenSockets())
+
+
+async def test_a_defect_does_not_end_the_watch_over_silent_pages(
+    bench: Bench, hub: LiveHub, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The dead-man of every motion lived in a task that one exception ended for good."""
+    monkeypatch.setattr("backend.api.live_people._LOOK_S", 0.001)
+    broken = iter([True, True])
+
+    def tick(*_what: object) -> None:
+        if next(broken, False):
+            raise KeyError("a defect")
+
+    monkeypatch.setattr(bench.leases, "tick", tick)
+    watch = asyncio.create_task(hub.people.run())
+    await asyncio.sleep(0.02)
+    acting.set(Actor(LOCAL, "c1"))
+    job = bench.jobs.start("move", "Move X", forever, drive="x", motion=True)
+    silent: Any = Page("c1", 2.0)
+    hub.connections["c1"] = silent
+    async with asyncio.timeout(5):
+        await job.wait()
+    assert job.state == "cancelled"
+    assert not watch.done()
+    assert "a defect" in caplog.text
+    del hub.connections["c1"]
+    watch.cancel()
+    await asyncio.wait([watch])
+
+
+async def test_a_page_that_goes_ends_its_motion_whatever_else_fails(
+    bench: Bench, hub: LiveHub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_what: object) -> None:
+        raise KeyError("a defect")
+
+    monkeypatch.setattr(hub.people._support, "release_all", broken)
+    acting.set(Actor(LOCAL, "c1"))
+    job = bench.jobs.start("move", "Move X", forever, drive="x", motion=True)
+    bench.leases.take("x", "c1", "Anna")
+    gone: Any = Page("c1", 0.0)
+    with pytest.raises(KeyError, match="a defect"):
+        hub.people.left(gone)
+    async with asyncio.timeout(5):
+        await job.wait()
+    assert job.state == "cancelled"
+    assert bench.leases.holder("x") is None
+
+
+async def test_what_fails_at_the_end_of_the_server_keeps_nothing_else_from_its_end(
+    bench: Bench, x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await x.axis.transition(State.OPERATION_ENABLED, Mode.PP)
+
+    async def broken() -> None:
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(bench.scope, "close", broken)
+    closed: list[bool] = []
+
+    async def close() -> None:
+        closed.append(True)
+
+    monkeypatch.setattr(servo, "close", close)
+    with pytest.raises(OSError, match="no space"):
+        await bench.close()
+    monkeypatch.undo()
+    assert servo.number(STATUS) != ENABLED
+    assert closed == [True]

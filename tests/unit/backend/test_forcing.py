@@ -231,6 +231,24 @@ async def test_a_cancelled_job_puts_back_too(
     assert outputs(io_link) == (0x1, 0)
 
 
+async def test_real_terminals_that_do_not_count_again_are_owed(
+    axis: Axis, sessions: ForcingSessions, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The values are back, and the drive goes on with simulated inputs: limits among them."""
+    session = await sessions.start(axis, "simulation", confirmed=True, connection="me")
+
+    async def lost(*_what: object) -> None:
+        raise LinkTimeout("no answer")
+
+    monkeypatch.setattr(forcing, "apply_settings", lost)
+    axis.stopped = True
+    await ended(lambda: sessions.get("x", "simulation") is None)
+    assert session.job is not None
+    assert isinstance(session.job.error, LinkTimeout)
+    debts = {debt.key: debt.unapplied for debt in axis.drive.owed.debts}
+    assert debts == {"2031:02": True, "2031:03": True}
+
+
 @pytest.mark.parametrize("how", ["cancelled", "STOP"])
 async def test_what_comes_while_it_ends_overrules_nothing_any_more(
     axis: Axis, io_link: MemoryLink, sessions: ForcingSessions, how: str

@@ -1,0 +1,21 @@
+"""Time that only goes on: for what may last so long and no longer.
+
+The wall clock is set: by a person, by a time server after the start, by a supply that failed. A
+grant must end after its minutes all the same. Time in which the computer slept counts, where the
+system tells it.
+"""
+
+from __future__ import annotations
+
+import time
+
+
+def elapsed_s() -> float:
+    """Seconds since some time before the start of this process; never set, never back."""
+    boot = getattr(time, "CLOCK_BOOTTIME", None)
+    return time.monotonic() if boot is None else time.clock_gettime(boot)
+
+
+def moment_of(elapsed: float) -> float:
+    """Epoch seconds by the wall clock of now at which `elapsed_s` is, or was, ``elapsed``."""
+    return time.time() + elapsed - elapsed_s()
