@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from playwright.sync_api import Page
 
+from tests.support.machine import within
 from tests.support.station import Station, until
 
 #: Faster than the noise of the simulated encoder at standstill, slower than any jog here.
 MOVING_RPM = 20.0
 #: Renewal time-out 0.2 s, braking 0.1 s at 60 rpm and 600 rpm/s, and the time to ask.
 STOP_S = 2.0
+#: Within this time a page tells what people must know: that it lost the server, that somebody
+#: pressed STOP and what it reached, that an axis has a fault.
+TOLD_MS = 5_000
+#: Why a jog ends, rightly, when a computer has no time for the page for a tenth of a second.
+SILENT = ("the page fell silent", "no sign of life from the page for 200 ms")
 
 
 class Bench:
@@ -40,12 +47,45 @@ class Bench:
         return abs(self.state()["velocity"]) > MOVING_RPM
 
     def wait_moving(self) -> None:
-        until(self.moves, 8, "the axis moves")
+        until(self.moves, 30, "the axis moves")
+
+    def press(self, press: Callable[[], None], let_go: Callable[[], None]) -> None:
+        """Hold a jog button until the axis moves; after a stall once more, as people do."""
+        for _ in range(8):
+            before = {job["id"] for job in self._jogs()}
+            press()
+            until(lambda known=before: self.moves() or self._ended(known), 30, "the axis moves")
+            if not self._ended(before):
+                return
+            let_go()
+        raise AssertionError("this machine stalls too often")
+
+    def jog(self, press: Callable[[], None], let_go: Callable[[], None]) -> str:
+        """Hold a jog button until the axis moves, and let go; returns why the jog ended."""
+        for _ in range(8):
+            self.press(press, let_go)
+            let_go()
+            self.wait_standing()
+            reason = str(self.jog_job()["result"]["reason"])
+            if reason not in SILENT:
+                return reason
+        raise AssertionError("this machine stalls too often")
+
+    def _ended(self, before: set[str]) -> bool:
+        """Whether a jog beyond these has ended, which only a stall may do."""
+        new = [job for job in self._jogs() if job["id"] not in before]
+        over = [job for job in new if job["state"] != "running"]
+        assert all((job["result"] or {}).get("reason") in SILENT for job in over), over
+        return bool(over)
+
+    def _jogs(self) -> list[Any]:
+        jobs = self.station.ok(self.station.http.get("/jobs"))
+        return [job for job in jobs if job["kind"] == "jog"]
 
     def wait_standing(self) -> None:
         """The axis stands, its job has ended, and it stays where it is."""
-        until(lambda: not self.moves(), STOP_S, "the axis stands")
-        until(lambda: self.state()["moving_job"] is None, 5, "the job has ended")
+        within(STOP_S, lambda: not self.moves(), "the axis stands")
+        until(lambda: self.state()["moving_job"] is None, 30, "the job has ended")
         before = self.state()["position"]
         for _ in range(5):
             now = self.state()
@@ -53,8 +93,7 @@ class Bench:
 
     def jog_job(self) -> Any:
         """The jog that began last."""
-        jobs = self.station.ok(self.station.http.get("/jobs"))
-        return [job for job in jobs if job["kind"] == "jog"][-1]
+        return self._jogs()[-1]
 
 
 def open_axis(page: Page, drive: str, name: str) -> None:

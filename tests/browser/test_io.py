@@ -7,7 +7,8 @@ import re
 from playwright.sync_api import Page, expect
 
 from tests.browser.cable import Cable
-from tests.browser.driving import Bench, open_axis
+from tests.browser.driving import TOLD_MS, Bench, open_axis
+from tests.support.machine import within
 from tests.support.station import until
 
 
@@ -61,7 +62,7 @@ def test_forcing_ends_with_leaving_the_page(laptop: Page, bench: Bench) -> None:
     begin_forcing(page, bench)
     assert bench.raw("60FE:01") & 0x10000
     open_axis(page, bench.drive, "overview")
-    until(lambda: bench.raw("60FE:02") == 0, 3, "leaving lets go at once")
+    within(3, lambda: bench.raw("60FE:02") == 0, "leaving lets go at once")
     assert bench.raw("60FE:01") == 0
 
 
@@ -69,14 +70,14 @@ def test_forcing_ends_with_stop(laptop: Page, bench: Bench) -> None:
     page = laptop
     begin_forcing(page, bench)
     page.keyboard.press("Escape")
-    until(lambda: bench.raw("60FE:02") == 0, 3, "STOP lets go")
-    expect(page.get_by_text("STOP was pressed")).to_be_visible()
+    within(3, lambda: bench.raw("60FE:02") == 0, "STOP lets go")
+    expect(page.get_by_text("STOP was pressed")).to_be_visible(timeout=TOLD_MS)
 
 
 def test_forcing_ends_with_the_connection(laptop: Page, bench: Bench, cable: Cable) -> None:
     begin_forcing(laptop, bench)
     cable.cut()
-    until(lambda: bench.raw("60FE:02") == 0, 15, "no sign of life lets go")
+    within(15, lambda: bench.raw("60FE:02") == 0, "no sign of life lets go")
     cable.mend()
 
 

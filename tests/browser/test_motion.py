@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import re
 import signal
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.cable import Cable
-from tests.browser.driving import Bench, open_axis
+from tests.browser.driving import TOLD_MS, Bench, open_axis
 from tests.support.station import until
 
 PLUS = "Hold to move in the positive direction"
@@ -31,17 +32,15 @@ def _press(page: Page, bench: Bench, name: str = PLUS) -> None:
     """Hold a jog button with the mouse until the axis moves."""
     open_axis(page, bench.drive, "motion")
     page.mouse.move(*_centre(page, name))
-    page.mouse.down()
-    bench.wait_moving()
+    bench.press(page.mouse.down, page.mouse.up)
 
 
 def test_jog_by_mouse(laptop: Page, bench: Bench) -> None:
+    open_axis(laptop, bench.drive, "motion")
+    laptop.mouse.move(*_centre(laptop, PLUS))
     start = bench.state()["position"]
-    _press(laptop, bench)
-    laptop.mouse.up()
-    bench.wait_standing()
+    assert bench.jog(laptop.mouse.down, laptop.mouse.up) == "released"
     assert bench.state()["position"] > start
-    assert bench.jog_job()["result"]["reason"] == "released"
     expect(laptop.get_by_text("Ended: released")).to_be_visible()
 
 
@@ -54,31 +53,25 @@ def test_sliding_off_the_button_still_ends_with_the_release(laptop: Page, bench:
     assert bench.state()["position"] < start
 
 
-def test_jog_by_finger(phone: Page, bench: Bench) -> None:
-    page = phone
-    open_axis(page, bench.drive, "motion")
+def _touch(page: Page, end: str) -> tuple[Callable[[], None], Callable[[], None]]:
+    """A finger on the button, and its end."""
     x, y = _centre(page, PLUS)
     fingers = page.context.new_cdp_session(page)
-    fingers.send(
-        "Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]}
-    )
-    bench.wait_moving()
-    fingers.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-    bench.wait_standing()
+
+    def event(kind: str, *points: dict[str, float]) -> None:
+        fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": list(points)})
+
+    return lambda: event("touchStart", {"x": x, "y": y}), lambda: event(end)
+
+
+def test_jog_by_finger(phone: Page, bench: Bench) -> None:
+    open_axis(phone, bench.drive, "motion")
+    assert bench.jog(*_touch(phone, "touchEnd")) == "released"
 
 
 def test_cancelled_touch_stops(phone: Page, bench: Bench) -> None:
-    page = phone
-    open_axis(page, bench.drive, "motion")
-    x, y = _centre(page, PLUS)
-    fingers = page.context.new_cdp_session(page)
-    fingers.send(
-        "Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]}
-    )
-    bench.wait_moving()
-    fingers.send("Input.dispatchTouchEvent", {"type": "touchCancel", "touchPoints": []})
-    bench.wait_standing()
-    assert bench.jog_job()["result"]["reason"] == "pointer cancelled"
+    open_axis(phone, bench.drive, "motion")
+    assert bench.jog(*_touch(phone, "touchCancel")) == "pointer cancelled"
 
 
 def test_jog_by_key(laptop: Page, bench: Bench) -> None:
@@ -87,10 +80,7 @@ def test_jog_by_key(laptop: Page, bench: Bench) -> None:
     _centre(page, PLUS)
     start = bench.state()["position"]
     page.get_by_role("group", name=re.compile("^Jog")).focus()
-    page.keyboard.down("ArrowLeft")
-    bench.wait_moving()
-    page.keyboard.up("ArrowLeft")
-    bench.wait_standing()
+    bench.jog(lambda: page.keyboard.down("ArrowLeft"), lambda: page.keyboard.up("ArrowLeft"))
     assert bench.state()["position"] < start
 
 
@@ -181,7 +171,7 @@ def test_lost_connection_is_said_and_comes_back(laptop: Page, bench: Bench, cabl
     open_axis(laptop, bench.drive, "overview")
     expect(laptop.get_by_label("State of the drive")).to_contain_text("Switch on disabled")
     cable.cut()
-    expect(laptop.get_by_text("Connection to the server lost.")).to_be_visible()
+    expect(laptop.get_by_text("Connection to the server lost.")).to_be_visible(timeout=TOLD_MS)
     cable.mend()
     expect(laptop.get_by_text("Connection to the server lost.")).to_have_count(0)
     expect(laptop.get_by_label("State of the drive")).to_contain_text("Switch on disabled")
@@ -191,7 +181,7 @@ def test_escape_stops_a_jog(laptop: Page, bench: Bench) -> None:
     _press(laptop, bench)
     laptop.keyboard.press("Escape")
     bench.wait_standing()
-    expect(laptop.get_by_text("Stopped: X")).to_be_visible()
+    expect(laptop.get_by_text("Stopped: X")).to_be_visible(timeout=TOLD_MS)
 
 
 def _start_sequence(page: Page, bench: Bench) -> None:
@@ -220,7 +210,7 @@ def test_stop_on_every_page(laptop: Page, bench: Bench, where: str) -> None:
     assert box["x"] + box["width"] >= 1279
     button.click()
     bench.wait_standing()
-    expect(page.get_by_text("Stopped: X")).to_be_visible()
+    expect(page.get_by_text("Stopped: X")).to_be_visible(timeout=TOLD_MS)
 
 
 def test_stop_is_reached_through_an_open_dialog(phone: Page, bench: Bench) -> None:

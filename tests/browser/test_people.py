@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import statistics
-import time
 from collections.abc import Callable, Iterator
 from datetime import timedelta
 from pathlib import Path
@@ -16,10 +15,11 @@ from playwright.sync_api import Browser, Dialog, Locator, Page, expect
 
 from backend.people.rights import Right, Role
 from backend.people.station import People
-from tests.browser.conftest import HERE, LAPTOP
-from tests.browser.driving import Bench, open_axis
+from tests.browser.conftest import HERE, LAPTOP, PATIENCE_MS
+from tests.browser.driving import TOLD_MS, Bench, open_axis
 from tests.browser.test_motion import PLUS, _centre
 from tests.support.guarded import CHEAP, NAMES, PASSWORD
+from tests.support.machine import OwnTime, within
 from tests.support.station import Station, until
 
 #: Greatest time from letting the enabling button go to standstill.
@@ -62,7 +62,7 @@ def opened(browser: Browser, station: Station, bench: Bench) -> Iterator[Open]:
         context = browser.new_context(locale="en", **LAPTOP)  # type: ignore[arg-type]
         contexts.append(context)
         page = context.new_page()
-        page.set_default_timeout(15_000)
+        page.set_default_timeout(PATIENCE_MS)
         page.on("pageerror", lambda error: defects.append(str(error)))
         page.goto(f"{station.url}/{address}")
         return page
@@ -160,12 +160,11 @@ def test_a_viewer_moves_nothing_and_can_stop(opened: Open, bench: Bench) -> None
     expect(vera.get_by_text("Vera may not do this")).to_be_visible()
     vera.mouse.up()
     olaf.mouse.move(*_centre(olaf, PLUS))
-    olaf.mouse.down()
-    bench.wait_moving()
+    bench.press(olaf.mouse.down, olaf.mouse.up)
     vera.keyboard.press("Escape")
     bench.wait_standing()
     # Who stopped it is told where it was moved from, and not on the page that pressed.
-    expect(olaf.get_by_text("Vera pressed STOP.")).to_be_visible()
+    expect(olaf.get_by_text("Vera pressed STOP.")).to_be_visible(timeout=TOLD_MS)
     expect(vera.get_by_text("Vera pressed STOP.")).to_have_count(0)
     olaf.mouse.up()
 
@@ -341,7 +340,7 @@ def move_together(olaf: Page, guest: Page, bench: Bench) -> None:
         guest.mouse.move(*_centre(guest, PLUS))
         guest.mouse.down()
         with contextlib.suppress(AssertionError):
-            until(bench.moves, 3, "the axis moves")
+            until(bench.moves, 5, "the axis moves")
             return
         guest.mouse.up()
         olaf.mouse.up()
@@ -355,10 +354,10 @@ def granted(olaf: Page, guest: Page) -> None:
 
 def standstill_s(bench: Bench, let_go: Callable[[], None]) -> float:
     """Seconds from letting go to the first reading at standstill."""
-    began = time.monotonic()
-    let_go()
-    until(lambda: not bench.moves(), 5, "the axis stands")
-    return time.monotonic() - began
+    with OwnTime(with_children=True) as took:
+        let_go()
+        until(lambda: not bench.moves(), 30, "the axis stands")
+    return took.s
 
 
 def test_a_guest_moves_only_while_the_button_on_site_is_held(opened: Open, bench: Bench) -> None:
@@ -368,7 +367,7 @@ def test_a_guest_moves_only_while_the_button_on_site_is_held(opened: Open, bench
     x, y = _centre(guest, PLUS)
     guest.mouse.move(x, y)
     guest.mouse.down()
-    expect(guest.get_by_text("does not hold the enabling button")).to_be_visible()
+    expect(guest.get_by_text("does not hold the enabling button")).to_be_visible(timeout=TOLD_MS)
     guest.mouse.up()
     assert not bench.moves()
     times = []
@@ -391,7 +390,7 @@ def test_the_end_of_the_visit_stops_the_guest_at_once(opened: Open, bench: Bench
     move_together(olaf, guest, bench)
     # Another person on site may end it too, while the button is still held.
     end_visit(anna)
-    until(lambda: not bench.moves(), 1, "the axis stands")
+    within(1, lambda: not bench.moves(), "the axis stands")
     expect(guest.get_by_role("heading", name="Log in")).to_be_visible(timeout=3_000)
     # The page loads anew just now; its cookie is asked, not the page.
     again = guest.context.request.get(f"{bench.station.url}/api/v1/drives")

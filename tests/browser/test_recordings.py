@@ -22,7 +22,7 @@ from rerun.chunk import RrdReader
 
 from backend.recording.reader import RecordingReader
 from tests.api.test_scene import messages
-from tests.browser.conftest import FLAGS
+from tests.browser.conftest import FLAGS, PATIENCE_MS
 from tests.browser.driving import Bench
 from tests.support.station import until
 
@@ -46,7 +46,7 @@ def browser(playwright: Playwright) -> Iterator[Browser]:
 def page(browser: Browser, bench: Bench) -> Iterator[Page]:
     context = browser.new_context(locale="en", viewport={"width": 1280, "height": 800})
     page = context.new_page()
-    page.set_default_timeout(15_000)
+    page.set_default_timeout(PATIENCE_MS)
     defects: list[str] = []
     page.on("pageerror", lambda error: defects.append(str(error)))
     page.on("console", lambda message: defects.append(message.text) if _policy(message.text) else 0)
@@ -65,7 +65,7 @@ def scene_page(browser: Browser, bench: Bench) -> Iterator[Page]:
     screen = {"width": 900, "height": 600}
     context = browser.new_context(locale="en", color_scheme="dark", viewport=screen)
     page = context.new_page()
-    page.set_default_timeout(15_000)
+    page.set_default_timeout(PATIENCE_MS)
     defects: list[str] = []
     page.on("pageerror", lambda error: defects.append(str(error)))
     page.on("console", lambda message: defects.append(message.text) if _policy(message.text) else 0)
