@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from backend.drive import Drive
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, OutOfRange
 from profiles.schema import Parameter, UnitSpec
 
 #: Raw units per rpm for families that count speed in turns; inc/s depends on the gearing.
@@ -88,6 +88,30 @@ class AxisUnits:
     def torque_raw(self, percent: float) -> int:
         """% of rated to raw torque."""
         return round(percent * _RAW_PER_PERCENT.get(self.spec.torque, 10.0))
+
+
+def ramp_raw(units: AxisUnits, drive: Drive, key: str, rpm_per_s: float) -> int:
+    """The raw ramp of this parameter for rpm/s.
+
+    Raises:
+        OutOfRange: gentler than the longest ramp time of the drive; said in rpm/s, as the time in
+            the drive is nothing that anybody typed.
+    """
+    raw = units.acceleration_raw(rpm_per_s)
+    reference, longest = units.spec.ramp_reference_rpm, drive.parameter(key).raw_limits[1]
+    timed = reference is not None and units.spec.acceleration.startswith("ms")
+    if not timed or reference is None or not longest or raw <= longest:
+        return raw
+    gentlest = 1000.0 * reference / longest
+    raise OutOfRange(
+        f"{drive.name}: {rpm_per_s:g} rpm/s is gentler than this drive can be: its longest ramp "
+        f"({key}) takes {longest:g} ms for {reference:g} rpm",
+        drive=drive.name,
+        parameter=key,
+        value=rpm_per_s,
+        limit=f"at least {gentlest:g} rpm/s",
+        remedy=f"choose {gentlest:g} rpm/s or more, and a low speed to begin with",
+    )
 
 
 async def read_units(drive: Drive) -> AxisUnits:

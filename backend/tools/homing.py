@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
+from backend.units import ramp_raw
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
@@ -56,7 +57,7 @@ async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobR
             writes[key] = units.velocity_raw_of(drive.parameter(key), value)
     if settings.acceleration_rpm_s is not None:
         key = drive.require("homing_acceleration")
-        writes[key] = units.acceleration_raw(settings.acceleration_rpm_s)
+        writes[key] = ramp_raw(units, drive, key, settings.acceleration_rpm_s)
     if settings.offset_rev is not None:
         writes[drive.require("home_offset")] = units.position_raw(settings.offset_rev)
     for key, raw in writes.items():

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
 from backend.travel_units import REVOLUTIONS, TravelUnit
-from backend.units import AxisUnits
+from backend.units import AxisUnits, ramp_raw
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
@@ -85,11 +85,10 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
         raise OutOfRange(f"direction {settings.direction} is neither 1 nor -1")
     require_scale(axis, units, settings)
     envelope = Envelope(settings.travel_rev, settings.speed_rpm, settings.torque_percent, 3600.0)
-    ramps = {
-        drive.require("profile_velocity"): units.velocity_raw(settings.speed_rpm),
-        drive.require("profile_acceleration"): units.acceleration_raw(settings.acceleration_rpm_s),
-        drive.require("profile_deceleration"): units.acceleration_raw(settings.acceleration_rpm_s),
-    }
+    ramps = {drive.require("profile_velocity"): units.velocity_raw(settings.speed_rpm)}
+    for role in ("profile_acceleration", "profile_deceleration"):
+        key = drive.require(role)
+        ramps[key] = ramp_raw(units, drive, key, settings.acceleration_rpm_s)
     for key, raw in ramps.items():
         drive.check(drive.parameter(key), raw)
     progress(0.0, "enabling")

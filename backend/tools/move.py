@@ -9,7 +9,7 @@ from typing import Literal
 
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
-from backend.units import AxisUnits
+from backend.units import AxisUnits, ramp_raw
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
@@ -151,10 +151,10 @@ async def _ramps(axis: Axis, settings: MoveSettings) -> dict[str, int]:
             values[drive.require("profile_velocity")] = units.velocity_raw(settings.speed_rpm)
     if settings.acceleration_rpm_s is not None:
         key = drive.require("profile_acceleration")
-        values[key] = units.acceleration_raw(settings.acceleration_rpm_s)
+        values[key] = ramp_raw(units, drive, key, settings.acceleration_rpm_s)
     if settings.deceleration_rpm_s is not None:
         key = drive.require("profile_deceleration")
-        values[key] = units.acceleration_raw(settings.deceleration_rpm_s)
+        values[key] = ramp_raw(units, drive, key, settings.deceleration_rpm_s)
     for key, raw in values.items():
         drive.check(drive.parameter(key), raw)
     return values

@@ -6,8 +6,8 @@ import pytest
 
 from backend.drive import Drive
 from backend.ports import Port
-from backend.units import read_units
-from drivers.errors import NotAllowed
+from backend.units import AxisUnits, ramp_raw, read_units
+from drivers.errors import NotAllowed, OutOfRange
 from drivers.link import Found
 from profiles import load_profile
 from tests.support.memory_link import MemoryLink
@@ -57,3 +57,16 @@ async def test_other_units_are_refused(switches: dict[str, int], number: str) ->
 
 def test_unit_switches_make_the_units_be_read_again() -> None:
     assert {"2014:0F", "2014:10", "2005:06", "6091:01"} <= PROFILE.unit_keys
+
+
+async def test_a_ramp_that_a_drive_cannot_do_is_refused_in_the_unit_that_was_typed() -> None:
+    """DS_C ramps by a time of at most 2000 ms (003:641), taken for 3000 rpm: 1500 rpm/s."""
+    profile = load_profile("ds_c")
+    spec = profile.link("canopen")
+    assert spec is not None
+    drive = Drive("x", "Low axis", profile, [Port(MemoryLink({}), 3, spec)])
+    units = AxisUnits(profile.units, 10000.0)
+    assert ramp_raw(units, drive, "6083:00", 1500.0) == 2000
+    with pytest.raises(OutOfRange, match="Low axis: 600 rpm/s is gentler") as refused:
+        ramp_raw(units, drive, "6083:00", 600.0)
+    assert refused.value.limit == "at least 1500 rpm/s"
