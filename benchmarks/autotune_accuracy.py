@@ -27,18 +27,21 @@ async def tuned(axis: Axis, session: CyclicSession, spec: MechanicsSpec, scheme:
     """Tune an axis and tell the figures; the axis is as before in the end.
 
     ``×a/×b`` compares with the same design without notches and with the filters as they were: of
-    the speed gain, and of the -3 dB point of the motor's speed.
+    the speed gain, and of the -3 dB point of the motor's speed. Of each margin the promise, what
+    was predicted for the axis as measured, and what was verified.
     """
     began = time.monotonic()
     # Counted in multiples of the motor by families that do not tell the motor's inertia.
     rotor = None if axis.drive.profile.drive == "mms7" else spec.motor.inertia_kgm2
     settings = AutotuneSettings(WIDE, scheme=scheme, motor_inertia_kgm2=rotor)
     found = await autotune(axis, session, settings, Progress(lambda: None))
+    took_s = time.monotonic() - began
     plain = await _without_notches(axis, session, found)
     applied, verified = found.applied, found.verified
     if applied is None or verified is None:
         return "nothing applied"
-    m, p, now = verified.sweep.margins, verified.promised, applied.gains.speed_bandwidth_hz
+    m, p, n = verified.sweep.margins, verified.promised, applied.nominal
+    now = applied.gains.speed_bandwidth_hz
     predicted, measured = verified.predicted_bandwidth_hz, verified.measured_bandwidth_hz
     off = abs(measured / predicted - 1) if measured and predicted else np.inf
     limiting = [hz for hz, _ in true_modes(spec) if 5.0 < hz < 400.0]
@@ -52,11 +55,11 @@ async def tuned(axis: Axis, session: CyclicSession, spec: MechanicsSpec, scheme:
         f"{found.load:9} {','.join(f'{hz:.0f}' for hz in limiting) or '–':12} "
         f"{len(applied.notches)} notches {_corners(applied):12} {now:5.1f} Hz {gain:12} bandwidth "
         f"{_hz(predicted)}→{_hz(measured)}{' ' if off <= 0.1 else '!'} "
-        f"PM {_kept(p.phase_margin_deg, m.get('phase_margin_deg'), -1.0)}° "
-        f"GM {_kept(p.gain_margin_db, m.get('gain_margin_db'), -1.0)} dB "
-        f"Ms {_kept(-p.ms, m.get('ms'), -0.03 * p.ms)} "
-        f"{marked(_moving_s(found), 60.0, '.0f')}s of motion  "
-        f"{'; '.join(found.notes + found.tried)}  {time.monotonic() - began:.0f} s"
+        f"PM {_kept(p.phase_margin_deg, n.phase_margin_deg, m.get('phase_margin_deg'), 1.0, 6.0)}° "
+        f"GM {_kept(p.gain_margin_db, n.gain_margin_db, m.get('gain_margin_db'), 1.0, 3.0)} dB "
+        f"Ms {_kept(-p.ms, -n.ms, m.get('ms'), 0.03 * p.ms, np.inf)} "
+        f"{marked(_moving_s(found), 60.0, '.0f')}s of motion, {took_s:.0f} s in all  "
+        f"{'; '.join(found.notes + found.tried)}"
     )
 
 
@@ -82,13 +85,21 @@ def _corners(applied: Candidate) -> str:
     return "/".join("–" if hz is None else f"{hz:.0f}" for hz in corners)
 
 
-def _kept(promised: float, found: float | bool | None, slack: float) -> str:
-    """Promise and measurement; the smaller a number is the worse."""
+def _kept(
+    promised: float, predicted: float | None, found: float | bool | None, slack: float, off: float
+) -> str:
+    """Promise, prediction and measurement; the smaller a number is the worse.
+
+    ``!``: the promise is missed by more than ``slack``; ``?``: the prediction by more than ``off``.
+    """
+    before = f"{abs(promised):.3g}→{'–' if predicted is None else f'{abs(predicted):.3g}'}"
     if not isinstance(found, float):
-        return f"{abs(promised):.3g}→–"
+        return f"{before}→–"
     found = found if promised > 0 else -found
-    missed = "!" if found < promised + slack else ""
-    return f"{abs(promised):.3g}→{abs(found):.3g}{missed}"
+    missed = "!" if found < promised - slack else ""
+    if predicted is not None and abs(found - predicted) > off:
+        missed += "?"
+    return f"{before}→{abs(found):.3g}{missed}"
 
 
 def _moving_s(found: AutotuneResult) -> float:

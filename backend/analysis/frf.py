@@ -113,7 +113,7 @@ def estimate_periodic(
     the way, images arrive weaker, and the noise is that of the encoder.
 
     ``coulomb_nm`` is friction whose torque is subtracted (units of the torque; the response must
-    then be a velocity); None estimates it from the data.
+    then be a velocity, of a closed loop the speed loop's); None estimates it from the data.
 
     Scatter between periods is noise; scatter between realisations beyond that is nonlinear
     distortion (Pintelon & Schoukens section 4.3, "robust method"). Variances are pooled over
@@ -121,7 +121,7 @@ def estimate_periodic(
     """
     s = collect(records, path, quantity, position=position)
     if coulomb_nm is None:
-        coulomb_nm = 0.0 if quantity == "closed_loop" else estimate_coulomb(s, path, quantity)
+        coulomb_nm = estimate_coulomb(s, path, quantity)
     inputs = continuous_input(s, path, quantity, coulomb_nm, position=position)
     g, _, s_ur = instrument_estimate(s, inputs)
     # What friction did to the answer is known to about a fifth only; that is charged to the band

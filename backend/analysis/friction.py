@@ -10,9 +10,10 @@ from backend.analysis.line_spectra import (
     LineSpectra,
     Quantity,
     continuous_input,
+    friction_input,
     instrument_estimate,
 )
-from backend.analysis.sampling import SignalPath, reported_response
+from backend.analysis.sampling import SignalPath
 
 #: No line is weighed as if its noise were less than this share of an ordinary line's.
 _LEAST_NOISE = 0.1
@@ -32,11 +33,15 @@ def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> fl
     if len(s.sent) < 2:
         return 0.0
     plain = continuous_input(s, path, quantity)
-    late = reported_response(s.frequency_hz, path)
-    turned: list[ComplexArray] = [d * late for d in s.direction]
+    turned = friction_input(s, path, quantity, plain)
+    torques = plain if quantity != "closed_loop" else s.torque
+    if not torques:
+        return 0.0
     limit = float(
-        max(np.median(np.abs(u)) for u in plain) / s.samples * 2.0 * np.sqrt(s.lines.size)
+        max(np.median(np.abs(u)) for u in torques) / s.samples * 2.0 * np.sqrt(s.lines.size)
     )
+    if limit <= 0.0:
+        return 0.0
     # By their noise first: behind a coarse encoder the upper lines drown friction, and elsewhere
     # the lower ones tell it best. What play does drowns it in all but the lowest.
     low = np.asarray(s.frequency_hz <= _LOWEST * s.frequency_hz[0], dtype=np.float64)
@@ -71,4 +76,5 @@ def _torque_weight(s: LineSpectra, inputs: list[ComplexArray]) -> FloatArray:
         return np.ones(g.size)
     noise = np.sum([np.sum(np.abs(e - e.mean(axis=0)) ** 2, axis=0) for e in errors], axis=0)
     noise = neighbour_mean(noise / freedom, 3)
-    return np.asarray(1.0 / (noise + _LEAST_NOISE * np.median(noise)))
+    least = _LEAST_NOISE * float(np.median(noise))
+    return np.asarray(1.0 / (noise + least)) if least > 0.0 else np.ones(g.size)

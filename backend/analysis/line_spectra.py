@@ -73,8 +73,9 @@ class Record:
 class LineSpectra:
     """Line spectra of all good periods: arrays [m realisations][p periods, lines].
 
-    ``torque`` is the loop's own torque, ``direction`` the direction of motion (-1 to 1) that
-    Coulomb friction follows, when it does (the speed is reported late).
+    ``torque`` is the loop's own torque (of a *closed_loop* all of it, where it was recorded),
+    ``direction`` the direction of motion (-1 to 1) that Coulomb friction follows, when it does
+    (the speed is reported late).
     """
 
     frequency_hz: FloatArray
@@ -217,6 +218,8 @@ def collect(
         direction.append(friction_direction(record, e, good, path, lag_s))
         if quantity == "torque_injection":
             torque.append(period_spectra(own_torque(record, path), e, good))
+        elif quantity == "closed_loop" and record.torque is not None:
+            torque.append(period_spectra(record.torque, e, good))
     if not sent:
         raise ValueError("every period has a gap; nothing is left to evaluate")
     return LineSpectra(
@@ -298,21 +301,54 @@ def continuous_input(
 ) -> list[ComplexArray]:  # fmt: skip
     """What really drove the measured quantity, per realisation [periods, lines]."""
     f = s.frequency_hz
+    inputs: list[ComplexArray]
     if quantity == "closed_loop":
         whole = hold_response(f, path.sample_rate_hz, path.hold) * delay_response(
             f, path.command_delay_s + path.response_delay_s
         )
-        return [r * whole for r in s.sent]
-    late = reported_response(f, path)
-    if position:
-        late = delay_response(f, path.response_delay_s)
-    direct = command_response(f, path)
-    inputs: list[ComplexArray] = [r * direct * late for r in s.sent]
-    if quantity == "torque_injection":
-        inputs = [u + own * late for u, own in zip(inputs, s.torque, strict=True)]
+        inputs = [r * whole for r in s.sent]
+    else:
+        late = _late(s, path, position=position)
+        direct = command_response(f, path)
+        inputs = [r * direct * late for r in s.sent]
+        if quantity == "torque_injection":
+            inputs = [u + own * late for u, own in zip(inputs, s.torque, strict=True)]
     if coulomb_nm:
-        inputs = [u - coulomb_nm * late * d for u, d in zip(inputs, s.direction, strict=True)]
+        taken = friction_input(s, path, quantity, inputs, position=position)
+        inputs = [u - coulomb_nm * d for u, d in zip(inputs, taken, strict=True)]
     return inputs
+
+
+def _late(s: LineSpectra, path: SignalPath, *, position: bool) -> ComplexArray:
+    """From the true quantity to the reported one; no filter lies in the way of a position."""
+    if position:
+        return delay_response(s.frequency_hz, path.response_delay_s)
+    return reported_response(s.frequency_hz, path)
+
+
+def friction_input(
+    s: LineSpectra, path: SignalPath, quantity: Quantity, inputs: list[ComplexArray],
+    *, position: bool = False,
+) -> list[ComplexArray]:  # fmt: skip
+    """What one Nm of Coulomb friction takes from the inputs, per realisation [periods, lines].
+
+    Within a closed speed loop it takes what of the reference would have made that torque. Its
+    controller is the recorded torque over the recorded error, which no friction changes: with
+    speed y = P·(u - d) and torque u = C·(r - y) the response is y = T·(r - d/C). Nothing where
+    that torque was not recorded.
+    """
+    late = _late(s, path, position=position)
+    if quantity != "closed_loop":
+        return [late * d for d in s.direction]
+    if not s.torque:
+        return [0.0 * d for d in s.direction]
+    sent = [r.mean(axis=0).conj() for r in s.sent]
+    error, torque = (
+        sum((part.mean(axis=0) * r for part, r in zip(parts, sent, strict=True)), np.zeros(1))
+        for parts in ([u - y for u, y in zip(inputs, s.response, strict=True)], s.torque)
+    )
+    per_nm = np.asarray(error / np.where(torque == 0.0, np.inf, torque))
+    return [per_nm * late * d for d in s.direction]
 
 
 def instrument_estimate(

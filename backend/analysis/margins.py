@@ -72,13 +72,15 @@ def _at(frequency_hz: FloatArray, value: FloatArray, where_hz: float) -> float:
 
 
 def bandwidth(frequency_hz: FloatArray, closed: ComplexArray) -> Bandwidth:
-    """-3 dB and -90° bandwidth, counted from the response at the lowest line.
+    """-3 dB and -90° bandwidth of a closed loop, counted from 0 dB.
 
-    The lowest line must lie well inside the bandwidth; its phase is taken as the principal value.
+    0 dB is what a drive's loop comes to at standstill; a lowest line rises above it where the
+    integral overshoots, the more the further up it lies. It must lie well inside the bandwidth;
+    its phase is taken as the principal value.
     """
     db = magnitude_db(closed)
     phase = phase_deg(closed)
-    low = _crossings(frequency_hz, db - db[0] + 3.0103)
+    low = _crossings(frequency_hz, db + 3.0103)
     late = _crossings(frequency_hz, phase + 90.0)
     falls = [f for f, sense in low if sense < 0]
     lags = [f for f, sense in late if sense < 0]

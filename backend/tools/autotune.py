@@ -304,7 +304,7 @@ async def apply_and_verify(
     inertia = found.inertia.result.inertia_kgm2.value
     check = Check(
         settings.envelope, facts, inertia, found.mechanics.hold, settings.rated_torque_nm,
-        settings.motor_inertia_kgm2,
+        settings.motor_inertia_kgm2, found.inertia.result.coulomb_nm.value,
     )  # fmt: skip
     promised = goals_for(found.load, settings.mark)
     order = _order(found, settings.mark)

@@ -15,6 +15,7 @@ from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
 from backend.analysis.identify import Identification, identify_with_path
 from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
 from backend.analysis.mechanical_model import MechanicalModel
+from backend.analysis.reported import charged, commanded, current_doubt, mean_cycles
 from backend.analysis.sampling import STEP_LEAD_S, Hold, SignalPath, sampled_command
 from backend.axis import Envelope
 from backend.tools import excite
@@ -26,6 +27,10 @@ from backend.tools.waveform import Waveform
 Kind = Literal["mechanics", "speed_loop", "position_loop"]
 Loop = Literal["auto", "none", "speed", "position"]
 
+_COMMANDED = (
+    "the drive reports the torque that it commands: what its current loop takes is not known, and "
+    "is charged to the band"
+)
 #: Weak modes below this are artefacts of friction more often than mechanics.
 _LOWEST_MODE_HZ = 15.0
 _WEAK_DB, _LEAST_DB, _LEAST_SHARE = 3.0, 1.0, 0.2
@@ -55,6 +60,8 @@ class SweepSettings:
     hold: Hold | None = None
     """How the drive holds set-points between cycles; None asks the drive, or the recording."""
     excitation: Waveform = "multisine"
+    coulomb_nm: float | None = None
+    """Friction that is taken out of a speed loop's response; None: the recording tells."""
 
 
 @dataclass(frozen=True)
@@ -121,11 +128,22 @@ def evaluate(
         for s, r in records
     )
     quantity: Quantity = "torque_mode" if loop == "none" else "torque_injection"
+    if (cycles := mean_cycles(taken)) is not None:
+        raise ValueError(
+            f"the drive reports its speed as the mean of {cycles} cycles, from which mechanics "
+            "cannot be told; switch that averaging off, or take another cycle time"
+        )
     found = identify_with_path(taken, path, quantity, hold_known=known)
     path = found.fit.path
     limit = settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm
     saturated = _saturated(taken, path, quantity, limit)
     warnings = _warnings(found, saturated, facts)
+    if facts.current_bandwidth_hz is None and commanded(path):
+        lines = found.direct.frequency_hz
+        doubt = current_doubt(lines)
+        direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
+        found = replace(found, direct=direct, corrected=corrected)
+        warnings += (_COMMANDED,)
     return SweepResult(
         kind="mechanics",
         loop=loop,
@@ -267,13 +285,23 @@ def _evaluate_loop(
     settings: SweepSettings,
     loop: Literal["none", "speed", "position"],
 ) -> SweepResult:
-    """Closed loop from its reference to the motion."""
-    position = settings.kind == "position_loop"
+    """Closed loop from its reference to the motion, of a speed loop without what friction does."""
     taken = []
-    for sequence, r in records:
-        response = r.position_rad - r.position_rad[0] if position else r.velocity_rad_s
-        taken.append(Record(sequence.excitation, response, r.torque_nm, r.valid))
-    frf = estimate_periodic(tuple(taken), path, "closed_loop")
+    if settings.kind == "position_loop":
+        for s, r in records:
+            moved = r.position_rad - r.position_rad[0]
+            taken.append(Record(s.excitation, moved, None, r.valid))
+        coulomb_nm: float | None = 0.0
+    else:
+        for s, r in records:
+            taken.append(
+                Record(s.excitation, r.velocity_rad_s, r.torque_nm, r.valid, r.position_rad)
+            )
+        coulomb_nm = settings.coulomb_nm
+    # The drive takes the reference at the beginning of its step, and the torque's mean follows by
+    # half a step, as does the speed's: both belong to the loop (`loops_of`), not to the way in.
+    path = replace(path, command_delay_s=path.command_delay_s - path.loop_delay_s)
+    frf = estimate_periodic(tuple(taken), path, "closed_loop", coulomb_nm=coulomb_nm)
     use = frf.in_band & (frf.coherence > 0.8)
     found: dict[str, float | bool | None] = {}
     if np.count_nonzero(use) > 12:

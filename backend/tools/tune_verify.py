@@ -27,6 +27,8 @@ Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], No
 MARGIN_DB, MARGIN_DEG, MS_RATIO = 1.0, 1.0, 1.03
 #: Lines that margins are read from: coherence, standard deviation of the phase, how many at least.
 _COHERENT, _BLURRED_DEG, _LINES = 0.9, 4.0, 12
+#: A loop is seen where its lines begin within its bandwidth: its crossover may else be missed.
+_WITHIN = 10 ** (-3.0103 / 20.0)
 #: Pairs of realisations that are measured; more where the first leave too few such lines: friction
 #: and noise of a heavy or a coarse axis average out.
 _REALISATIONS = (1, 4)
@@ -59,6 +61,7 @@ class Check:
     hold: Hold | None
     rated_torque_nm: float | None
     motor_inertia_kgm2: float | None
+    coulomb_nm: float | None = None
 
 
 async def verify(
@@ -77,7 +80,7 @@ async def verify(
         settings = sweep_evaluation.SweepSettings(
             check.envelope, kind="speed_loop", realisations=realisations,
             inertia_kgm2=check.inertia_kgm2, hold=check.hold,
-            rated_torque_nm=check.rated_torque_nm,
+            rated_torque_nm=check.rated_torque_nm, coulomb_nm=check.coulomb_nm,
         )  # fmt: skip
         swept = await sweep_tool.sweep(axis, session, settings, measuring, keep)
         read = sharp_margins(swept)
@@ -100,13 +103,16 @@ async def verify(
 def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool | None]:
     """Margins of the lines that noise hardly moves; empty where there are too few of them.
 
-    Where a loop's answer is weak against the noise of its sensor, a line says nothing of margins.
+    Where a loop's answer is weak against the noise of its sensor, a line says nothing of margins;
+    where only lines above its bandwidth do, its crossover is none of them.
     """
     frf = swept.frf
     use = frf.in_band & (frf.coherence > _COHERENT) & ~(frf.std_deg > _BLURRED_DEG)
     if np.count_nonzero(use) < _LINES:
         return {}
     f, closed = frf.frequency_hz[use], frf.response[use]
+    if np.abs(closed[0]) < _WITHIN:
+        return {}
     width = bandwidth(f, closed)
     return {
         **sweep_evaluation.margins_of(f, open_from_closed(closed)),

@@ -109,6 +109,16 @@ def _panels(page: Page, drive: str, folder: Path, colours: int) -> None:
     keep(page.locator(".bode").first, "verified")
 
 
+def _automatic(page: Page, station: Station, drive: str, folder: Path, colours: int) -> None:
+    """All steps in one job, and what its panel then tells."""
+    open_axis(page, drive, "tune")
+    page.get_by_role("heading", name="Designs").wait_for()
+    tuning.run_job(page, station, drive, "Start tuning")
+    page.get_by_role("heading", name="Verification").wait_for()
+    page.wait_for_timeout(SETTLE_MS)
+    _store(_panel(page, "Tune automatically"), folder / "tuning-automatic.png", colours)
+
+
 def _pages(browser: Browser, station: Station, drive: str, folder: Path, colours: int) -> None:
     """Both pages at two sizes, light and dark."""
     for screen, size in {"laptop": LAPTOP, "phone": PHONE}.items():
@@ -138,6 +148,7 @@ def shoot(browser: Browser, folder: Path, place: Path, colours: int = COLOURS) -
         page = context.new_page()
         page.goto(station.url)
         _panels(page, drive, folder, colours)
+        _automatic(page, station, drive, folder, colours)
         report = station.ok(station.http.get("/reports"))[0]["file"]
         page.set_viewport_size({"width": 900, "height": 1000})
         page.goto(f"{station.url}/api/v1/reports/{report}")

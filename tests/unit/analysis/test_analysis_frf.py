@@ -189,6 +189,43 @@ def test_closed_loop_response_of_the_speed_loop():
     assert np.median(np.abs(np.degrees(np.angle(ratio)))) < 1.5
 
 
+@pytest.mark.parametrize("told_nm", [None, 0.04])
+def test_friction_is_taken_out_of_a_closed_speed_loop(told_nm):
+    """A soft loop that is moved to and fro slows down by friction: no gain of a linear loop."""
+    fs, n = 2000.0, 2000
+    mechanics = replace(ONE, coulomb_nm=0.04)
+    kp = TURN * 20.0 * mechanics.total_kgm2
+    ki = kp * TURN * 2.0
+    lines = choose_lines(5.0, 400.0, 1.0, count=150)
+    base = 20.0 * np.sin(TURN * np.arange(6 * n) / n)
+    records = []
+    for number in range(4):
+        sign = 1.0 - 2.0 * (number % 2)
+        e = multisine(
+            sample_rate_hz=fs, period_samples=n, lines=lines, periods=5, transient_periods=1,
+            realisation=number // 2, invert=sign < 0,
+        )  # fmt: skip
+        e = scaled(e, 12.0)
+        played = base + e.samples
+        run = simulate(mechanics, Drive(kp_nms=kp, ki_nm=ki), fs, velocity=played)
+        records.append(Record(e, run.velocity, run.torque, None, run.position))
+    path = SignalPath(fs, "linear", response_delay_s=25e-6)
+
+    def error(coulomb_nm):
+        frf = estimate_periodic(tuple(records), path, "closed_loop", coulomb_nm=coulomb_nm)
+        s = 2j * np.pi * frf.frequency_hz
+        forward = (kp + ki / s) / (1 + s / (TURN * 1000.0)) * mechanics.response(frf.frequency_hz)
+        truth = forward * np.exp(s * 25e-6) / (1 + forward * np.exp(-s * 50e-6))
+        use = frf.frequency_hz < 60.0
+        ratio = np.abs(np.log(frf.response[use] / truth[use]))
+        return float(np.median(ratio)), frf.coulomb_nm
+
+    without, _ = error(0.0)
+    corrected, found_nm = error(told_nm)
+    assert corrected < 0.3 * without
+    assert found_nm == pytest.approx(0.04, rel=0.1)
+
+
 def linear_response(excitation, mechanics):
     e = scaled(excitation, 0.4)
     run = simulate(replace(mechanics, coulomb_nm=0.0), Drive(), e.sample_rate_hz, torque=e.samples)

@@ -66,6 +66,18 @@ def test_bandwidth_of_a_damped_second_order_system():
     assert bandwidth(F[:100], closed[:100]).minus_3db_hz is None
 
 
+def test_bandwidth_is_counted_from_standstill_wherever_the_lowest_line_lies():
+    # PI on an inertia rises above 0 dB where its integral acts; -3 dB lies where it lies.
+    loop = response(control.tf([TURN * 50.0, TURN * 50.0 * TURN * 20.0], [1, 0, 0]))
+    closed = closed_from_open(loop)
+    assert np.abs(closed[F > 10.0][0]) > 1.05
+    whole = bandwidth(F, closed).minus_3db_hz
+    assert bandwidth(F[F > 10.0], closed[F > 10.0]).minus_3db_hz == pytest.approx(whole, rel=1e-6)
+    w = TURN * whole
+    value = TURN * 50.0 * (1j * w + TURN * 20.0) / (1j * w) ** 2
+    assert np.abs(value / (1 + value)) == pytest.approx(10 ** (-3.0103 / 20), rel=1e-3)
+
+
 def test_rational_fit_recovers_resonances_of_a_known_system():
     w1, w2, wz = TURN * 57.0, TURN * 210.0, TURN * 40.0
     system = (

@@ -1,0 +1,79 @@
+"""What the reported speed and torque are, beyond what an estimate takes them to be.
+
+The reported speed is taken to be the true one through one lag and one delay, and the reported
+torque to be behind the current loop. Some drives report the mean speed of several cycles, or the
+torque that they command. The position tells the first, a torque that follows at once the second.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.frf import Frf
+from backend.analysis.line_spectra import Record, good_periods, period_spectra
+from backend.analysis.sampling import SignalPath, lag_response
+
+#: A speed may be a mean over so many cycles; it is one where half of the upper
+#: lines differ by less.
+_MOST_CYCLES, _SAME = 16, 0.01
+#: A torque that follows its command faster than this is the command; current loops are slower.
+_COMMANDED_HZ, _USUAL_HZ = 3500.0, 1000.0
+
+
+def mean_cycles(records: tuple[Record, ...]) -> int | None:
+    """Cycles whose mean the reported speed is, by the positions; None where it is no mean.
+
+    A speed that is the way of several cycles over their time has nulls within the band, which no
+    lag has, and tells nothing that the positions do not.
+    """
+    if any(r.position is None or r.excitation.segments for r in records):
+        return None
+    left = []
+    for cycles in range(1, _MOST_CYCLES + 1):
+        shares = [_apart(r, cycles) for r in records]
+        left.append(float(np.median(np.concatenate(shares))))
+    best = int(np.argmin(left))
+    return best + 1 if left[best] < _SAME else None
+
+
+def _apart(record: Record, cycles: int) -> FloatArray:
+    """How far the reported speed is from a mean over these cycles [lines], relative to it."""
+    e, place = record.excitation, record.position
+    assert place is not None
+    good, _ = good_periods(record)
+    if not good:
+        return np.ones(1)
+    before = np.concatenate([np.full(cycles, place[0]), place[:-cycles]])
+    mean = (place - before) * (e.sample_rate_hz / cycles)
+    told, made = (period_spectra(x, e, good).mean(axis=0) for x in (record.response, mean))
+    # Low lines are alike whatever the speed is.
+    upper = e.line_hz >= 0.5 * e.line_hz[-1]
+    return np.asarray((np.abs(told - made) / np.maximum(np.abs(told), 1e-300))[upper])
+
+
+def commanded(path: SignalPath) -> bool:
+    """Whether the reported torque is the command: no current loop lies between them."""
+    return path.current_bandwidth_hz is not None and path.current_bandwidth_hz > _COMMANDED_HZ
+
+
+def current_doubt(frequency_hz: FloatArray) -> ComplexArray:
+    """Logarithm of what an ordinary current loop takes that no recording shows, but its delay."""
+    return _without_delay(frequency_hz, np.log(lag_response(frequency_hz, _USUAL_HZ)))
+
+
+def charged(frf: Frf, lines_hz: FloatArray, doubt: ComplexArray) -> Frf:
+    """A wider band by a doubt that is known on ``lines_hz``."""
+    size, turn = (np.interp(frf.frequency_hz, lines_hz, x) for x in (doubt.real, doubt.imag))
+    return replace(
+        frf,
+        std_db=np.hypot(frf.std_db, 20 / np.log(10) * size),
+        std_deg=np.hypot(frf.std_deg, np.degrees(turn)),
+    )
+
+
+def _without_delay(f: FloatArray, told: ComplexArray) -> ComplexArray:
+    late = float(np.sum(f * told.imag) / np.sum(f**2))
+    return np.asarray(told - 1j * late * f)
