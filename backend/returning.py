@@ -42,15 +42,17 @@ class Returning:
         if debts and self._notes.was_moved(drive.id):
             axis.owes_stop = True
         drive.owed.recall(debts)
-        drive.owed.keep(lambda: self._note(drive))
+        drive.owed.keep(lambda: self._note(axis))
         if drive.found is None and serial is not None:
             # What is owed is owed to that one: another that answers here is noticed.
             drive.found = Found(drive.ports[0].station, serial=serial)
 
-    def _note(self, drive: Drive) -> None:
+    def _note(self, axis: Axis) -> None:
+        drive, owed = axis.drive, axis.drive.owed
+        # A stop that did not reach the drive is owed to it by the next server, too.
+        moves = owed.in_motion or axis.owes_stop
         try:
-            owed = drive.owed
-            self._notes.put(drive.id, _serial(drive), owed.outstanding, in_motion=owed.in_motion)
+            self._notes.put(drive.id, _serial(drive), owed.outstanding, in_motion=moves)
         except StorageFailed as error:
             if self._noted:
                 text = (

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
-import time
-from collections.abc import Coroutine, Iterator, Mapping
+from collections.abc import Coroutine, Mapping
 from datetime import UTC, datetime
 from functools import partial
 from typing import Protocol
@@ -37,6 +35,7 @@ from backend.api.live_people_messages import (
     Where,
 )
 from backend.api.live_shared import Shared, only
+from backend.api.live_watch import PeopleWatch
 from backend.api.people_record import PeopleRecord
 from backend.bench import Bench
 from backend.elapsed import moment_of
@@ -48,14 +47,8 @@ from backend.people.station import People
 from backend.people.support import Invitation, Said
 from backend.people.throttle import Bucket
 from drivers.cia402 import State
-from drivers.errors import DriveError, NotAllowed
+from drivers.errors import NotAllowed
 
-log = logging.getLogger(__name__)
-
-#: With the quarter second between looks, a silent connection loses control within 2 s, and what
-#: moves by its command ends.
-SILENCE_S = 1.7
-_LOOK_S, _HOLD_LOOK_S, _TEND_S = 0.25, 0.02, 5.0
 #: Lines of a page's chat at once, and a second: nobody talks the log full.
 _TALK = (10.0, 1.0)
 
@@ -90,7 +83,7 @@ class PeopleLive:
         self._tasks: set[asyncio.Task[object]] = set()
         self._ending: set[str] = set()
         self._talk: dict[str, Bucket] = {}
-        self._hold_pressed = asyncio.Event()
+        self._watch = PeopleWatch(bench, people, pages, self._fell_silent)
         bench.leases.on_notice.append(self._notice)
         bench.on_drives.append(self.changed)
         bench.on_job.append(self._job)
@@ -346,7 +339,7 @@ class PeopleLive:
         if identity.is_guest or identity.kind == "token":
             raise Forbidden("the enabling button is for a person on site")
         self._support.press(invitation, page.id)
-        self._hold_pressed.set()
+        self._watch.hold_pressed.set()
         guest = self._support.find(invitation).guest
         self._record.note(
             "invitation",
@@ -401,58 +394,14 @@ class PeopleLive:
         snapshot = None if member is None else member.monitor.snapshot
         return snapshot is not None and snapshot.state is State.OPERATION_ENABLED
 
-    # --- time -------------------------------------------------------------------------
-
     async def run(self) -> None:
         """Let end what ends by itself, for as long as the server lives."""
-        async with asyncio.TaskGroup() as group:
-            group.create_task(self._look(), name="people")
-            group.create_task(self._watch_holds(), name="enabling")
-            group.create_task(self._tend(), name="accounts")
-
-    async def _look(self) -> None:
-        leases = self._bench.leases
-        while True:
-            now = time.monotonic()
-            for page in list(self._pages.values()):
-                if now - page.heard > SILENCE_S:
-                    with _going_on():
-                        self._fell_silent(page)
-            with _going_on():
-                leases.tick(lambda drive: self._bench.jobs.moving(drive) is not None)
-            with _going_on():
-                self._support.tick()
-            await asyncio.sleep(_LOOK_S)
-
-    async def _watch_holds(self) -> None:
-        while True:
-            await self._hold_pressed.wait()
-            self._hold_pressed.clear()
-            while self._support.any_hold:
-                with _going_on():
-                    self._support.watch()
-                await asyncio.sleep(_HOLD_LOOK_S)
-
-    async def _tend(self) -> None:
-        while self._people.accounts_needed:
-            # The database may be away for a while; who is known stays known.
-            with contextlib.suppress(DriveError):
-                await self._people.accounts.tend()
-            await asyncio.sleep(_TEND_S)
+        await self._watch.run()
 
     def _spawn(self, work: Coroutine[object, object, object]) -> None:
         task: asyncio.Task[object] = asyncio.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-
-
-@contextlib.contextmanager
-def _going_on() -> Iterator[None]:
-    """One defect must not end the watch over everything that moves: it is logged."""
-    try:
-        yield
-    except Exception:
-        log.exception("what ends by itself could not be ended")
 
 
 def require_control(people: People, identity: Identity, drive: str) -> None:

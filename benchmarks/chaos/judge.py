@@ -127,7 +127,7 @@ class Judge:
     # --- motion -----------------------------------------------------------------------
 
     def moves(self, axis: int) -> bool:
-        history = self._history[axis]
+        history = tuple(self._history[axis])
         if len(history) < 2 or axis not in self.counts:
             return False
         newest = history[-1]

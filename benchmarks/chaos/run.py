@@ -22,6 +22,7 @@ from benchmarks.chaos.judge import P99_S, Judge
 from benchmarks.chaos.people import Person, Tally
 from benchmarks.chaos.station import SPECS, TrialStation
 from benchmarks.chaos.trouble import Troubles
+from benchmarks.chaos.trouble_more import AimedTroubles
 
 #: Everything answers again within this time after the last trouble (docs/safety.md).
 RECOVERED_S = 30.0
@@ -30,6 +31,7 @@ QUIET_S = 12.0
 _WATCHED = {
     "mms7": (0x6060, 0x6072, 0x6081, 0x6083, 0x6084, 0x60E0, 0x60E1),
     "r6l": (0x6060, 0x6072, 0x6081, 0x6083, 0x6084, 0x60E0, 0x60E1),
+    "ep3e": (0x6060, 0x6072, 0x6081, 0x6083, 0x6084, 0x60E0, 0x60E1),
     "ds_c": (0x6081, 0x6083, 0x6084),
 }
 
@@ -49,7 +51,8 @@ class Trial:
                    self.tally, self.say)
             for name in ("Anna", "Olaf", "Petra")
         ]  # fmt: skip
-        self.troubles = Troubles(self.station, self.judge, self.random, self.say)
+        aimed = AimedTroubles(self.station, self.people, self.random, self.say)
+        self.troubles = Troubles(self.station, self.judge, self.random, self.say, self.tally, aimed)
         self.figures: list[dict[str, Any]] = []
 
     def say(self, text: str) -> None:
@@ -167,7 +170,17 @@ class Trial:
         self.judge.read_log()
         self.judge.forget_claims()
         if self.station.process is not None and self.station.process.poll() is None:
-            self.figures.append(await asyncio.to_thread(self.station.figures))
+            self.figures.append(await asyncio.to_thread(self._settled_figures))
+
+    def _settled_figures(self) -> dict[str, Any]:
+        """Once the pages that have just gone are gone for the server, too."""
+        figures = self.station.figures()
+        for _ in range(20):
+            if not any(name.startswith(("live-", "hear-", "reread-")) for name in figures["tasks"]):
+                break
+            time.sleep(0.25)
+            figures = self.station.figures()
+        return figures
 
     def _await_calm(self) -> None:
         """Standing and without power in time; where the server died, only standing."""
@@ -228,7 +241,10 @@ class Trial:
             problem = job["problem"]
             if problem and problem["type"] == "urn:servodeck:internal":
                 self.judge.violated(f"{job['title']}: {problem['detail']}", problem["detail"][:60])
-        self._told = " ".join(j["problem"]["detail"] for j in jobs if j["problem"])
+        told = [j["problem"]["detail"] for j in jobs if j["problem"]]
+        # What an earlier server was killed with is put back when the axis stands, and told.
+        told += [str(j["result"]) for j in jobs if j["kind"] == "put-back" and j["result"]]
+        self._told = " ".join(told)
 
     def _values(self) -> dict[int, dict[int, bytes]]:
         found: dict[int, dict[int, bytes]] = {}
@@ -311,7 +327,8 @@ class Trial:
             body = json.loads(json.loads(line)["body"])
             if body["kind"] == "write" and isinstance(body["new"], int):
                 have[body["axis"], body["target"], body["new"]] += 1
-        if lacking := dict(Counter(self.tally.writes) - have):
+        wanted = Counter(self.tally.writes) - Counter(self.tally.doubtful)
+        if lacking := dict(wanted - have):
             self.judge.violated(f"writes that the audit does not have: {lacking}")
 
     def _judge_leaks(self) -> None:

@@ -43,9 +43,10 @@ SPECS: dict[str, tuple[AxisSpec, ...]] = {
         AxisSpec("A", "mms7", "2005:03", 500, 3000), AxisSpec("B", "mms7", "2005:03", 500, 3000),
     ),
     "canopen": (AxisSpec("A", "ds_c", "2502:00", 1, 50),),
-    "modbus": (AxisSpec("A", "ds_c", "2502:00", 1, 50),),
+    "modbus": (AxisSpec("A", "ds_c", "2502:00", 1, 50), AxisSpec("B", "ds_c", "2502:00", 1, 50)),
     "ethercat": (
         AxisSpec("A", "mms7", "2005:03", 500, 3000), AxisSpec("B", "r6l", "2006:01", 200, 500),
+        AxisSpec("C", "ep3e", "2005:00", 20, 60),
     ),
 }  # fmt: skip
 
@@ -175,9 +176,10 @@ class TrialStation:
         """No file of the server grows beyond this; a disk that is full."""
         assert self.process is not None
         hard = resource.RLIM_INFINITY
-        resource.prlimit(
-            self.process.pid, resource.RLIMIT_FSIZE, (hard if size is None else size, hard)
-        )
+        with contextlib.suppress(ProcessLookupError):
+            resource.prlimit(
+                self.process.pid, resource.RLIMIT_FSIZE, (hard if size is None else size, hard)
+            )
 
     def restart_segment(self) -> None:
         """The virtual segment again, after it was killed."""

@@ -11,7 +11,9 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from benchmarks.chaos.judge import Judge
+from benchmarks.chaos.people import Tally
 from benchmarks.chaos.station import TrialStation
+from benchmarks.chaos.trouble_more import AimedTroubles
 
 Trouble = Callable[[float], Awaitable[None]]
 
@@ -20,8 +22,10 @@ class Troubles:
     """Makes trouble for some seconds and takes it back."""
 
     def __init__(
-        self, station: TrialStation, judge: Judge, source: random.Random, say: Any
-    ) -> None:
+        self, station: TrialStation, judge: Judge, source: random.Random, say: Any, tally: Tally,
+        aimed: AimedTroubles,
+    ) -> None:  # fmt: skip
+        self._tally, self._aimed = tally, aimed
         self.station, self.judge, self.random, self._say = station, judge, source, say
         self.server_was_killed = False
         self.cycled: set[int] = set()
@@ -32,10 +36,11 @@ class Troubles:
             self.pull, self.blip, self.mute, self.power_cycle, self.fault, self.stop_server,
             self.kill_server, self.full_disk, self.clock, self.stop_drives,
         ]  # fmt: skip
+        every += self._aimed.kinds()
         if self.station.bus == "ethercat":
             every += [
                 self.lose, self.counter, self.late, self.slow_sdo, self.stop_host,
-                self.kill_host, self.kill_segment, self.power_twice,
+                self.kill_host, self.kill_segment, self.power_twice, self.cycle_in_exchange,
             ]  # fmt: skip
         return every
 
@@ -96,6 +101,15 @@ class Troubles:
         await self.power_cycle(0.3)
         await asyncio.sleep(self.random.uniform(0.1, 1.0))
         await self.power_cycle(min(seconds, 1.0))
+
+    async def cycle_in_exchange(self, seconds: float) -> None:
+        """Process data of all drives are exchanged, and the supply of one of them fails."""
+        for person in self._aimed.people:
+            if person.socket is not None and person.drives:
+                await person.ask("POST", "/buses/cyclic", "cyclic",
+                                 json={"url": self.station.url, "cycle_us": 2000})  # fmt: skip
+                break
+        await self.power_cycle(seconds)
 
     async def fault(self, _seconds: float) -> None:
         axis = self._axis()
@@ -171,6 +185,7 @@ class Troubles:
 
     async def kill_server(self, _seconds: float) -> None:
         self.server_was_killed = True
+        self._tally.killed()
         self.judge.end_claims()
         for axis in range(len(self.station.specs)):
             # A move to a target goes on to its target in the drive.
@@ -184,9 +199,11 @@ class Troubles:
         await asyncio.sleep(seconds)
         self.station.limit_files(None)
 
-    async def clock(self, _seconds: float) -> None:
+    async def clock(self, seconds: float) -> None:
+        """Set, for a while; sessions may end by it, grants and hand-overs not."""
         by_s = self.random.choice([-86400.0, -60.0, 60.0, 86400.0])
         if self.station.down_since is None:
             await asyncio.to_thread(self.station.tell_server, do="jump", by_s=by_s)
-            await asyncio.sleep(0.5)
-            await asyncio.to_thread(self.station.tell_server, do="jump", by_s=-by_s)
+            await asyncio.sleep(max(seconds, 0.5))
+            if self.station.down_since is None:
+                await asyncio.to_thread(self.station.tell_server, do="jump", by_s=-by_s)

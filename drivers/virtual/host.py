@@ -186,13 +186,21 @@ class Wires:
         return device
 
     def _mute(self, command: dict[str, object]) -> None:
-        on = bool(command.get("on", True))
+        """All drives of a wire, or the one at ``station``."""
+        on, station = bool(command.get("on", True)), command.get("station")
         can_wire = self._can_wires.get(str(command.get("wire")))
-        if can_wire is None:
-            self._slave(command).mute = on
+        if can_wire is not None:
+            for node in can_wire[0].nodes:
+                if station in (None, node.node_id):
+                    node.mute = on
             return
-        for node in can_wire[0].nodes:
-            node.mute = on
+        slave = self._slave(command)
+        if station is None:
+            slave.mute = on
+        elif on:
+            slave.mute_stations.add(int(str(station)))
+        else:
+            slave.mute_stations.discard(int(str(station)))
 
     def _swap(self, command: dict[str, object]) -> None:
         """Two drives change places on their wire."""

@@ -188,6 +188,8 @@ class ModbusSlave:
         self.stations = dict(stations)
         self.lock = lock or threading.RLock()
         self.mute = False
+        self.mute_stations: set[int] = set()
+        """Of these the wire carries no answer; the others answer as ever."""
         self.echo = False
         self.requests = 0
         self._now_ns = now_ns
@@ -249,7 +251,7 @@ class ModbusSlave:
 
     def _answer(self, request: Request) -> None:
         self.requests += 1
-        if self.mute:
+        if self.mute or request.station in self.mute_stations:
             return
         # A drive acts when the request has crossed the wire; its clock is set to that moment.
         ahead_ns = int((self.wire.arrival_s - time.monotonic()) * 1e9)

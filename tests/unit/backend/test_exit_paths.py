@@ -400,7 +400,7 @@ async def test_a_defect_does_not_end_the_watch_over_silent_pages(
     bench: Bench, hub: LiveHub, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """The dead-man of every motion lived in a task that one exception ended for good."""
-    monkeypatch.setattr("backend.api.live_people._LOOK_S", 0.001)
+    monkeypatch.setattr("backend.api.live_watch._LOOK_S", 0.001)
     broken = iter([True, True])
 
     def tick(*_what: object) -> None:

@@ -246,6 +246,23 @@ async def test_the_next_server_stops_what_a_killed_one_left_moving(
     await again.close()
 
 
+async def test_a_stop_that_is_owed_outlives_the_server(
+    x: Member, servo: Servo, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """The line was dead when the motion ended, and the server ended before it came back."""
+    x.axis.owes_stop = True
+    await lost_in_the_middle(x, servo)
+    state = tmp_path_factory.mktemp("ended") / "state"
+    shutil.copytree(tmp_path, state)
+    servo.mute = False
+    servo.enable()
+    servo.written.clear()
+    again, member = await bench_with(servo, state)
+    await member.monitor.refresh()
+    assert servo.words() == [2]
+    await again.close()
+
+
 async def test_what_was_changed_after_the_kill_is_offered_not_done(
     x: Member, servo: Servo, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

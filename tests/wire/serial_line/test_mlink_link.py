@@ -261,6 +261,19 @@ async def test_mute_drive_fails_fast_and_comes_back(port: Path, opened: OpenLink
         assert await link.read(1, STATUS) == b"\0\0"
 
 
+async def test_one_mute_drive_on_the_line_leaves_the_others_as_they_are(
+    port: Path, opened: OpenLink
+) -> None:
+    with serving(port, {1: ShelfDevice(), 2: ShelfDevice()}) as slave:
+        link = await opened(f"mlink://{port}?timeout_ms=30&retries=0")
+        slave.mute_stations.add(2)
+        with pytest.raises(LinkTimeout):
+            await link.read(2, STATUS)
+        assert await link.read(1, STATUS) == b"\0\0"
+        slave.mute_stations.clear()
+        assert await link.read(2, STATUS) == b"\0\0"
+
+
 async def test_power_cycle(port: Path, opened: OpenLink) -> None:
     shelf = ShelfDevice()
     with serving(port, {1: shelf}):
