@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray, IntArray, neighbour_mean
+from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray, IntArray, neighbour_mean
 from backend.analysis.frf import Frf
 from backend.analysis.line_spectra import (
     Quantity,
@@ -40,6 +40,9 @@ _SLOW, _ABOUT_S = 0.1, 0.002
 _AT_REVERSALS, _LEAST_TIME = 1.4, 0.01
 #: Power on the empty bins over that of the noise in it, from which on it tells of play.
 _ABOVE_NOISE = 4.0
+#: Where noise rules below, as behind a coarse encoder, play may show above this share of the sample
+#: rate, where it moves the motor alone; so much above the noise there.
+_HIGHEST, _FAR_ABOVE_NOISE = 0.3, 5.0
 
 
 @dataclass(frozen=True)
@@ -118,14 +121,26 @@ def distortion(
     if np.count_nonzero(upper) < _FEWEST:
         return none
     # Where noise rules (the coarse encoder of DS_C), what is left after it is taken out is noise.
-    powers = [float(np.median(np.mean(p, axis=0)[upper])) for p in (rest, noise)]
-    if powers[0] < _ABOVE_NOISE * powers[1]:
-        return Distortion(np.asarray(np.interp(frf.frequency_hz, f, share)))
+    highest = f >= _HIGHEST * path.sample_rate_hz
+    if not _stands_out(rest, noise, upper, _ABOVE_NOISE):
+        if not _stands_out(rest, noise, highest, _FAR_ABOVE_NOISE):
+            return Distortion(np.asarray(np.interp(frf.frequency_hz, f, share)))
+        upper = highest
     return Distortion(
         # What lies below the first empty bins is told by all of them, not by one beside a valley.
         np.asarray(np.interp(frf.frequency_hz, f, share, left=float(np.median(share)))),
         float(np.median(share[upper])), float(np.median(plain[upper])), _ratio(falls),
     )  # fmt: skip
+
+
+def _stands_out(
+    rest: list[FloatArray], noise: list[FloatArray], use: BoolArray, factor: float
+) -> bool:
+    """Whether what is left on these bins is more than noise."""
+    if np.count_nonzero(use) < _FEWEST:
+        return False
+    power, of_noise = (float(np.median(np.mean(p, axis=0)[use])) for p in (rest, noise))
+    return power >= factor * of_noise
 
 
 def _at_reversals(

@@ -27,6 +27,8 @@ Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], No
 MARGIN_DB, MARGIN_DEG, MS_RATIO = 1.0, 1.0, 1.03
 #: Lines that margins are read from: coherence, standard deviation of the phase, how many at least.
 _COHERENT, _BLURRED_DEG, _LINES = 0.9, 4.0, 12
+#: Coherence of lines that a bandwidth is read from where those do not hold it.
+_SEEN = 0.8
 #: A loop is seen where its lines begin within its bandwidth: its crossover may else be missed.
 _WITHIN = 10 ** (-3.0103 / 20.0)
 #: Pairs of realisations that are measured; more where the first leave too few such lines: friction
@@ -113,9 +115,16 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
     f, closed = frf.frequency_hz[use], frf.response[use]
     if np.abs(closed[0]) < _WITHIN:
         return {}
+    found = sweep_evaluation.margins_of(f, open_from_closed(closed))
+    if found["phase_margin_deg"] is None:
+        return {}
     width = bandwidth(f, closed)
+    if width.minus_3db_hz is None:
+        # It may fall into an antiresonance, where its lines are weak.
+        seen = frf.in_band & (frf.coherence > _SEEN)
+        width = bandwidth(frf.frequency_hz[seen], frf.response[seen])
     return {
-        **sweep_evaluation.margins_of(f, open_from_closed(closed)),
+        **found,
         "bandwidth_hz": width.minus_3db_hz,
         "bandwidth_90deg_hz": width.minus_90deg_hz,
     }

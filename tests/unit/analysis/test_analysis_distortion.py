@@ -71,6 +71,37 @@ def test_an_axis_with_play_gets_no_model_and_no_lines_beyond_the_direct_band():
     assert np.median(found.corrected.std_db) > 0.25 * 8.686
 
 
+@pytest.mark.parametrize("play", [True, False])
+def test_play_is_seen_above_the_noise_of_a_coarse_encoder(play):
+    """Noise hides the empty bins below 290 Hz; above, motion of every period is play, none is not.
+
+    So it is on a DS_C: 2500 lines, and a motor that rattles alone within the gap.
+    """
+    linear = tuple(records_of(Mechanics(loads=((1e-4, 60.0, 0.006),), coulomb_nm=0.0)))
+    rng = np.random.default_rng(5)
+    e = linear[0].excitation
+    empty = np.setdiff1d(np.arange(e.lines[0], e.lines[-1] + 1), e.lines)
+    sizes = np.abs(np.fft.rfft(linear[0].response[e.first_sample + PERIOD :][:PERIOD]))
+    around = np.interp(empty, e.lines, sizes[e.lines])
+    spectrum = np.zeros(PERIOD // 2 + 1, dtype=complex)
+    high = empty * RATE / PERIOD > 300.0
+    spectrum[empty[high]] = 0.5 * around[high] * np.exp(1j * rng.uniform(0, TURN, high.sum()))
+    own = np.tile(np.fft.irfft(spectrum, PERIOD), 8)
+    start = PERIOD - e.first_sample % PERIOD
+    records = []
+    for r in linear:
+        n = r.response.size
+        noise = np.fft.rfft(rng.normal(0.0, 0.3, n))
+        noise[np.fft.rfftfreq(n, 1.0 / RATE) > 290.0] *= 0.02
+        added = np.fft.irfft(noise, n) + play * own[start : start + n]
+        records.append(replace(r, response=r.response + added))
+    frf = estimate_periodic(tuple(records), PATH, "torque_mode")
+    found = distortion(tuple(records), PATH, "torque_mode", frf)
+    assert found.play is play
+    if play:
+        assert found.level == pytest.approx(0.5, rel=0.15)
+
+
 @pytest.mark.parametrize("filter_hz", [0.0, 400.0])
 def test_friction_is_what_it_is_however_late_the_speed_is_reported(filter_hz):
     """The lag of a filtered speed shows against the position; nobody tells the filter."""

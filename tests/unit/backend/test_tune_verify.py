@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,3 +72,11 @@ def test_margins_are_read_from_lines_that_noise_hardly_moves() -> None:
     found = sharp_margins(loop_swept(1.0))
     assert found["phase_margin_deg"] == pytest.approx(65.2, abs=1.5)
     assert sharp_margins(loop_swept(10.0)) == {}
+
+
+@pytest.mark.parametrize("from_hz", [80.0, 45.0])
+def test_a_loop_that_is_seen_above_its_crossover_only_tells_no_margins(from_hz: float) -> None:
+    # Its bandwidth is 60 Hz and its crossover 39 Hz: without them the rest says nothing.
+    swept = loop_swept(1.0)
+    blurred = np.where(swept.frf.frequency_hz < from_hz, 10.0, 1.0)
+    assert sharp_margins(replace(swept, frf=replace(swept.frf, std_deg=blurred))) == {}
