@@ -1,7 +1,8 @@
-import { useCallback, useEffect, useRef, useState } from 'react'
+import { useCallback, useRef, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
 import type { AuditEvent, AuditNames, AuditStatus, Problem } from '../../api/schema'
 import { useLink } from '../../live/store'
+import { useSearch } from '../../widgets/useSearch'
 import { type AuditFilters, auditQuery } from './filters'
 
 /** Entries that fit, newest first; `older` adds the ones before them. */
@@ -32,11 +33,8 @@ export function useAudit(filters: AuditFilters) {
     },
     [key],
   )
-  useEffect(() => {
-    if (!open) return
-    const timer = setTimeout(() => void load(null), 150)
-    return () => clearTimeout(timer)
-  }, [open, load])
+  const newest = useCallback(() => load(null), [load])
+  useSearch(newest, open)
   return {
     events,
     names,

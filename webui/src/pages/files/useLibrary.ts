@@ -1,7 +1,8 @@
-import { useCallback, useEffect, useState } from 'react'
+import { useCallback, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
 import type { LibraryEntry, Problem, TagCount } from '../../api/schema'
 import { useLink } from '../../live/store'
+import { useSearch } from '../../widgets/useSearch'
 import { type Filters, queryOf } from './filters'
 
 const PAGE = 50
@@ -32,11 +33,7 @@ export function useLibrary(filters: Filters) {
       setProblem(problemOf(error))
     }
   }, [key])
-  useEffect(() => {
-    if (!open) return
-    const timer = setTimeout(() => void refresh(), 150)
-    return () => clearTimeout(timer)
-  }, [open, refresh])
+  useSearch(refresh, open)
   const more = () => setLimit((before) => Math.min(500, before + PAGE))
   return { entries, total, tags, problems, shared, problem, refresh, more }
 }
