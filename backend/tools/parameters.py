@@ -123,7 +123,16 @@ async def load_set(
     report: list[Written] = []
     for number, (key, raw) in enumerate(chosen):
         progress(number / max(1, len(chosen)), f"writing {key}")
-        report.append(await _write_verified(drive, key, raw))
+        try:
+            report.append(await _write_verified(drive, key, raw))
+        except LinkLost as error:
+            # Half a set is in force now: which half, and how to take it back.
+            error.message += (
+                f"; {number} of {len(chosen)} rows were written before {key}; what was there "
+                f"before is in the set “{backup}”"
+            )
+            error.args = (error.message,)
+            raise
     return {
         "written": sum(row.ok for row in report),
         "failed": sum(not row.ok for row in report),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -13,7 +14,9 @@ from backend.drive import Drive
 from backend.library import SetLibrary
 from backend.parameter_set import BadSet
 from backend.tools import parameters
-from drivers.errors import NotAllowed, OutOfRange
+from drivers.errors import LinkLost, NotAllowed, OutOfRange
+from drivers.link import Address
+from tests.support.memory_link import MemoryLink
 
 SAVED = datetime(2026, 11, 21, 10, 15, tzinfo=UTC)
 
@@ -41,6 +44,32 @@ async def test_round_trip(drive: Drive) -> None:
     assert rows == {"2005:03": 400, "2005:10": 0, "2100:00": 0}, (
         "commands, motor-individual values and what only Modbus reaches are left out"
     )
+
+
+async def test_a_load_that_the_link_ends_says_how_far_it_came_and_how_to_take_it_back(
+    drive: Drive, link: MemoryLink, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half a set in force, and nothing but "the link is lost" said so."""
+    content = parameter_set.parse(await written(drive))
+    sent: list[int] = []
+    write = link.write
+
+    async def pulled(station: int, address: Address, data: bytes) -> None:
+        sent.append(address.index or 0)
+        if len(sent) == 2:
+            raise LinkLost("the adapter is gone")
+        await write(station, address, data)
+
+    monkeypatch.setattr(link, "write", pulled)
+    library = SetLibrary(tmp_path)
+    with pytest.raises(LinkLost, match="1 of 2 rows were written before 2005:10") as told:
+        await parameters.load_set(
+            drive, content, ["2005:03", "2005:10"], silent, library=library,
+            accept_other_identity=False,
+        )  # fmt: skip
+    name = told.value.message.split("“")[1].removesuffix("”")
+    undo = library.load(name)
+    assert {row.key: row.raw for row in undo.rows} == {"2005:03": 400, "2005:10": 0}
 
 
 async def test_every_truncation_is_noticed(drive: Drive) -> None:
