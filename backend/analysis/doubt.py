@@ -41,6 +41,8 @@ class Doubt:
     direct: tuple[ComplexArray, ...]
     path_step: FloatArray
     path_std: FloatArray
+    covariance: FloatArray
+    """Of the fit's parameters, [n, n]."""
 
 
 def doubt(
@@ -75,6 +77,8 @@ def doubt(
     return Doubt(
         tuple(corrected), tuple(direct), step[x.size :],
         np.sqrt(np.maximum(np.diag(covariance)[x.size :], 0.0)),
+        # All lines together may be explained better than each of a few is known.
+        covariance[: x.size, : x.size] / min(variance, 1.0),
     )  # fmt: skip
 
 

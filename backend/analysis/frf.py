@@ -30,6 +30,10 @@ from backend.analysis.line_spectra import (
 )
 from backend.analysis.sampling import DIRECT_SHARE, MODEL_SHARE, SignalPath
 
+#: What friction did to a line is off by this share where only the speed tells its direction, and
+#: where the balance of torques does at reversals.
+_BY_SPEED, _BY_BALANCE = 0.2, 0.08
+
 __all__ = ["Frf", "Quantity", "Record", "estimate_periodic", "valid_band_hz"]
 
 
@@ -55,6 +59,8 @@ class Frf:
     periods_used: int
     periods_dropped: int
     coulomb_nm: float = 0.0
+    friction: ComplexArray | None = None
+    """By how much the logarithm of each line may be off, all together, by friction; or nothing."""
 
     @property
     def magnitude_db(self) -> FloatArray:
@@ -124,10 +130,12 @@ def estimate_periodic(
         coulomb_nm = estimate_coulomb(s, path, quantity)
     inputs = continuous_input(s, path, quantity, coulomb_nm, position=position)
     g, _, s_ur = instrument_estimate(s, inputs)
-    # What friction did to the answer is known to about a fifth only; that is charged to the band
-    # (more of it would also weigh lines less that tell the speed filter well).
+    # What friction did to the answer is known in part only; that is charged to the band (more of
+    # it would also weigh lines less that tell the speed filter well).
     plain = instrument_estimate(s, continuous_input(s, path, quantity, position=position))[0]
-    doubt = 0.2 * np.log(g / plain)
+    told = all(record.told_direction is not None for record in records)
+    # Where friction takes most of the torque, a share of it is much of what is left.
+    doubt = _BY_BALANCE * (g / plain - 1.0) if told else _BY_SPEED * np.log(g / plain)
     power = np.asarray(sum(np.abs(r.mean(axis=0)) ** 2 for r in s.sent))
     noise_var, total_var, freedom = _variances(s, inputs, g, smooth_lines)
     relative = total_var * power / np.abs(g * s_ur) ** 2
@@ -154,6 +162,7 @@ def estimate_periodic(
         periods_used=s.used,
         periods_dropped=s.dropped,
         coulomb_nm=coulomb_nm,
+        friction=np.asarray(doubt),
     )
 
 

@@ -18,8 +18,9 @@ from backend.analysis.distortion import Distortion, distortion
 from backend.analysis.doubt import Doubt, Shifted
 from backend.analysis.doubt import doubt as joint_doubt
 from backend.analysis.frf import Frf, estimate_periodic
-from backend.analysis.line_spectra import Quantity, Record, loop_spectra
+from backend.analysis.line_spectra import Quantity, Record, loop_spectra, speed_lag_s
 from backend.analysis.loop_fit import fit_loop
+from backend.analysis.mode_doubt import ModeDoubt, mode_doubts
 from backend.analysis.model_fit import Solution, fit_sampled_model, views_of
 from backend.analysis.path_fit import (
     at_whole_cycles,
@@ -27,6 +28,7 @@ from backend.analysis.path_fit import (
     moved_path,
     path_covariance,
 )
+from backend.analysis.reversals import with_balanced_reversals
 from backend.analysis.sampled_model import LoopModel, SampledFit
 from backend.analysis.sampling import (
     STEP_LEAD_S,
@@ -42,6 +44,7 @@ from backend.analysis.stated_band import (
     widened,
     without_images,
 )
+from backend.analysis.two_signals import ways_of
 
 #: A model whose median relative misfit is larger, and larger than the noise, corrects nothing.
 TRUSTED_ERROR = 0.03
@@ -52,11 +55,19 @@ _LEFT_LATE = 0.3
 _UNDECIDED = 80.0
 #: At most this many rounds of refining loop, path and mechanics against each other.
 _PASSES = 4
+#: A mode whose part in the response is not known to this (logarithm, one deviation) is tried
+#: without; it stays where that is worse by so much.
+_UNSURE, _WORTH_A_MODE = 0.25, 80.0
+#: A line is hidden by friction where that may move it by so much; so many are more than a few.
+_HIDDEN, _HIDDEN_SHARE = 0.1, 0.03
+#: Rounds of friction by the balance of torques and mechanics by what that leaves.
+_BALANCES = 2
 #: What is left of a distortion along one axis of the complex plane, two draws averaged.
 _AVERAGED = 0.5
-#: Path parameters are moved by this much (cycles, logarithm) to see what they do, and moved at
-#: all where torque and motion together put them further off than this share of their deviation.
-_STEP, _SETTLED, _LEAST_STEP = 0.02, 0.2, 1e-4
+#: Path parameters are moved by this much (cycles, logarithm) to see what they do, moved at all
+#: where torque and motion together put them further off than this share of their deviation, and
+#: by no more than two deviations or this at once.
+_STEP, _SETTLED, _LONGEST_STEP = 0.02, 0.2, 0.1
 #: What half a cycle of delay weighs, in the criterion's units, is half of this; and what a cycle
 #: by which a drive would report too early does.
 _FRACTION, _EARLY = 100.0, 2e3
@@ -78,6 +89,8 @@ class Identification:
     fit: SampledFit
     trusted: bool = True
     distortion: Distortion | None = None
+    modes: tuple[ModeDoubt, ...] = ()
+    """How exactly each mode of the model is known; empty where no model is trusted."""
 
 
 def identify_mechanics(
@@ -96,7 +109,10 @@ def identify_mechanics(
     """
     task = _Task(settled(records), quantity, max_modes, jitter_s)
     found = task.refined(task.trial(path, coulomb_nm), lambda _: path)
-    return _identification(task, found, task.doubt(found, corner_known=True))
+    if coulomb_nm is None:
+        task, found = task.balanced(found)
+    found, doubt = task.with_sure_modes(found, task.doubt(found, corner_known=True), True)
+    return _identification(task, found, doubt)
 
 
 def identify_with_path(
@@ -121,13 +137,14 @@ def identify_with_path(
             task.records, known, loop_closed=True, hold_known=True, motion=fit
         )[0]  # fmt: skip
 
-    found = task.refined(best, again)
+    task, found = task.balanced(task.refined(best, again))
     doubt = task.doubt(found, corner_known)
     for _ in range(_PASSES if np.all(np.isfinite(doubt.path_step)) else 0):
         if np.all(np.abs(doubt.path_step) < _SETTLED * doubt.path_std):
             break
         found = task.moved(found, doubt)
         doubt = task.doubt(found, corner_known)
+    found, doubt = task.with_sure_modes(found, doubt, corner_known)
     alike = [t for t in trials[1:] if _rank(t) < _rank(best) + _UNDECIDED]
     return _undecided(_identification(task, found, doubt), best, alike)
 
@@ -204,9 +221,42 @@ class _Task:
             last = self.trial(path, last.views.velocity.coulomb_nm, last.fit)
         return last
 
+    def balanced(self, trial: _Trial) -> tuple[_Task, _Trial]:
+        """The same refined with friction as the balance of torques tells it at reversals."""
+        task, last = self, trial
+        lag_s = speed_lag_s(self.records, trial.path)
+        motion = trial.fit if self.quantity == "torque_injection" else None
+        for n in range(_BALANCES):
+            if last.fit.error > max(TRUSTED_ERROR, 1.5 * last.fit.noise):
+                break
+            friction_nm = last.views.velocity.coulomb_nm
+            told = with_balanced_reversals(
+                self.records, self.quantity, last.fit, friction_nm, lag_s
+            )
+            task = replace(self, records=told)
+            anew = n == 0 and _hidden_by_friction(trial)
+            last = task.trial(trial.path, None, motion, None if anew else last.solution)
+        return task, last
+
+    def with_sure_modes(
+        self, trial: _Trial, doubt: Doubt, corner_known: bool
+    ) -> tuple[_Trial, Doubt]:
+        """The same with fewer modes as long as one of them may as well be none.
+
+        Two that share what one does are as little known, each by itself.
+        """
+        motion = trial.fit if self.quantity == "torque_injection" else None
+        while trial.fit.error <= TRUSTED_ERROR and _unsure(trial, doubt):
+            task = replace(self, max_modes=len(trial.fit.model.modes) - 1)
+            fewer = task.trial(trial.path, trial.views.velocity.coulomb_nm, motion)
+            if fewer.fit.score > trial.fit.score + _WORTH_A_MODE:
+                break
+            trial, doubt = fewer, task.doubt(fewer, corner_known)
+        return trial, doubt
+
     def moved(self, trial: _Trial, doubt: Doubt) -> _Trial:
         """The same mechanics refined on the path that torque and motion together would have."""
-        most = 2.0 * np.maximum(doubt.path_std, _LEAST_STEP)
+        most = np.maximum(2.0 * doubt.path_std, _LONGEST_STEP)
         step = np.clip(doubt.path_step, -most, most)
         path = moved_path(trial.path, float(step[0]), float(step[1]) if step.size > 1 else 0.0)
         motion = trial.fit if self.quantity == "torque_injection" else None
@@ -258,7 +308,8 @@ def _rank(trial: _Trial) -> float:
 def _implausible(fit: SampledFit) -> float:
     """A drive does not report what has not happened yet, and takes set-points at whole cycles."""
     path = fit.path
-    early = max(-fit.delay_s * path.sample_rate_hz - 0.1, 0.0)
+    first_s = min(fit.delay_s, fit.position_delay_s)
+    early = max(-first_s * path.sample_rate_hz - 0.1, 0.0)
     lead_s = STEP_LEAD_S if path.hold == "linear" else 0.0
     cycles = (path.command_delay_s + lead_s) * path.sample_rate_hz
     return _EARLY * early + _FRACTION * abs(cycles - round(cycles))
@@ -275,26 +326,43 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
         else:
             plain = unexplained(views.velocity, trial.solution, 0)
         return Identification(plain, plain, fit, False, spoilt)
-    direct, corrected = [], []
-    ways = [(views.velocity, fit.delay_s, False)]
-    if views.position is not None:
-        ways.append((views.position, fit.position_delay_s, True))
-    for place, (raw, late_s, integrated) in enumerate(ways):
-        late = delay_response(raw.frequency_hz, late_s)
-        if not integrated and path.response_bandwidth_hz is None:
-            late = late * lag_response(raw.frequency_hz, fit.path.response_bandwidth_hz)
-        plain = replace(raw, response=np.asarray(raw.response / late))
-        factor = fit.image_factor(raw.frequency_hz, integrated=integrated)
-        # Images stay in the direct estimate: its band must contain them.
-        direct.append(widened(plain, factor, 1.0, doubt.direct[place]))
-        corrected.append(without_images(plain, factor, task.jitter_s, doubt.corrected[place]))
+    parts = ways_of(views.velocity, views.position, path, fit, doubt)
+    # Images stay in the direct estimate: its band must contain them.
+    direct = [widened(p.lines, p.factor, 1.0, p.direct) for p in parts]
+    corrected = [without_images(p.lines, p.factor, task.jitter_s, p.corrected) for p in parts]
     # Play changes stiffness, and so everything above the frequency where it shows most.
     share = np.maximum.accumulate(spoilt.share) if spoilt.play else _AVERAGED * spoilt.share
     best, lines = (distorted(pooled(parts), share) for parts in (corrected, direct))
     if spoilt.play:
         lines = lines.cut(lines.valid_band_hz[1])
         return Identification(lines, lines, fit, False, spoilt)
-    return Identification(lines, best, fit, True, spoilt)
+    return Identification(lines, best, fit, True, spoilt, _mode_doubts(trial, doubt))
+
+
+def _hidden_by_friction(trial: _Trial) -> bool:
+    """Whether lines were so uncertain by friction that other mechanics may have been there."""
+    doubt = trial.views.velocity.friction
+    return doubt is not None and float(np.mean(np.abs(doubt) > _HIDDEN)) > _HIDDEN_SHARE
+
+
+def _unsure(trial: _Trial, doubt: Doubt) -> bool:
+    """Whether a mode within the band has a part in the response that may be nothing."""
+    low, high = trial.views.velocity.frequency_hz[0], trial.fit.valid_band_hz[1]
+    pairs = zip(trial.fit.model.modes, _mode_doubts(trial, doubt), strict=True)
+    return any(d.residue > _UNSURE and low < m.frequency_hz < high for m, d in pairs)
+
+
+def _mode_doubts(trial: _Trial, doubt: Doubt) -> tuple[ModeDoubt, ...]:
+    """With what friction may do to all lines together."""
+    given = [view for view in (trial.views.velocity, trial.views.position) if view is not None]
+    together = [
+        np.zeros(v.frequency_hz.size, np.complex128) if v.friction is None else v.friction
+        for v in given
+    ]
+    return mode_doubts(
+        trial.solution.problem, trial.solution.x, doubt.covariance, together,
+        friction_seen=trial.views.velocity.coulomb_nm > 0,
+    )  # fmt: skip
 
 
 def _without_path(trial: _Trial) -> ComplexArray:

@@ -39,7 +39,8 @@ class Record:
 
     ``response`` [n] is velocity or position, ``torque`` [n] the reported torque (needed for
     *torque_injection*), ``valid`` [n] False where a cycle was lost or late, ``position`` [n] the
-    integral of a velocity ``response`` as the drive reports it.
+    integral of a velocity ``response`` as the drive reports it. ``told_direction`` [n] is the mean
+    true direction of motion between each sample and the next where more than the speed tells it.
     """
 
     excitation: Excitation
@@ -47,13 +48,16 @@ class Record:
     torque: FloatArray | None = None
     valid: BoolArray | None = None
     position: FloatArray | None = None
+    told_direction: FloatArray | None = None
     _directions: dict[float, FloatArray] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
 
     def __post_init__(self) -> None:
         n = self.excitation.samples.size
-        for signal in (self.response, self.torque, self.valid, self.position):
+        for signal in (
+            self.response, self.torque, self.valid, self.position, self.told_direction,
+        ):  # fmt: skip
             if signal is not None and signal.shape != (n,):
                 raise ValueError(f"signals must have {n} samples, as the excitation has")
 
@@ -74,8 +78,8 @@ class LineSpectra:
     """Line spectra of all good periods: arrays [m realisations][p periods, lines].
 
     ``torque`` is the loop's own torque (of a *closed_loop* all of it, where it was recorded),
-    ``direction`` the direction of motion (-1 to 1) that Coulomb friction follows, when it does
-    (the speed is reported late).
+    ``direction`` the direction of motion (-1 to 1) that
+    Coulomb friction follows, when it does (the speed is reported late).
     """
 
     frequency_hz: FloatArray
@@ -167,22 +171,16 @@ def _velocity_from_position(
 ) -> ComplexArray:
     """Spectra [periods, lines] of the velocity by way of the reported position.
 
-    An axis that gains speed makes a parabola, whose curvature the velocity tells; the rest of the
-    drift is the difference between two periods.
+    What is transformed is how far the axis went from one sample to the next: the mean velocity
+    between them, exactly. A position that ends elsewhere than it began would leak onto every line.
     """
     if record.position is None:
         raise ValueError("the recording has no position")
     if e.segments:
         return tone_amplitudes(record.position, e, periods) * (2j * np.pi * e.line_hz)
-    n = e.period_samples
-    curvature = 0.0
-    if len(periods) > 1:
-        means = [float(record.response[e.first_sample + p * n :][:n].mean()) for p in periods]
-        curvature = (means[-1] - means[0]) / ((periods[-1] - periods[0]) * n) / rate
-    t = np.arange(record.position.size) - e.first_sample
-    straight = record.position - 0.5 * curvature * t**2
-    spectra = period_spectra(np.asarray(straight), e, periods)
-    return np.asarray(spectra * (2j * np.pi * e.line_hz))
+    mean = np.diff(record.position, append=record.position[-1]) * rate
+    spectra = period_spectra(mean, e, periods)
+    return np.asarray(spectra * _centre_of_interval(e.line_hz, rate))
 
 
 def collect(
@@ -267,8 +265,10 @@ def friction_direction(
 
     ``lag_s`` as from :func:`speed_lag_s`.
     """
-    spectra = period_spectra(record.direction(lag_s), e, periods)
     centre = _centre_of_interval(e.line_hz, e.sample_rate_hz)
+    if record.told_direction is not None:
+        return np.asarray(period_spectra(record.told_direction, e, periods) * centre)
+    spectra = period_spectra(record.direction(lag_s), e, periods)
     return np.asarray(spectra * centre / delay_response(e.line_hz, path.response_delay_s))
 
 

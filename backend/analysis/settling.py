@@ -140,12 +140,14 @@ def _without(record: Record, poles: ComplexArray) -> Record:
 
 def _cleaned(signal: FloatArray, e: Excitation, poles: ComplexArray) -> FloatArray:
     d = _difference(signal, e)
-    n = np.arange(d.stop - d.start)
+    # One sample more: what lies between the last one and the next belongs to the last period.
+    stop = min(d.stop + 1, signal.size)
+    n = np.arange(stop - d.start)
     swings = np.exp(poles[None, :] * n[:, None])
     basis = swings[: d.series.size]
     matrix = np.concatenate([basis.real, -basis.imag], axis=1)
     a, b = np.split(np.linalg.lstsq(matrix, d.series, rcond=None)[0], 2)
     size = (a + 1j * b) / (np.exp(poles * d.period) - 1.0)
     out = signal.copy()
-    out[d.start : d.stop] -= (swings @ size).real
+    out[d.start : stop] -= (swings @ size).real
     return out

@@ -15,6 +15,9 @@ from backend.analysis.sampling import hold_response
 SYSTEMATIC_DB = 0.05
 SYSTEMATIC_DEG = 0.35
 
+#: So much of what is taken out as images may be wrong beside what the model's doubt says.
+_IMAGES_LEFT = 0.08
+
 #: What no model explains is shown to this share of the sample rate; its misfit is a mean over so
 #: many lines to each side.
 _UNTRUSTED_SHARE, _AROUND = 0.1, 6
@@ -52,14 +55,17 @@ def distorted(frf: Frf, share: FloatArray) -> Frf:
 
 
 def pooled(parts: list[Frf]) -> Frf:
-    """Each line by what is known best; the errors of two views of one motion may be the same."""
+    """Each line by what is known best; the errors of two views of one motion may be the same.
+
+    A third view is made of the other two, and taken where it is better than both together.
+    """
     if len(parts) == 1:
         return parts[0]
-    first, second = parts
-    a, b = (np.maximum(np.nan_to_num(p.std_db, nan=1.0), 1e-6) ** -2 for p in parts)
+    first, second = parts[:2]
+    a, b = (np.maximum(np.nan_to_num(p.std_db, nan=1.0), 1e-6) ** -2 for p in (first, second))
     share = a / (a + b)
     response = first.response * share + second.response * (1.0 - share)
-    return replace(
+    mean = replace(
         first,
         response=np.asarray(response),
         std_db=first.std_db * share + second.std_db * (1.0 - share),
@@ -67,6 +73,17 @@ def pooled(parts: list[Frf]) -> Frf:
         coherence=np.maximum(first.coherence, second.coherence),
         noise=first.noise * share + second.noise * (1.0 - share),
         distortion=first.distortion * share + second.distortion * (1.0 - share),
+    )
+    return mean if len(parts) == 2 else _better(mean, parts[2])
+
+
+def _better(one: Frf, other: Frf) -> Frf:
+    """Each line from the estimate whose band is smaller there."""
+    sizes = [np.hypot(np.radians(p.std_deg), p.std_db * np.log(10) / 20) for p in (one, other)]
+    take = sizes[1] < sizes[0]
+    names = ("response", "std_db", "std_deg", "coherence", "noise", "distortion")
+    return replace(
+        one, **{name: np.where(take, getattr(other, name), getattr(one, name)) for name in names}
     )
 
 
@@ -84,9 +101,9 @@ def widened(frf: Frf, factor: ComplexArray, share: float, doubt: ComplexArray) -
 
 def without_images(direct: Frf, factor: ComplexArray, jitter_s: float, doubt: ComplexArray) -> Frf:
     """The lines without what sampling folds back, and the band that is left to them."""
-    # The correction is as uncertain as the model: a fifth of it stays in the band.
+    # The correction is as uncertain as the model; beside its doubt a part of it stays in the band.
     return replace(
-        widened(direct, factor, 0.2, doubt),
+        widened(direct, factor, _IMAGES_LEFT, doubt),
         response=np.asarray(direct.response / factor),
         valid_band_hz=valid_band_hz(
             float(direct.frequency_hz[0]), direct.sample_rate_hz, model=True, jitter_s=jitter_s

@@ -15,6 +15,7 @@ from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
 from backend.analysis.identify import Identification, identify_with_path
 from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
 from backend.analysis.mechanical_model import MechanicalModel
+from backend.analysis.mode_doubt import ModeDoubt
 from backend.analysis.reported import charged, commanded, current_doubt, mean_cycles
 from backend.analysis.sampling import STEP_LEAD_S, Hold, SignalPath, sampled_command
 from backend.axis import Envelope
@@ -34,6 +35,10 @@ _COMMANDED = (
 #: Weak modes below this are artefacts of friction more often than mechanics.
 _LOWEST_MODE_HZ = 15.0
 _WEAK_DB, _LEAST_DB, _LEAST_SHARE = 3.0, 1.0, 0.2
+#: A mode whose part in the response is not known to this (logarithm, one deviation) may be none.
+_UNSURE = 1.0 / 3.0
+#: Deviations to either side that hold 95 of 100 cases.
+_CI95 = 1.96
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +158,10 @@ def evaluate(
         trusted=found.trusted,
         unit="(rad/s)/Nm" if facts.torque_known else "(rad/s)/rated torque",
         resonances=resonance_table(
-            found.fit.model, found.corrected.frequency_hz, found.corrected.valid_band_hz[1]
+            found.fit.model,
+            found.corrected.frequency_hz,
+            found.corrected.valid_band_hz[1],
+            found.modes,
         )
         if found.trusted
         else (),
@@ -225,15 +233,18 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
 
 
 def resonance_table(
-    model: MechanicalModel, lines_hz: FloatArray, highest_hz: float
-) -> tuple[Resonance, ...]:
+    model: MechanicalModel, lines_hz: FloatArray, highest_hz: float,
+    doubts: tuple[ModeDoubt, ...] = (),
+) -> tuple[Resonance, ...]:  # fmt: skip
     """Resonances and antiresonances that the lines show, ascending; heights are local, in dB.
 
     A mode that hardly rises, or that no line shows because it is narrower than what lies between
-    two of them, explains noise.
+    two of them, explains noise; so does one whose own part may as well be nothing, by ``doubts``
+    (one for each mode, or none).
     """
     rows: list[Resonance] = []
-    for mode in model.modes:
+    for number, mode in enumerate(model.modes):
+        known = doubts[number] if doubts else None
         height = model.height_db(mode)
         low = mode.frequency_hz < _LOWEST_MODE_HZ
         nearest_hz = float(np.min(np.abs(lines_hz - mode.frequency_hz)))
@@ -241,14 +252,22 @@ def resonance_table(
         seen = model.prominence(mode) / np.hypot(1.0, nearest_hz / half_width_hz)
         shown = height > _WEAK_DB if low else seen > _LEAST_SHARE
         inside = lines_hz[0] < mode.frequency_hz <= highest_hz
-        if shown and inside and mode.damping < 1.0:
-            rows.append(Resonance("resonance", mode.frequency_hz, mode.damping, height))
+        sure = known is None or known.residue < _UNSURE
+        if shown and sure and inside and mode.damping < 1.0:
+            rows.append(
+                Resonance(
+                    "resonance", mode.frequency_hz, mode.damping, height,
+                    _around(mode.frequency_hz, known.frequency if known else None),
+                    _around(mode.damping, known.damping if known else None),
+                )
+            )  # fmt: skip
     kept = [row.frequency_hz for row in rows]
     for frequency, damping in model.antiresonances():
         # An antiresonance belongs to the next mode above it, which may lie beyond the band.
         above = min((m.frequency_hz for m in model.modes if m.frequency_hz > frequency), default=0)
-        known = above in kept or above > highest_hz or (not above and frequency > 0.25 * highest_hz)
-        if not known or not lines_hz[0] < frequency <= highest_hz:
+        paired = above in kept or above > highest_hz
+        paired = paired or (not above and frequency > 0.25 * highest_hz)
+        if not paired or not lines_hz[0] < frequency <= highest_hz:
             continue
         around = np.array([frequency * 0.5, frequency, frequency * 2.0])
         db = 20 * np.log10(np.abs(model.response(around)))
@@ -256,6 +275,14 @@ def resonance_table(
         if depth < -_LEAST_DB:
             rows.append(Resonance("antiresonance", frequency, damping, depth))
     return tuple(sorted(rows, key=lambda row: row.frequency_hz))
+
+
+def _around(value: float, deviation: float | None) -> tuple[float, float] | None:
+    """The 95 % interval of a value whose logarithm has this deviation."""
+    if deviation is None:
+        return None
+    factor = float(np.exp(_CI95 * min(deviation, 5.0)))
+    return value / factor, value * factor
 
 
 def _injection_margins(found: Identification) -> dict[str, float | bool | None]:
@@ -384,7 +411,8 @@ def as_json(result: SweepResult) -> dict[str, object]:
         "resonances": [
             {
                 "kind": r.kind, "frequency_hz": r.frequency_hz, "damping": r.damping,
-                "height_db": r.height_db,
+                "height_db": r.height_db, "frequency_ci95_hz": r.frequency_ci95_hz,
+                "damping_ci95": r.damping_ci95,
             }
             for r in result.resonances
         ],

@@ -106,6 +106,10 @@ export const tuning = {
   'resonance.antiresonance': ['antiresonance', '反谐振'],
   'resonance.damping': ['Damping', '阻尼'],
   'resonance.height': ['Height', '高度'],
+  'resonance.band': [
+    'In brackets: where the true damping lies in 95 of 100 cases. Strong friction and a resonance narrower than the lines of the measurement widen it.',
+    '括号内:真实阻尼有 95% 的可能落在此范围。摩擦大,或谐振比测量谱线间隔更窄时,该范围会变宽。',
+  ],
   'resonance.notch': ['Notch here', '在此陷波'],
   'margin.title': ['Loop', '环路'],
   'margin.titleMeanwhile': ['The loop that was closed meanwhile', '测量时闭合的环路'],

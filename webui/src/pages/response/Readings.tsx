@@ -77,6 +77,9 @@ export function CursorTable({
 
 const hertzOf = (f: number | null) => (f === null ? '—' : f < 0 ? `−${hertz(-f)}` : hertz(f))
 
+const percentBand = ([low, high]: [number, number]) =>
+  `(${fixed(low * 100, 1, '')}…${fixed(high * 100, 1, '%')})`
+
 /** Resonances and antiresonances; `onNotch` puts a notch on a resonance. */
 export function ResonanceTable({
   sweep,
@@ -104,7 +107,10 @@ export function ResonanceTable({
             <tr key={`${each.kind} ${each.frequency_hz}`}>
               <td>{t(`resonance.${each.kind}`)}</td>
               <td className="right">{hertz(each.frequency_hz)}</td>
-              <td className="right">{fixed(each.damping * 100, 1, '%')}</td>
+              <td className="right">
+                {fixed(each.damping * 100, 1, '%')}
+                {each.damping_ci95 && <span className="dim"> {percentBand(each.damping_ci95)}</span>}
+              </td>
               <td className="right">{fixed(each.height_db, 1, 'dB')}</td>
               {onNotch && (
                 <td className="right">
@@ -121,6 +127,9 @@ export function ResonanceTable({
           ))}
         </tbody>
       </table>
+      {sweep.resonances.some((each) => each.damping_ci95) && (
+        <p className="dim">{t('resonance.band')}</p>
+      )}
     </div>
   )
 }

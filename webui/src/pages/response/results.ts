@@ -5,6 +5,9 @@ export interface Resonance {
   frequency_hz: number
   damping: number
   height_db: number
+  /** Where the true value lies in 95 of 100 cases; older measurements do not say. */
+  frequency_ci95_hz?: [number, number] | null
+  damping_ci95?: [number, number] | null
 }
 
 export type Margins = Record<string, number | boolean | null>

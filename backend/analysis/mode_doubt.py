@@ -1,0 +1,81 @@
+"""How exactly a fit tells its modes: frequency, damping and part in the response.
+
+The covariance of the fit's parameters carried over to the modes by their slopes (Pintelon &
+Schoukens, *System Identification*, 2012, section 2.4), and beside it what all lines may be off by
+together, which no covariance of single lines shows: the friction that was taken out of them acts
+like damping, by the same share everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.fit_problem import Problem, robust_rows
+
+#: What path and interpolation leave of frequency and damping however long one measures, and of
+#: damping where the friction that every axis has did not show, and so is still in the lines.
+_SYSTEMATIC = np.array([3e-4, 0.03, 0.0])
+_UNSEEN_FRICTION = np.array([0.0, 0.1, 0.0])
+#: Parameters (most are logarithms) are moved by this much to see what the modes do.
+_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class ModeDoubt:
+    """One standard deviation each, of logarithms: frequency, damping and residue of a mode."""
+
+    frequency: float
+    damping: float
+    residue: float
+
+
+def mode_doubts(
+    problem: Problem, x: FloatArray, covariance: FloatArray, together: Sequence[ComplexArray],
+    *, friction_seen: bool,
+) -> tuple[ModeDoubt, ...]:  # fmt: skip
+    """For each mode of the model at ``x``, in its order.
+
+    ``covariance`` is that of ``x``; ``together`` are, per view, one deviation [lines] of the
+    logarithm that is common to all lines; ``friction_seen`` whether friction was taken out.
+    """
+    here = _modes(problem, x)
+    if here.size == 0:
+        return ()
+    slopes = np.zeros((x.size, *here.shape))
+    for n in range(x.size):
+        moved = x.copy()
+        moved[n] += _STEP
+        there = _modes(problem, moved)
+        if there.shape == here.shape:
+            slopes[n] = (there - here) / _STEP
+    spread = np.einsum("pml,pq,qml->ml", slopes, covariance, slopes)
+    shift = np.einsum("pml,p->ml", slopes, _step_of(problem, x, together))
+    least = _SYSTEMATIC**2 + (0.0 if friction_seen else 1.0) * _UNSEEN_FRICTION**2
+    total = np.sqrt(np.maximum(spread, 0.0) + shift**2 + least)
+    return tuple(ModeDoubt(*(float(v) for v in row)) for row in total)
+
+
+def _modes(problem: Problem, x: FloatArray) -> FloatArray:
+    """Logarithms [modes, 3] of frequency, damping and residue."""
+    modes = problem.form.model(x).modes
+    rows = [[m.frequency_hz, m.damping, m.residue] for m in modes]
+    return np.asarray(np.log(np.maximum(np.array(rows).reshape(-1, 3), 1e-12)))
+
+
+def _step_of(problem: Problem, x: FloatArray, together: Sequence[ComplexArray]) -> FloatArray:
+    """How far the best parameters move when all measured lines do."""
+    residuals, jacobian = problem.misfit(x)
+    rows = np.zeros(residuals.size)
+    parts = []
+    for view, common in zip(problem.views, together, strict=True):
+        weighted = common * view.weight
+        parts += [weighted.real, weighted.imag]
+    flat = np.concatenate(parts)
+    rows[: flat.size] = flat
+    root = robust_rows(residuals)
+    jacobian = jacobian * root[:, None]
+    return np.asarray(np.linalg.lstsq(jacobian, rows * root, rcond=1e-9)[0])
