@@ -8,6 +8,7 @@ from pathlib import Path
 
 from backend.audit import AuditLog
 from backend.audit.trail import Trail
+from backend.files import StorageFailed
 from backend.journal import Journal
 from backend.library import Library, LibrarySets
 from backend.library.described import folders
@@ -54,7 +55,11 @@ class Records:
         self.audit.start()
         self._taking_up = asyncio.create_task(self._take_up(), name="records")
         # A database far away that does not answer keeps no drive waiting.
-        await asyncio.wait({self._taking_up}, timeout=None if self.store.sqlite_file else REMOTE_S)
+        done, _ = await asyncio.wait(
+            {self._taking_up}, timeout=None if self.store.sqlite_file else REMOTE_S
+        )
+        for task in done:
+            task.result()
 
     async def _take_up(self) -> None:
         try:
@@ -63,12 +68,14 @@ class Records:
         except DatabaseFailed as error:
             text = f"{error.message}; {error.remedy}. Until it answers, drives can be used"
             self._journal.add(f"{text}, the library cannot, and the audit waits", level="error")
+        except StorageFailed as error:
+            self._journal.add(f"{error.message}; {error.remedy}", level="error")
 
     async def close(self) -> None:
         """Write down what is left."""
         self._loop = None
         if self._taking_up is not None:
-            await self._taking_up
+            await asyncio.wait({self._taking_up})
         await asyncio.to_thread(self.audit.close)
         await asyncio.to_thread(self.store.close)
         self._lock.give()
