@@ -21,7 +21,8 @@ from drivers.ethercat.setup import Snapshot, StationSetup
 from drivers.ethercat.station import Station, al_status, change_state
 from drivers.ethercat.steps import Pause, Steps
 
-_WATCHDOG, _OP_TRIES, _OP_PAUSE_S = 0x001B, 5, 0.2
+_NOT_YET, _OP_TRIES, _OP_PAUSE_S = (0x001B, 0x002D), 5, 0.2
+"""Process data or SYNC0 stayed away (AL status codes of ETG.1020 table 2)."""
 _LEAVE_S, _SETTLE_DC_S, _SETTLE_S = 0.5, 0.4, 0.02
 
 
@@ -114,12 +115,12 @@ class Exchange:
         yield from self._enter_op(self._stations[number - 1])
 
     def _enter_op(self, station: Station) -> Steps[None]:
-        """To OP; once more where process data just stayed away: a computer may stall for 50 ms."""
+        """To OP; once more where data or SYNC0 just stayed away: a computer may stall for 50 ms."""
         for _ in range(_OP_TRIES - 1):
             try:
                 yield from change_state(station, AlState.OP, time.monotonic)
             except NotAllowed:
-                if station.al_code != _WATCHDOG:
+                if station.al_code not in _NOT_YET:
                     raise
                 yield Pause(_OP_PAUSE_S)
             else:

@@ -21,7 +21,7 @@ from drivers.ethercat.protocol import Message, error_to_wire
 from drivers.ethercat.realtime import RealTime
 from drivers.ethercat.ring import Ring
 from drivers.ethercat.roster import Roster, Send
-from drivers.ethercat.segment import Segment
+from drivers.ethercat.segment import Segment, SpoiltMap
 from drivers.ethercat.setup import FoundInPart
 from drivers.ethercat.station import Station
 
@@ -338,7 +338,7 @@ class Operations:
         for _ in range(_FIND_TRIES - 1):
             try:
                 answer = self._find_and_configure(message)
-            except FoundInPart:
+            except (FoundInPart, SpoiltMap):
                 continue
             done(answer, None)
             return

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from drivers.errors import DriveError, LinkTimeout, NotAllowed, ProtocolError
+from drivers.errors import DriveError, LinkTimeout, NotAllowed
 from drivers.ethercat import coe
 from drivers.ethercat import setup as setup_
 from drivers.ethercat.al_status import AlState
@@ -17,14 +17,13 @@ from drivers.ethercat.mapping import Entry, Pdo
 from drivers.ethercat.playback import AxisLoop
 from drivers.ethercat.protocol import Message
 from drivers.ethercat.ring import Ring
-from drivers.ethercat.segment import IO_MAP_BYTES, Segment
+from drivers.ethercat.segment import IO_MAP_BYTES, Segment, SpoiltMap
 from drivers.ethercat.setup import Snapshot, StationSetup
 from drivers.ethercat.station import Station, change_state, identify
 from drivers.ethercat.steps import Steps
 
 CYCLE_NS = (250_000, 10_000_000)
 _SETUP_S = 30.0
-_MAP_TRIES = 3
 T = TypeVar("T")
 Report = Callable[[str, int | None, str], None]
 """Kind of event, station, text."""
@@ -68,7 +67,7 @@ class Preparation:
 
         Raises:
             NotAllowed: cycle, mapping or watchdog is not possible, with drive and reason.
-            FoundInPart: the search was disturbed; one more may help.
+            FoundInPart, SpoiltMap: search or mapping were disturbed; one more search may help.
         """
         cycle_ns = int(message["cycle_ns"])
         if not CYCLE_NS[0] <= cycle_ns <= CYCLE_NS[1]:
@@ -128,19 +127,18 @@ class Preparation:
         entry_by_entry = [number for number, can in whole.items() if not can]
         if total > IO_MAP_BYTES:
             self._segment.map(total)
-        for _ in range(_MAP_TRIES):
-            # An emergency that lies in a mailbox would make SOEM's mapping fail.
-            drains = {s.number: s.box.drain() for s in self._stations if s.mailbox is not None}
-            self._run("mailbox", drains, "emptying the mailboxes")
-            self._promise("building the process data map")
-            self._segment.map(total, entry_by_entry)
-            wrong = {n: p for n, p in self._setups.items() if not self._fits(n, p)}
-            if not wrong:
-                return initial
-        # Not an answer that SOEM missed, then.
+        # An emergency that lies in a mailbox would make SOEM's mapping fail.
+        drains = {s.number: s.box.drain() for s in self._stations if s.mailbox is not None}
+        self._run("mailbox", drains, "emptying the mailboxes")
+        self._promise("building the process data map")
+        self._segment.map(total, entry_by_entry)
+        wrong = {n: p for n, p in self._setups.items() if not self._fits(n, p)}
+        if not wrong:
+            return initial
+        # Perhaps SOEM missed an answer.
         number, plan = next(iter(wrong.items()))
         told = self._segment.sizes(number)
-        raise ProtocolError(
+        raise SpoiltMap(
             f"station {number} maps {told[0]} bytes of outputs and {told[1]} of inputs,"
             f" {plan.rx.size} and {plan.tx.size} were written",
             remedy="the drive keeps a mapping of its own: use its fixed process data",

@@ -40,8 +40,17 @@ _MOST_STRAY = 64
 _OTHER_FRAME, _TOO_MANY = -2, -4
 """What SOEM's search returns besides a number of slaves."""
 
-_FIND_TRIES, _MAP_TRIES = 3, 3
+_FIND_TRIES = 3
 """A segment that stands still for a moment answers nothing, or too late and to another question."""
+
+
+class SpoiltMap(ProtocolError):
+    """SOEM took something else for an answer while it asked for the mapping.
+
+    Only a new search helps: SOEM gives every further mapping FMMUs of its own beside those of the
+    one that failed, which then go on writing outputs and reading inputs at the wrong places, and
+    the third mapping is beyond the end of its list.
+    """
 
 
 class Segment:
@@ -55,6 +64,8 @@ class Segment:
         self.socket_fd: int | None = None
         self.slaves: Sequence[pysoem.CdefSlave] = ()
         self.mapped = False
+        self._fresh = False
+        """Nothing was mapped since the search."""
         self.frame_timeout_us = _FRAME_TIMEOUT_US
         self.late_frames = 0
         """Frames that came back after they had been given up."""
@@ -132,7 +143,7 @@ class Segment:
         Raises:
             ProtocolError: more slaves than can be handled.
         """
-        self.mapped = False
+        self.mapped, self._fresh = False, False
         self.master.manual_state_change = 0
         for attempt in range(_FIND_TRIES):
             if attempt:
@@ -149,6 +160,7 @@ class Segment:
                 f"answers on {self.interface} come too late to be told apart",
                 remedy="this computer is too busy, or another master is on the segment: try again",
             )
+        self._fresh = True
         self.slaves = tuple(self.master.slaves) if count > 0 else ()
         return len(self.slaves)
 
@@ -219,8 +231,8 @@ class Segment:
         end of its buffer. ``entry_by_entry`` are stations without complete access.
 
         Raises:
-            NotAllowed: more process data than the IO map holds.
-            ProtocolError: a drive's mapping could not be read.
+            NotAllowed: more process data than the IO map holds, or no search came before.
+            SpoiltMap: a drive's mapping could not be read; to be searched for and mapped again.
         """
         if expected_bytes > IO_MAP_BYTES:
             raise NotAllowed(
@@ -229,25 +241,23 @@ class Segment:
                 limit=f"{IO_MAP_BYTES} bytes",
                 remedy="map fewer signals or use fewer drives at a time",
             )
+        if not self._fresh:
+            raise NotAllowed("process data are mapped once after a search", remedy="search again")
+        self._fresh = False
         self.forget_errors()
         self.master.manual_state_change = 1
         for number in entry_by_entry:
             # Another drive's EEPROM may have told SOEM that this one has it.
             self.slaves[number - 1]._disable_complete_access()  # noqa: SLF001 - its only name
-        for attempt in range(_MAP_TRIES):
-            try:
-                self.master.config_map()
-            except pysoem.ConfigMapError as error:
-                self.forget_errors()
-                # SOEM takes what comes next for its answer, be it an emergency or the answer to
-                # an earlier question: once more, then. What a drive refuses it refuses again.
-                if attempt == _MAP_TRIES - 1:
-                    told = sorted({_mapping_error(item) for item in error.error_list})
-                    raise ProtocolError(
-                        f"the process data could not be mapped: {'; '.join(told)}"
-                    ) from error
-            else:
-                break
+        try:
+            self.master.config_map()
+        except pysoem.ConfigMapError as error:
+            self.forget_errors()
+            told = sorted({_mapping_error(item) for item in error.error_list})
+            raise SpoiltMap(
+                f"the process data could not be mapped: {'; '.join(told)}",
+                remedy="try again; if it stays so, the drive refuses what was mapped",
+            ) from error
         self.mapped = True
 
     def set_output(self, station: int, data: bytes) -> None:

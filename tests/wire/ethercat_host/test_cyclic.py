@@ -20,6 +20,7 @@ from drivers.cia402 import Mode, State
 from drivers.errors import Busy, NotAllowed, OutOfRange
 from drivers.link import Address, CyclicSignal, Envelope, ScopeBlock, Trajectory
 from profiles.schema import DataType
+from tests.support.station import HANG_S
 from tests.wire.ethercat_host.conftest import Bus, Rig, until
 from tests.wire.ethercat_host.servo_device import servo_profile
 
@@ -76,7 +77,7 @@ async def running(
 
 async def enable(bus: Bus, station: int, mode: Mode = Mode.CSP) -> None:
     await bus.link.process_data.drive_to(station, State.OPERATION_ENABLED, mode)
-    await until(lambda: in_state(bus, station) == "Operation enabled", 3.0)
+    await until(lambda: in_state(bus, station) == "Operation enabled", HANG_S)
 
 
 def in_state(bus: Bus, station: int) -> str:
@@ -120,11 +121,14 @@ async def test_a_trajectory_is_played_exactly_one_value_per_cycle(rig: Rig) -> N
         wave = (2000 * (1 - np.cos(np.linspace(0, 2 * np.pi, 300)))).astype(np.int64)
         first, second = wave + rig.truth(0, 0x6064), rig.truth(1, 0x6064) - wave
         await bus.link.process_data.run([move(1, first), move(2, second)])
-        await asyncio.sleep(0.1)
         for channel, values in (("1.target", first), ("2.target", second)):
-            told = track[channel]
-            begin = int(np.argmax(told != told[0])) - int(np.argmax(values != values[0]))
-            assert np.array_equal(told[begin : begin + 300], values)
+
+            def came_whole(channel: str = channel, values: npt.NDArray[np.int64] = values) -> bool:
+                told = track[channel]
+                begin = int(np.argmax(told != told[0])) - int(np.argmax(values != values[0]))
+                return np.array_equal(told[begin : begin + 300], values)
+
+            await until(came_whole, HANG_S, "every value, once")
         follows = track["1.position"]
         assert follows.max() == first.max()
         counters = bus.link.quality().details
@@ -154,7 +158,7 @@ async def test_parameters_are_read_while_axes_move(rig: Rig) -> None:
         with pytest.raises(NotAllowed, match="6040:00 belongs to the cyclic exchange"):
             await bus.link.write(1, Address(0x6040, 0, "UINT16"), b"\x0f\0")
         await bus.link.write(1, Address(0x6072, 0, "UINT16"), (1500).to_bytes(2, "little"))
-        await until(lambda: rig.truth(0, 0x6072) == 1500, 1.0)
+        await until(lambda: rig.truth(0, 0x6072) == 1500, HANG_S)
         with pytest.raises(Busy, match="runs on this segment"):
             await bus.link.scan(lambda _s, _t: None)
 
@@ -163,12 +167,12 @@ async def test_velocity_and_torque_modes(rig: Rig) -> None:
     async with running(rig) as bus:
         await enable(bus, 1, Mode.CSV)
         await bus.link.process_data.run([move(1, [3000] * 60 + [0], VELOCITY)])
-        await until(lambda: rig.truth(0, 0x606C) == 0, 1.0)
+        await until(lambda: rig.truth(0, 0x606C) == 0, HANG_S)
         assert rig.truth(0, 0x6064) > START
-        await until(lambda: in_state(bus, 1) == "Ready to switch on", 2.0)
+        await until(lambda: in_state(bus, 1) == "Ready to switch on", HANG_S)
         await enable(bus, 1, Mode.CST)
         await bus.link.process_data.run([move(1, [2] * 30, TORQUE)])
-        await until(lambda: rig.truth(0, 0x606C) == 0, 2.0, "the quick stop ends the motion")
+        await until(lambda: rig.truth(0, 0x606C) == 0, HANG_S, "the quick stop ends the motion")
 
 
 @pytest.mark.parametrize(
@@ -191,7 +195,7 @@ async def test_the_envelope_stops_one_axis_and_not_the_other(
         await asyncio.sleep(0.1)
         rig.do("inject", slave=0, what=what, value=value)
         await bus.told(words)
-        await until(lambda: in_state(bus, 1) != "Operation enabled", 1.0)
+        await until(lambda: in_state(bus, 1) != "Operation enabled", HANG_S)
         with pytest.raises(NotAllowed, match=words):
             await moving
         rig.do("inject", slave=0, what=what, value=0)
@@ -223,10 +227,12 @@ async def test_single_wrong_counters_and_lost_frames_are_tolerated_and_counted(r
         await asyncio.sleep(0.1)
         rig.do("lose", count=2, cyclic=True)
         await moving
-        await asyncio.sleep(0.25)
-        after = bus.link.quality()
-        assert after.wkc_errors - before.wkc_errors == 1
-        assert after.lost_frames - before.lost_frames >= 2
+
+        def counted() -> bool:
+            return bus.link.quality().lost_frames - before.lost_frames >= 2
+
+        await until(counted, HANG_S)
+        assert bus.link.quality().wkc_errors - before.wkc_errors == 1
 
 
 async def test_data_that_stay_invalid_stop_the_axis(rig: Rig) -> None:
@@ -235,9 +241,9 @@ async def test_data_that_stay_invalid_stop_the_axis(rig: Rig) -> None:
         await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=5)])
         rig.do("counter", by=-1)
         await bus.told("no valid process data for", "the axis is braked")
-        await until(lambda: rig.truth(0, 0x606C) == 0, 1.0)
+        await until(lambda: rig.truth(0, 0x606C) == 0, HANG_S)
         rig.do("peace")
-        await until(lambda: in_state(bus, 1) == "Ready to switch on", 2.0)
+        await until(lambda: in_state(bus, 1) == "Ready to switch on", HANG_S)
 
 
 async def test_a_power_cycle_in_motion_ends_it_and_the_drive_comes_back_disabled(
@@ -248,8 +254,8 @@ async def test_a_power_cycle_in_motion_ends_it_and_the_drive_comes_back_disabled
         await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=5)])
         rig.do("power_cycle", slave=0, off_s=0.3)
         await bus.told("station 1", "was switched on again")
-        await bus.told("station 1 is in OP again", within_s=8)
-        await until(lambda: in_state(bus, 1) == "Switch on disabled", 2.0)
+        await bus.told("station 1 is in OP again", within_s=HANG_S)
+        await until(lambda: in_state(bus, 1) == "Switch on disabled", HANG_S)
         assert rig.do("state")["slaves"][0]["state"] == "OP"  # type: ignore[index]
         await enable(bus, 1)
         await bus.link.process_data.run([move(1, ramp(rig, 0, count=30))])

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import textwrap
+from typing import cast
+
 import pysoem
 import pytest
 
 from drivers.errors import NotAllowed, ProtocolError
 from drivers.ethercat.mapping import plan_station
+from drivers.ethercat.operations import Operations
+from drivers.ethercat.ring import Ring
 from drivers.ethercat.segment import Segment
 from drivers.link import Address, CyclicSignal
+from drivers.virtual.wires.netns import Namespace, child_environment
 from profiles.schema import DataType, PdoSpec, Profile
+from tests.wire.ethercat_host.conftest import Rig
 from tests.wire.ethercat_host.servo_device import servo_profile
 
 
@@ -86,13 +95,18 @@ class Soem:
     """A master whose mapping fails with these errors in turn, then succeeds."""
 
     manual_state_change = 0
+    slaves = ()
 
     def __init__(self, *errors: Exception) -> None:
         self.errors = list(errors)
-        self.tries = 0
+        self.done: list[str] = []
+
+    def config_init(self, release_gil: bool) -> int:
+        self.done.append("searched")
+        return 1
 
     def config_map(self) -> None:
-        self.tries += 1
+        self.done.append("mapped")
         if self.errors:
             raise pysoem.ConfigMapError([self.errors.pop(0)])
 
@@ -104,20 +118,74 @@ STRAY = pysoem.PacketError(1, 3), pysoem.PacketError(1, 1), Exception("unexpecte
 REFUSAL = pysoem.SdoError(2, 0x1C12, 1, 0x06090011, "Subindex does not exist")
 
 
+def operations(*errors: Exception) -> tuple[Operations, Soem]:
+    """Those of a process whose setting-up is a search and a mapping and nothing else."""
+    made, master = Operations("none", cast("Ring", None), lambda _message: None), Soem(*errors)
+    made.segment._master = master
+
+    def find_and_configure(_message: object) -> dict[str, object]:
+        made.segment.find()
+        made.segment.map(64)
+        return {"configured": True}
+
+    made._find_and_configure = find_and_configure  # type: ignore[method-assign]
+    return made, master
+
+
 @pytest.mark.parametrize("stray", [*STRAY, REFUSAL], ids=str)
-def test_a_mapping_that_an_answer_to_something_else_spoilt_is_made_again(stray: Exception) -> None:
+def test_after_a_mapping_that_a_stray_answer_spoilt_the_segment_is_searched_again(
+    stray: Exception,
+) -> None:
     """SOEM looks at the index of an answer at most: any error may be another question's."""
-    segment, master = Segment("none"), Soem(stray, stray)
-    segment._master = master
-    segment.map(64)
-    assert segment.mapped
-    assert master.tries == 3
+    made, master = operations(stray, stray)
+    told: list[object] = []
+    made._configure({}, lambda answer, error: told.append((answer, error)))
+    assert told == [({"configured": True}, None)]
+    assert master.done == ["searched", "mapped"] * 3
 
 
 def test_a_mapping_that_a_drive_refuses_ends_in_its_words() -> None:
-    segment, master = Segment("none"), Soem(REFUSAL, REFUSAL, REFUSAL, REFUSAL)
-    segment._master = master
+    made, master = operations(REFUSAL, REFUSAL, REFUSAL)
     with pytest.raises(ProtocolError, match=r"station 2 aborted 1C12:01 \(Subindex does not exist"):
+        made._configure({}, lambda _answer, _error: None)
+    assert not made.segment.mapped
+    assert master.done == ["searched", "mapped"] * 3
+
+
+def test_nothing_is_mapped_twice_after_one_search() -> None:
+    """The FMMUs of the first mapping would go on beside those of the second."""
+    segment = Segment("none")
+    segment._master = Soem()
+    segment.find()
+    segment.map(64)
+    with pytest.raises(NotAllowed, match="once after a search"):
         segment.map(64)
-    assert not segment.mapped
-    assert master.tries == 3
+
+
+def test_a_search_takes_away_what_an_earlier_mapping_left_in_the_slaves(
+    namespace: Namespace, rig: Rig
+) -> None:
+    """Registers of the FMMUs: ETG.1000.4 table 56, 16 bytes each from 0x600, active at byte 12."""
+    script = textwrap.dedent(
+        """
+        import time
+        from drivers.ethercat.segment import Segment
+
+        segment = Segment("ec0m")
+        segment.frame_timeout_us = 1_000_000
+        segment.open()
+        for _ in range(3):
+            assert segment.find() == 2
+            while segment.read(1, 0x130, 1) != b"\\2" or segment.read(2, 0x130, 1) != b"\\2":
+                time.sleep(0.01)
+            segment.map(64)
+            active = [segment.read(1, 0x600 + 16 * n, 16)[12] & 1 for n in range(4)]
+            assert active == [1, 1, 0, 0], active
+        segment.close()
+        """
+    )
+    result = subprocess.run(
+        namespace.command([sys.executable, "-c", script]),
+        capture_output=True, text=True, check=False, env=child_environment(), timeout=60,
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr
