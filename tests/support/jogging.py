@@ -29,7 +29,9 @@ def jogged(
         with page.holding(drive):
             page.send(type="ping", n=1)
             page.wait("pong", n=1)  # what was sent before has begun
-            now = until(partial(_there_or_over, http, drive, there, start), what="it gets there")
+            now = until(
+                partial(_there_or_over, http, page, drive, there, start), what="it is there"
+            )
             if now["moving_job"] is not None:
                 yield start
                 return
@@ -42,8 +44,9 @@ def fast(now: Any, _start: float) -> bool:
     return abs(float(now["velocity"] or 0.0)) > 100
 
 
-def _there_or_over(http: httpx.Client, drive: str, there: There, start: float) -> Any:
+def _there_or_over(http: httpx.Client, page: Live, drive: str, there: There, start: float) -> Any:
     """The axis' state where it is there or is jogged no more, else None."""
+    page.listen()
     now = _state(http, drive)
     return now if now["moving_job"] is None or there(now, start) else None
 

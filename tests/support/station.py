@@ -7,6 +7,7 @@ import contextlib
 import json
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -159,6 +160,7 @@ class Live:
         # With messages unread, this client does not see the server's close and would wait 10 s.
         self.socket: ClientConnection = connect(url, max_size=None, close_timeout=1)
         self.binary: list[bytes] = []
+        self._heard: deque[str | bytes] = deque()
         hello = self.wait("hello")
         self.connection = hello["connection"]
 
@@ -166,11 +168,18 @@ class Live:
         self.socket.send(json.dumps(message))
 
     def receive(self, timeout_s: float = HANG_S) -> Any:
-        message = self.socket.recv(timeout=timeout_s)
+        heard = self._heard
+        message = heard.popleft() if heard else self.socket.recv(timeout=timeout_s)
         if isinstance(message, bytes):
             self.binary.append(message)
             return {"type": "binary"}
         return json.loads(message)
+
+    def listen(self) -> None:
+        """Take what has come, for later: with much unread, this client hears no ping any more."""
+        with contextlib.suppress(TimeoutError):
+            while True:
+                self._heard.append(self.socket.recv(timeout=0))
 
     def wait(self, kind: str, timeout_s: float = HANG_S, **fields: object) -> Any:
         """The next message of this kind whose fields agree."""
