@@ -1,14 +1,14 @@
 """Pictures for docs/tuning.md: one virtual axis on its way from untouched to tuned.
 
-    python -m tests.browser.screenshots_tuning [FOLDER]
+    python -m tests.browser.screenshots_tuning [--automatic] [FOLDER]
 
 Whole pages at laptop and phone size, and single panels as far as the text needs them.
 """
 
 from __future__ import annotations
 
+import argparse
 import io
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -63,8 +63,10 @@ def prepare(station: Station) -> str:
     return drive
 
 
-def _store(what: Page | Locator, file: Path, colours: int) -> None:
+def _store(what: Page | Locator, file: Path, colours: int, above: int = 0) -> None:
+    """Keep a picture, without so many lines at its top."""
     picture = Image.open(io.BytesIO(what.screenshot())).convert("RGB")
+    picture = picture.crop((0, above, picture.width, picture.height))
     picture.quantize(colours, dither=Image.Dither.NONE).save(file, optimize=True)
 
 
@@ -112,11 +114,16 @@ def _panels(page: Page, drive: str, folder: Path, colours: int) -> None:
 def _automatic(page: Page, station: Station, drive: str, folder: Path, colours: int) -> None:
     """All steps in one job, and what its panel then tells."""
     open_axis(page, drive, "tune")
-    page.get_by_role("heading", name="Designs").wait_for()
+    page.get_by_role("heading", name="Tune automatically").wait_for()
     tuning.run_job(page, station, drive, "Start tuning")
     page.get_by_role("heading", name="Verification").wait_for()
     page.wait_for_timeout(SETTLE_MS)
-    _store(_panel(page, "Tune automatically"), folder / "tuning-automatic.png", colours)
+    panel = _panel(page, "Tune automatically")
+    whole, told = panel.bounding_box(), panel.locator(".note.good").bounding_box()
+    assert whole is not None
+    assert told is not None
+    above = round(told["y"] - whole["y"]) - 8
+    _store(panel, folder / "tuning-automatic.png", colours, above)
 
 
 def _pages(browser: Browser, station: Station, drive: str, folder: Path, colours: int) -> None:
@@ -148,22 +155,38 @@ def shoot(browser: Browser, folder: Path, place: Path, colours: int = COLOURS) -
         page = context.new_page()
         page.goto(station.url)
         _panels(page, drive, folder, colours)
-        _automatic(page, station, drive, folder, colours)
         report = station.ok(station.http.get("/reports"))[0]["file"]
         page.set_viewport_size({"width": 900, "height": 1000})
         page.goto(f"{station.url}/api/v1/reports/{report}")
         _store(page, folder / "tuning-report.png", colours)
         context.close()
+    shoot_automatic(browser, folder, place / "automatic", colours)
+
+
+def shoot_automatic(browser: Browser, folder: Path, place: Path, colours: int = COLOURS) -> None:
+    """Take the picture of an axis that was tuned automatically, from untouched on."""
+    place.mkdir(exist_ok=True)
+    with tuning.running(place) as station:
+        drive = station.add(1, tuning.URL, name="Spindle")
+        context = browser.new_context(locale="en", color_scheme="light", **PANEL)  # type: ignore[arg-type]
+        page = context.new_page()
+        page.goto(station.url)
+        _automatic(page, station, drive, folder, colours)
+        context.close()
 
 
 def main() -> None:
-    """Take the pictures of tuning alone."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "images"
+    """Take the pictures of tuning alone; ``--automatic``: only that of the automatic one."""
+    options = argparse.ArgumentParser()
+    options.add_argument("folder", nargs="?", type=Path, default=ROOT / "docs" / "images")
+    options.add_argument("--automatic", action="store_true")
+    asked = options.parse_args()
+    folder: Path = asked.folder
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as place, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=FLAGS)
         try:
-            shoot(browser, folder, Path(place))
+            (shoot_automatic if asked.automatic else shoot)(browser, folder, Path(place))
         finally:
             browser.close()
 
