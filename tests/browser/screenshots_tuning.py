@@ -122,7 +122,7 @@ def _automatic(page: Page, station: Station, drive: str, folder: Path, colours: 
     whole, told = panel.bounding_box(), panel.locator(".note.good").bounding_box()
     assert whole is not None
     assert told is not None
-    above = round(told["y"] - whole["y"]) - 8
+    above = round(told["y"] - whole["y"])
     _store(panel, folder / "tuning-automatic.png", colours, above)
 
 
