@@ -29,7 +29,7 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SERVODECK_PROFILES", str(folder / "mine"))
         patch.setenv("SERVODECK_CACHE", str(folder / "cache"))
-        running = Station(folder, folder / "bench.toml")
+        running = Station(folder, folder / "bench.toml", steady=True)
         running.start()
         yield running
         running.stop()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,11 @@ URL = "ethercat://virtual0"
 AXIS = '[[axis]]\nname = "{name}"\ndrive = "{drive}"\non = "ethercat://virtual0"\nstation = {at}\n'
 
 
-@pytest.fixture(scope="module")
-def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+@contextmanager
+def started(folder: Path, *, steady: bool) -> Iterator[Station]:
     """Two drives, of which the profile of the first says that it takes firmware."""
     if reason := unavailable():
         pytest.skip(f"no private network here: {reason}")
-    folder = Path(tmp_path_factory.mktemp("segment"))
     firmware_drive.write_profile(folder / "profiles")
     bench = folder / "bench.toml"
     names = [("A", 1), ("B", 2)]
@@ -30,12 +30,25 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SERVODECK_PROFILES", str(folder / "profiles"))
-        running = Station(folder, bench, ["--factory", firmware_drive.FACTORY])
+        running = Station(folder, bench, ["--factory", firmware_drive.FACTORY], steady=steady)
         running.start()
         running.add(1, URL, profile=firmware_drive.NAME, name="A")
         running.add(2, URL, profile="mms7", name="B")
         yield running
         running.stop()
+
+
+@pytest.fixture(scope="module")
+def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+    with started(Path(tmp_path_factory.mktemp("segment")), steady=True) as running:
+        yield running
+
+
+@pytest.fixture
+def in_real_time(tmp_path: Path) -> Iterator[Station]:
+    """Its own clock, which alone can tell how late a cycle was."""
+    with started(tmp_path, steady=False) as running:
+        yield running
 
 
 def view(station: Station) -> Any:
@@ -59,10 +72,13 @@ def test_stations_in_the_order_of_the_cable(station: Station) -> None:
     assert second["clock_ahead_ns"] is None, "nobody keeps it current without exchange"
 
 
-def test_figures_of_the_exchange(station: Station) -> None:
-    station.ok(station.http.post("/buses/cyclic", json={"url": URL, "cycle_us": 1000}))
+def test_figures_of_the_exchange(in_real_time: Station) -> None:
+    station = in_real_time
+    body = {"url": URL, "cycle_us": 1000}
+    # A computer that is kept busy by others may keep a drive from answering in time.
+    until(lambda: station.http.post("/buses/cyclic", json=body).is_success, 60, "it runs")
     try:
-        seen = until(lambda: (now := view(station))["exchange"]["cycles"] > 100 and now, 10)
+        seen = until(lambda: (now := view(station))["exchange"]["cycles"] > 100 and now, 60)
         figures = seen["exchange"]
         assert [s["state"] for s in seen["stations"]] == ["OP", "OP"]
         # One wake-up per cycle; LRW counts 1 for reading and 2 for writing, per slave.
@@ -91,7 +107,7 @@ def test_alias_wants_to_be_confirmed_and_is_read_back_after_power_on(station: St
     station.ok(station.http.post("/ethercat/alias", json=body | {"confirmed": True}))
     station.drives.segments[URL].command("power_cycle", slave=1, off_s=0.1)
     # SOEM refuses the slave with its new alias, so the segment is searched again by itself.
-    until(lambda: [s["alias"] for s in view(station)["stations"]] == [0, 1234], 15, "new alias")
+    until(lambda: [s["alias"] for s in view(station)["stations"]] == [0, 1234], 60, "new alias")
 
 
 def load(station: Station, drive: str, data: bytes, **query: bool) -> Any:
@@ -115,7 +131,7 @@ def test_firmware_is_loaded_to_the_end_even_if_cancelled(station: Station) -> No
     station.drives.segments[URL].command("timing", slave=0, sdo_s=0.01)
     job = station.ok(load(station, "a", data, confirmed=True))
     seen = until(lambda: (
-        now := station.ok(station.http.get(f"/jobs/{job['id']}")))["progress"] > 0 and now, 10
+        now := station.ok(station.http.get(f"/jobs/{job['id']}")))["progress"] > 0 and now, 60
     )  # fmt: skip
     assert "bytes: do not switch off" in seen["step"]
     second = load(station, "a", data, confirmed=True)
@@ -124,7 +140,7 @@ def test_firmware_is_loaded_to_the_end_even_if_cancelled(station: Station) -> No
     ended = station.ok(station.http.delete(f"/jobs/{job['id']}"))
     assert ended["state"] == "done", ended
     assert ended["result"] == {"bytes": 20_000, "file": "app.efw", "state": "BOOT"}
-    until(lambda: view(station)["stations"][0]["state"] == "PREOP", 10, "up again")
+    until(lambda: view(station)["stations"][0]["state"] == "PREOP", 60, "up again")
 
 
 def test_firmware_that_fails_says_how_far_it_came_and_what_to_do(station: Station) -> None:
@@ -132,7 +148,7 @@ def test_firmware_that_fails_says_how_far_it_came_and_what_to_do(station: Statio
     segment.command("timing", slave=0, sdo_s=0.0)
     segment.command("firmware", slave=0, fail_at=1999)
     job = station.ok(load(station, "a", bytes(4000), confirmed=True))
-    until(lambda: station.ok(station.http.get(f"/jobs/{job['id']}"))["state"] != "running", 20)
+    until(lambda: station.ok(station.http.get(f"/jobs/{job['id']}"))["state"] != "running", 60)
     ended = station.ok(station.http.get(f"/jobs/{job['id']}"))
     assert ended["state"] == "failed", ended
     told = ended["problem"]["detail"]
@@ -141,7 +157,7 @@ def test_firmware_that_fails_says_how_far_it_came_and_what_to_do(station: Statio
     assert "it may be without firmware" in told
     segment.command("firmware", slave=0)
     job = station.ok(load(station, "a", bytes(4000), confirmed=True))
-    until(lambda: station.ok(station.http.get(f"/jobs/{job['id']}"))["state"] == "done", 20)
+    until(lambda: station.ok(station.http.get(f"/jobs/{job['id']}"))["state"] == "done", 60)
 
 
 def test_permissions_of_an_interface_that_is_not_there(station: Station) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from drivers.virtual.wires.netns import unavailable
-from tests.support.station import Station, until
+from tests.support.station import HANG_S, Station, until
 
 URL = "ethercat://virtual0"
 FAMILIES = ("m6l", "r6l", "ep3e")
@@ -43,7 +43,7 @@ def cause(station: Station, family: str, code: str) -> None:
     """Raise a fault by its code, and reset it."""
     segment = station.drives.segments[URL]
     segment.command("inject", slave=FAMILIES.index(family), what=code)
-    until(lambda: station.state(family)["state"] == "Fault", 10, f"{code} is there")
+    until(lambda: station.state(family)["state"] == "Fault", HANG_S, f"{code} is there")
     station.ok(station.http.post(f"/drives/{family}/fault-reset"))
 
 
@@ -128,7 +128,7 @@ def test_m6l_forces_outputs_only_while_process_data_run(station: Station) -> Non
     try:
         station.ok(station.http.post(path, json={"confirmed": True}))
         station.ok(station.http.put(path, json={"values": {"DO1": True}}))
-        until(lambda: raw(station, "m6l", "200B:0E") & 1, 5, "DO1 is on")
+        until(lambda: raw(station, "m6l", "200B:0E") & 1, HANG_S, "DO1 is on")
         station.ok(station.http.delete(path))
         assert raw(station, "m6l", "200B:0E") & 1 == 0
     finally:

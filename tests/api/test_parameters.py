@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.station import Station, until
+from tests.support.station import HANG_S, Station, until
 
 
 def test_scan_finds_both_drives(station: Station) -> None:
@@ -168,9 +168,11 @@ def test_exchanged_drive_is_noticed_before_anything_is_written(station: Station)
     try:
         station.drives.command(do="swap", wire="mlink://virtual0", first=1, second=2)
         station.drives.command(do="pull", wire="mlink://virtual0")
-        until(lambda: not station.state(x)["fresh"], 5)
+        until(lambda: not station.state(x)["fresh"], HANG_S)
         station.drives.command(do="heal", wire="mlink://virtual0")
-        warned = until(lambda: station.ok(station.http.get(f"/drives/{x}"))["identity_warning"], 15)
+        warned = until(
+            lambda: station.ok(station.http.get(f"/drives/{x}"))["identity_warning"], HANG_S
+        )
         assert "serial number" in warned
         answer = station.http.put(f"/drives/{x}/parameters/6081:00", json={"raw": 1000})
         assert answer.status_code == 409

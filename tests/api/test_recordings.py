@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from backend.recording import capture
-from tests.support.station import Station, until
+from tests.support.station import HANG_S, Station, until
 
 POSITION, VELOCITY, STATUS = "6064:00", "606C:00", "6041:00"
 #: 100 rpm in the unit of 606Ch, at 65536 increments to the revolution (004: default).
@@ -64,7 +64,7 @@ def test_record_list_export_delete(station: Station, x: str) -> None:
     assert row["state"] == "recording"
     name = row["name"]
     assert name == "Axis test.sdrec"
-    until(lambda: samples(station, name) > 50, 10, "samples arrive")
+    until(lambda: samples(station, name) > 50, HANG_S, "samples arrive")
     assert station.http.get(f"/recordings/{name}/file").status_code == 409, "still growing"
     assert station.http.delete(f"/recordings/{name}").status_code == 409
     ended = station.ok(station.http.post(f"/recordings/{name}/stop"))
@@ -116,7 +116,9 @@ def test_trigger_keeps_what_was_before_it(station: Station, x: str) -> None:
     body = {"mode": "PV", "target": 200, "acceleration": 3000, "deceleration": 3000,
             "travel_limit": 30, "torque_limit": 150, "timeout_s": 3, "consent": True}  # fmt: skip
     station.ok(station.http.post(f"/drives/{x}/jobs/move", json=body))
-    until(lambda: listed(station, search="step")[0]["state"] == "complete", 15, "it ends itself")
+    until(
+        lambda: listed(station, search="step")[0]["state"] == "complete", HANG_S, "it ends itself"
+    )
     station.ok(station.http.post("/stop", json={}))
     _, table = exported_csv(station, row["name"])
     crossing = table[np.argmax(table[:, 2] >= RPM_100), 0]
@@ -137,7 +139,7 @@ def test_full_disk_ends_it_and_the_axis_goes_on(station: Station, x: str) -> Non
     # The kernel refuses to write beyond this, as it does on a full disk.
     resource.setrlimit(resource.RLIMIT_FSIZE, (file.stat().st_size + 3000, before[1]))
     try:
-        until(lambda: listed(station)[0]["state"] in ("interrupted", "failed"), 15, "it ends")
+        until(lambda: listed(station)[0]["state"] in ("interrupted", "failed"), HANG_S, "it ends")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
         signal.signal(signal.SIGXFSZ, handler)
@@ -225,8 +227,10 @@ def test_fault_freezes_the_last_seconds(station: Station, x: str) -> None:
     until(lambda: station.state(x)["fresh"])
     station.drives.command(do="inject", axis="Feed screw", what="over_temperature")
     try:
-        until(lambda: listed(station)[0]["state"] == "recording", 10, "the recording began")
-        rows = until(lambda: station.ok(station.http.get("/bundles"))["bundles"], 20, "the bundle")
+        until(lambda: listed(station)[0]["state"] == "recording", HANG_S, "the recording began")
+        rows = until(
+            lambda: station.ok(station.http.get("/bundles"))["bundles"], HANG_S, "the bundle"
+        )
     finally:
         station.drives.command(do="inject", axis="Feed screw", what="over_temperature", value=0)
         station.ok(station.http.post(f"/drives/{x}/fault-reset", json={}))
@@ -267,7 +271,7 @@ def test_bundle_of_a_mute_drive(station: Station, x: str, monkeypatch: pytest.Mo
     known = station.ok(station.http.get(f"/drives/{x}/parameters/{read}"))
     station.drives.command(do="mute", wire="mlink://virtual0", on=True)
     try:
-        until(lambda: not station.state(x)["fresh"], 15, "its silence is noticed")
+        until(lambda: not station.state(x)["fresh"], HANG_S, "its silence is noticed")
         made = station.ok(station.http.post("/bundles", json={"reason": "mute"}))
     finally:
         station.drives.command(do="mute", wire="mlink://virtual0", on=False)
@@ -283,4 +287,4 @@ def test_bundle_of_a_mute_drive(station: Station, x: str, monkeypatch: pytest.Mo
     assert any(row["error"] for row in rows), "what was never read says so"
     assert facts["links"][0]["timeouts"] > 0
     station.ok(station.http.delete(f"/bundles/{made['name']}"))
-    until(lambda: station.state(x)["fresh"], 15, "it answers again")
+    until(lambda: station.state(x)["fresh"], HANG_S, "it answers again")

@@ -10,7 +10,7 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from tests.support.station import Station, until
+from tests.support.station import HANG_S, Station, until
 from tests.unit.recording.test_feed import parse
 
 
@@ -55,10 +55,10 @@ def test_feed_is_what_reruns_own_reader_reads(
 ) -> None:
     blobs: list[bytes] = []
     station.ok(station.http.get(f"/drives/{x}/parameters/6083:00"))
-    until(lambda: blobs.extend(pull(feed)[2]) or len(blobs) > 5, 20, "samples come")
+    until(lambda: blobs.extend(pull(feed)[2]) or len(blobs) > 5, HANG_S, "samples come")
     station.ok(station.http.put(f"/drives/{x}/parameters/6083:00", json={"value": 2345}))
     enough = len(blobs) + 8
-    until(lambda: blobs.extend(pull(feed)[2]) or len(blobs) > enough, 20, "more of them")
+    until(lambda: blobs.extend(pull(feed)[2]) or len(blobs) > enough, HANG_S, "more of them")
     log: list[str] = []
     seen: dict[str, int] = {}
     for number, blob in enumerate(blobs):
@@ -80,11 +80,11 @@ def test_feed_is_what_reruns_own_reader_reads(
 
 def test_feed_begins_anew_when_the_bench_changes(station: Station, feed: ClientConnection) -> None:
     session, _, blobs = pull(feed)
-    until(lambda: blobs or blobs.extend(pull(feed)[2]) or blobs, 20)
+    until(lambda: blobs or blobs.extend(pull(feed)[2]) or blobs, HANG_S)
     session = pull(feed)[0]
     other = station.add(2, name="Y")
     try:
-        until(lambda: pull(feed)[0] != session, 20, "a new session with both drives")
+        until(lambda: pull(feed)[0] != session, HANG_S, "a new session with both drives")
     finally:
         station.ok(station.http.delete(f"/drives/{other}"))
 
@@ -94,9 +94,9 @@ def test_feed_costs_nothing_when_nobody_looks(station: Station, x: str) -> None:
         return int(station.ok(station.http.get(f"/drives/{x}"))["quality"]["transactions"])
 
     with connect(f"ws://127.0.0.1:{station.port}/rerun/feed", max_size=None) as socket:
-        until(lambda: len(pull(socket)[2]) > 0, 20)
+        until(lambda: len(pull(socket)[2]) > 0, HANG_S)
         before = transactions()
-        until(lambda: transactions() > before + 20, 10, "the feed polls")
+        until(lambda: transactions() > before + 20, HANG_S, "the feed polls")
 
     def quiet() -> bool:
         import time
@@ -105,7 +105,7 @@ def test_feed_costs_nothing_when_nobody_looks(station: Station, x: str) -> None:
         time.sleep(0.5)
         return transactions() - before < 20
 
-    until(quiet, 10, "the polling ends with the last page")
+    until(quiet, HANG_S, "the polling ends with the last page")
 
 
 def test_foreign_pages_get_no_feed(station: Station) -> None:

@@ -20,7 +20,7 @@ from backend.demo import DemoBench
 from drivers.virtual.wires.netns import unavailable
 from tests.api.test_ethercat import BENCH, URL
 from tests.browser.cable import Cable
-from tests.support.station import Live, Station, until
+from tests.support.station import HANG_S, Live, Station, until
 
 POSITION, VELOCITY, TORQUE = "6064:00", "606C:00", "6077:00"
 SERIAL = """
@@ -102,12 +102,14 @@ def test_a_subscription_follows_the_exchange_as_it_starts_and_ends(
         assert [c["synchronous"] for c in begin(page, axis, (POSITION, VELOCITY))["channels"]] == [
             False, False,
         ]  # fmt: skip
-        until(lambda: page.receive() and len(heads(page.binary)) > 3, 20, "polled samples")
+        until(lambda: page.receive() and len(heads(page.binary)) > 3, HANG_S, "polled samples")
         exchange(station, run=True)
         info = page.wait("scope_info", 20)
         assert [c["synchronous"] for c in info["channels"]] == [True, True]
         page.binary.clear()
-        until(lambda: page.receive() and len(heads(page.binary)) > 3, 20, "samples of the cycle")
+        until(
+            lambda: page.receive() and len(heads(page.binary)) > 3, HANG_S, "samples of the cycle"
+        )
         first = heads(page.binary)[-1]
         assert first[3] & 1 == 0, "equally spaced"
         assert first[5] == pytest.approx(0.001)
@@ -115,7 +117,7 @@ def test_a_subscription_follows_the_exchange_as_it_starts_and_ends(
         info = page.wait("scope_info", 20)
         assert [c["synchronous"] for c in info["channels"]] == [False, False]
         page.binary.clear()
-        until(lambda: page.receive() and len(heads(page.binary)) > 3, 20, "polled again")
+        until(lambda: page.receive() and len(heads(page.binary)) > 3, HANG_S, "polled again")
         assert heads(page.binary)[-1][4] > first[4], "one clock throughout"
 
 
@@ -129,8 +131,8 @@ def test_what_the_cycle_does_not_carry_is_a_stream_of_its_own(station: Station, 
             page.receive()
             return len({head[3] >> 8 for head in heads(page.binary)}) == 2
 
-        until(both, 20, "both streams")
-        until(lambda: page.receive() and len(page.binary) > 15, 20)
+        until(both, HANG_S, "both streams")
+        until(lambda: page.receive() and len(page.binary) > 15, HANG_S)
         for stream in (0, 1):
             sequences = [h[0] for h in heads(page.binary) if h[3] >> 8 == stream]
             assert sequences == list(range(1, len(sequences) + 1)), "each counts for itself"
@@ -139,7 +141,7 @@ def test_what_the_cycle_does_not_carry_is_a_stream_of_its_own(station: Station, 
 def test_a_drive_that_comes_back_is_sampled_again(station: Station, serial: str) -> None:
     with station.live() as page:
         assert begin(page, serial, (POSITION,))["problem"] is None
-        until(lambda: page.receive() and len(page.binary) > 2, 10)
+        until(lambda: page.receive() and len(page.binary) > 2, HANG_S)
         station.ok(station.http.delete(f"/drives/{serial}"))
         gone = page.wait("scope_info")
         assert serial in gone["problem"]["detail"]
@@ -147,7 +149,7 @@ def test_a_drive_that_comes_back_is_sampled_again(station: Station, serial: str)
         back = page.wait("scope_info")
         assert back["problem"] is None
         page.binary.clear()
-        until(lambda: page.receive() and len(page.binary) > 2, 10, "samples of the new one")
+        until(lambda: page.receive() and len(page.binary) > 2, HANG_S, "samples of the new one")
 
 
 def test_units_of_the_axis_are_told(station: Station, serial: str) -> None:
@@ -186,7 +188,7 @@ def test_a_sleeping_page_loses_only_its_own_view_and_every_sample_is_counted(
     with station.live() as awake:
         begin(awake, axis, (POSITION, VELOCITY, TORQUE))
         awake.binary.clear()
-        until(lambda: awake.receive() and awake.binary, 20, "samples")
+        until(lambda: awake.receive() and awake.binary, HANG_S, "samples")
         began = heads(awake.binary)[0][4]
         # It sleeps by the axis' time, which passes slowly on a busy computer.
         until(lambda: awake.receive() and heads(awake.binary[-1:])[0][4] - began > 4.5, 75)
@@ -256,9 +258,9 @@ def test_a_half_open_connection_ends_and_with_it_the_polling(
     try:
         page = Live(cable.url.replace("http", "ws") + "api/v1/live")
         begin(page, serial, (POSITION,))
-        until(lambda: not quiet(), 20, "it polls fast")
+        until(lambda: not quiet(), HANG_S, "it polls fast")
         cable.stall()
-        until(quiet, 40, "the polling has ended")
+        until(quiet, HANG_S, "the polling has ended")
     finally:
         cable.close()
 

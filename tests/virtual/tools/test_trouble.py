@@ -44,7 +44,7 @@ async def test_cancelled(namespace: Namespace) -> None:
         assert before["2008:01"] == 1
         progress, there = spy(lambda p: "measuring" in p.step and p.fraction > 0.2)
         task = asyncio.create_task(sweep(b.axis, b.session, SweepSettings(WIDE), progress))
-        await asyncio.wait_for(there.wait(), 20.0)
+        await asyncio.wait_for(there.wait(), 100.0)
         await asyncio.sleep(0.2)
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -57,7 +57,7 @@ async def test_a_fault_in_the_middle(namespace: Namespace) -> None:
         before = await b.values()
         progress, there = spy(lambda p: "measuring" in p.step and p.fraction > 0.15)
         task = asyncio.create_task(sweep(b.axis, b.session, SweepSettings(WIDE), progress))
-        await asyncio.wait_for(there.wait(), 20.0)
+        await asyncio.wait_for(there.wait(), 100.0)
         b.segment.command("inject", slave=0, what="over_temperature", value=1)
         with pytest.raises(NotAllowed, match=r"Operation enabled|Fault|fault"):
             await task
@@ -68,7 +68,7 @@ async def test_the_cable_is_pulled(namespace: Namespace) -> None:
     async with bench(namespace, ONE) as b:
         progress, there = spy(lambda p: "measuring" in p.step and p.fraction > 0.15)
         task = asyncio.create_task(sweep(b.axis, b.session, SweepSettings(WIDE), progress))
-        await asyncio.wait_for(there.wait(), 20.0)
+        await asyncio.wait_for(there.wait(), 100.0)
         b.segment.command("cut", cable=0)
         try:
             with pytest.raises(DriveError):

@@ -94,7 +94,7 @@ class Bus:
     def texts(self) -> list[str]:
         return [event.text for _, event in self.events]
 
-    async def told(self, *words: str, within_s: float = 5.0) -> str:
+    async def told(self, *words: str, within_s: float = 30.0) -> str:
         """Wait for an event with all these words."""
         found: list[str] = []
 

@@ -83,7 +83,7 @@ class Loading:
     async def works(self) -> None:
         """The drive is in PREOP and its mailboxes are those of PREOP again."""
         assert await self.bus.link.read(1, STATUS) == b"\x50\x02"
-        await until(lambda: "PREOP" in self.bus.link.quality(1).state, 2.0)
+        await until(lambda: "PREOP" in self.bus.link.quality(1).state, 30.0)
 
 
 @pytest.fixture
@@ -109,7 +109,7 @@ async def test_nothing_else_is_asked_of_a_drive_that_is_being_loaded(calm: Rig) 
     async with calm.link() as bus:
         loading = Loading(bus)
         task = asyncio.create_task(loading.load())
-        await until(lambda: any("bytes" in text for _, text in loading.told), 5.0)
+        await until(lambda: any("bytes" in text for _, text in loading.told), 30.0)
         with pytest.raises(Busy, match="being loaded with firmware"):
             await bus.link.read(1, STATUS)
         with pytest.raises(Busy, match="cannot move"):

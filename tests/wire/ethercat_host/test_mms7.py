@@ -83,7 +83,7 @@ async def test_mms7_is_read_whole_and_moves(namespace: Namespace, mms7: VirtualS
         other = await link.survey()
         assert other.stations[1].state == "PREOP"
         await cyclic.drive_to(1, State.OPERATION_ENABLED, Mode.CSP)
-        await until(lambda: cyclic.axis_state(1)[0] == "Operation enabled", 5.0)
+        await until(lambda: cyclic.axis_state(1)[0] == "Operation enabled", 30.0)
         here = int.from_bytes(
             await link.read(1, Address(0x6064, 0, "INT32")), "little", signed=True
         )

@@ -125,7 +125,7 @@ async def test_its_fixed_process_data_on_swapped_sync_managers_move_it(bus: Bus)
         positions: list[float] = []
         cyclic.blocks(lambda b: positions.extend(b.samples[:, b.channels.index("position")]))
         await cyclic.drive_to(SERVO, State.OPERATION_ENABLED, Mode.CSP)
-        await until(lambda: cyclic.axis_state(SERVO)[0] == "Operation enabled", 5.0)
+        await until(lambda: cyclic.axis_state(SERVO)[0] == "Operation enabled", 30.0)
         values = np.arange(0, 500, 5, dtype=np.int64)
         target = Address(0x607A, 0, "INT32")
         await cyclic.run([Trajectory(SERVO, target, values, Envelope())])
