@@ -104,7 +104,7 @@ def test_a_mode_that_may_be_none_is_not_listed():
     )
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_motor_alone_has_no_resonance(seed):
     case = _case(Mechanics(5e-5, (), 2e-4, 0.03), 10.0)
     found, _ = _found(replace(case, drive=replace(case.drive, seed=seed)))
