@@ -8,7 +8,7 @@ from typing import Any
 from playwright.sync_api import Page
 
 from tests.support.machine import within
-from tests.support.station import Station, until
+from tests.support.station import HANG_S, Station, until
 
 #: Faster than the noise of the simulated encoder at standstill, slower than any jog here.
 MOVING_RPM = 20.0
@@ -47,14 +47,14 @@ class Bench:
         return abs(self.state()["velocity"]) > MOVING_RPM
 
     def wait_moving(self) -> None:
-        until(self.moves, 30, "the axis moves")
+        until(self.moves, HANG_S, "the axis moves")
 
     def press(self, press: Callable[[], None], let_go: Callable[[], None]) -> None:
         """Hold a jog button until the axis moves; after a stall once more, as people do."""
         for _ in range(8):
             before = {job["id"] for job in self._jogs()}
             press()
-            until(lambda known=before: self.moves() or self._ended(known), 30, "the axis moves")
+            until(lambda known=before: self.moves() or self._ended(known), HANG_S, "the axis moves")
             if not self._ended(before):
                 return
             let_go()
@@ -85,7 +85,7 @@ class Bench:
     def wait_standing(self) -> None:
         """The axis stands, its job has ended, and it stays where it is."""
         within(STOP_S, lambda: not self.moves(), "the axis stands")
-        until(lambda: self.state()["moving_job"] is None, 30, "the job has ended")
+        until(lambda: self.state()["moving_job"] is None, HANG_S, "the job has ended")
         before = self.state()["position"]
         for _ in range(5):
             now = self.state()

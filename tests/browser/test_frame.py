@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from tests.browser.cable import Cable
 from tests.browser.driving import TOLD_MS, Bench, open_axis
-from tests.support.station import until
+from tests.support.station import HANG_S, until
 
 ROOT = Path(__file__).resolve().parents[2]
 AXIS = ["overview", "parameters", "motion", "tune", "response", "gains", "setup", "io", "alarms"]
@@ -196,7 +196,7 @@ def test_scope_draws_and_measures(laptop: Page, bench: Bench) -> None:
             page.get_by_role("button", name="CSV").click()
         return download.value.path().read_text("utf-8").splitlines()
 
-    lines = until(lambda: found if len(found := export()) > 20 else None, 15, "twenty samples")
+    lines = until(lambda: found if len(found := export()) > 20 else None, HANG_S, "twenty samples")
     assert lines[0].startswith('"time_s","X Velocity actual value')
     assert all(line.count(",") == 3 for line in lines[1:])
 

@@ -24,7 +24,7 @@ from backend.recording.reader import RecordingReader
 from tests.api.test_scene import messages
 from tests.browser.conftest import FLAGS, PATIENCE_MS
 from tests.browser.driving import Bench
-from tests.support.station import until
+from tests.support.station import HANG_S, until
 
 #: Loading and compiling 43 MB of WebAssembly on a busy machine.
 VIEWER_MS = 90_000
@@ -89,7 +89,7 @@ def record(page: Page, bench: Bench, name: str) -> None:
         rows = bench.station.ok(bench.station.http.get("/recordings"))["recordings"]
         return any(row["name"] == f"{name}.sdrec" and row["samples"] > 50 for row in rows)
 
-    until(recorded, 15, "samples are recorded")
+    until(recorded, HANG_S, "samples are recorded")
     page.get_by_role("button", name="End").click()
     expect(page.get_by_text("complete", exact=False)).to_be_visible()
 
@@ -184,7 +184,7 @@ def test_armed_kept_and_bounded_from_the_page(page: Page, bench: Bench) -> None:
         retention = bench.station.ok(answer.get("/recordings"))["retention"]
         return bool(retention["max_total_bytes"] == 7_000_000_000)
 
-    until(bounded, 10, "the bound holds on the server")
+    until(bounded, HANG_S, "the bound holds on the server")
 
 
 def test_what_cannot_be_recorded_is_said_in_words(page: Page, bench: Bench) -> None:
@@ -205,10 +205,10 @@ def test_bundles_are_made_armed_and_deleted(page: Page, bench: Bench) -> None:
     armed = page.get_by_label("Make one on every fault")
     expect(armed).to_be_checked()
     armed.click()  # it shows what the server says, so not at once
-    until(lambda: not bench.station.ok(bench.station.http.get("/bundles"))["armed"], 10)
+    until(lambda: not bench.station.ok(bench.station.http.get("/bundles"))["armed"], HANG_S)
     expect(armed).not_to_be_checked()
     armed.click()
-    until(lambda: bench.station.ok(bench.station.http.get("/bundles"))["armed"], 10)
+    until(lambda: bench.station.ok(bench.station.http.get("/bundles"))["armed"], HANG_S)
     page.get_by_role("button", name=re.compile("^Delete .*zip")).click()
     expect(page.get_by_text("No support bundles.")).to_be_visible()
 
@@ -219,7 +219,7 @@ def test_the_viewer_shows_what_is_live_and_what_was_recorded(page: Page, bench: 
     page.get_by_role("button", name="Show live").click()
     status = page.locator("[data-phase]")
     expect(status).to_have_attribute("data-phase", "live", timeout=VIEWER_MS)
-    until(lambda: int(status.get_attribute("data-blobs") or 0) > 20, 30, "blobs arrive")
+    until(lambda: int(status.get_attribute("data-blobs") or 0) > 20, HANG_S, "blobs arrive")
     expect(page.frame_locator("iframe").locator("canvas")).to_be_visible()
     page.frame_locator("iframe").locator("canvas").click(timeout=VIEWER_MS)
     with page.expect_request("**/api/v1/stop"):

@@ -19,7 +19,7 @@ from drivers.virtual.wires.netns import unavailable
 from tests.browser.cable import Cable
 from tests.browser.conftest import LAPTOP, PHONE, _open
 from tests.browser.test_frame import SIDEWAYS, TOO_SMALL
-from tests.support.station import Station, until
+from tests.support.station import HANG_S, Station, until
 
 URL = "ethercat://virtual0"
 BENCH = f"""
@@ -128,7 +128,7 @@ def add_channel(page: Page, words: str) -> None:
 
 def soon(read: Callable[[], Any], expected: Any, what: str) -> None:
     """What a gesture does is seen with the next picture, which a busy computer paints late."""
-    until(lambda: read() == expected, 10, what)
+    until(lambda: read() == expected, HANG_S, what)
 
 
 def length(stretch: Sequence[float]) -> float:
@@ -162,13 +162,15 @@ def test_a_step_is_caught_and_the_cursors_read_it(
     page.get_by_label("Cursor A").fill("-0.15")
     page.get_by_label("Cursor B").fill("0.6")
     expect(page.get_by_text("Between the cursors: 0.75 s")).to_be_visible()
-    until(lambda: abs(number(figure(page, VELOCITY, "b")) - 240) < 5, 10, "cursor B reads 240 rpm")
+    until(
+        lambda: abs(number(figure(page, VELOCITY, "b")) - 240) < 5, HANG_S, "cursor B reads 240 rpm"
+    )
     assert abs(number(figure(page, VELOCITY, "a"))) < 5
     assert number(figure(page, VELOCITY, "ba")) == pytest.approx(240, abs=8)
     assert number(figure(page, VELOCITY, "max")) > 230
     # 240 rpm are 4 turns a second: between 0.3 s and 0.6 s the shaft turns 1.2 times.
     page.get_by_label("Cursor A").fill("0.3")
-    until(lambda: abs(number(figure(page, POSITION, "ba")) - 1.2) < 0.02, 10, "1.2 turns")
+    until(lambda: abs(number(figure(page, POSITION, "ba")) - 1.2) < 0.02, HANG_S, "1.2 turns")
     assert number(figure(page, VELOCITY, "mean")) == pytest.approx(240, rel=0.02)
     # A cursor is dragged as well: B to the middle of the plot, 0.3 s after the trigger.
     box = page.get_by_role("img", name="Scope").locator(".u-over").bounding_box()
@@ -207,17 +209,19 @@ def test_a_sine_has_its_frequency_and_amplitude(page: Page, station: Station, cy
     page.get_by_text("Spectrum", exact=True).click()
     spectrum = page.get_by_role("region", name="Spectrum")
     spectrum.get_by_label("Trace").select_option(TARGET)
-    until(lambda: peaks(page) and abs(peaks(page)[0][1] - amplitude) < 0.0005, 15, "amplitude")
+    until(lambda: peaks(page) and abs(peaks(page)[0][1] - amplitude) < 0.0005, HANG_S, "amplitude")
     assert peaks(page)[0][0] == pytest.approx(hertz, abs=0.02)
     expect(spectrum.get_by_text("1000 Hz", exact=False)).to_be_visible()
     expect(page.get_by_text("not equally spaced")).to_have_count(0)
     # The speed of a sine of A turns at f is 2πfA turns a second.
     spectrum.get_by_label("Trace").select_option("m1")
-    until(lambda: peaks(page) and abs(peaks(page)[0][1] - speed) < 0.01 * speed, 15, "its speed")
+    until(
+        lambda: peaks(page) and abs(peaks(page)[0][1] - speed) < 0.01 * speed, HANG_S, "its speed"
+    )
     assert peaks(page)[0][0] == pytest.approx(hertz, abs=0.02)
     # The axis follows it: the same line, about as high.
     spectrum.get_by_label("Trace").select_option(POSITION)
-    until(lambda: peaks(page) and abs(peaks(page)[0][1] - amplitude) < 0.01, 15, "it follows")
+    until(lambda: peaks(page) and abs(peaks(page)[0][1] - amplitude) < 0.01, HANG_S, "it follows")
     for tab in ("Spectrogram", "X–Y"):
         page.get_by_text(tab, exact=True).click()
         expect(page.get_by_role("img", name=tab)).to_be_visible()
@@ -236,13 +240,13 @@ def test_timing_is_told_and_follows_the_exchange(page: Page, station: Station, a
 
 def test_what_passes_without_a_connection_is_counted(page: Page, cyclic: str, cable: Cable) -> None:
     expect(page.locator(f'[data-trace="{VELOCITY}"] .timing')).to_contain_text("synchronous")
-    until(lambda: number(figure(page, VELOCITY, "rms")) >= 0, 10)
+    until(lambda: number(figure(page, VELOCITY, "rms")) >= 0, HANG_S)
     lost = page.locator("[data-lost]")
     before = int(lost.get_attribute("data-lost") or 0)
     cable.cut()
     expect(page.get_by_text("nothing for").first).to_be_visible(timeout=15_000)
     cable.mend()
-    until(lambda: int(lost.get_attribute("data-lost") or 0) > before + 500, 30, "it is counted")
+    until(lambda: int(lost.get_attribute("data-lost") or 0) > before + 500, HANG_S, "it is counted")
     expect(page.get_by_text("nothing for")).to_have_count(0)
     expect(lost).to_contain_text("while there was no connection")
 

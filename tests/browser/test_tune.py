@@ -19,7 +19,7 @@ from tests.browser.cable import Cable
 from tests.browser.conftest import LAPTOP, _open
 from tests.browser.driving import MOVING_RPM, open_axis
 from tests.browser.tuning import COULOMB, INERTIA, MEASURED_MS, RESONANCE_HZ, confirm, row
-from tests.support.station import Station, until
+from tests.support.station import HANG_S, Station, until
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -212,7 +212,7 @@ def test_autotune_is_cancelled_while_the_axis_moves(
     page.locator(".job").get_by_role("button", name="Cancel").click()
     expect(page.get_by_role("status").filter(has_text="cancelled")).to_be_visible()
     # The axis stands without torque, and everything is as it was.
-    until(lambda: station.state(axis)["moving_job"] is None, 30, "the axis is free")
+    until(lambda: station.state(axis)["moving_job"] is None, HANG_S, "the axis is free")
     assert station.state(axis)["state"] != "Operation enabled"
     assert abs(station.state(axis)["velocity"]) < MOVING_RPM
     assert settings_of(station, axis) == before

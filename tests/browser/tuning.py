@@ -20,7 +20,7 @@ from backend.demo import DemoBench
 from drivers.virtual.wires.netns import unavailable
 from tests.browser.conftest import PATIENCE_MS
 from tests.browser.driving import open_axis
-from tests.support.station import Station, until
+from tests.support.station import HANG_S, Station, until
 
 URL = "ethercat://virtual0"
 MOTOR, LOAD, STIFFNESS, COULOMB = 5e-5, 1.5e-4, 60.0, 0.03
@@ -104,7 +104,7 @@ def run_job(page: Page, station: Station, axis: str, button: str) -> None:
         print(f"{button} is repeated: {told}")
         assert any(words in told for words in BUSY), told
         failed.first.get_by_role("button", name="Close").click()
-        until(lambda: station.state(axis)["moving_job"] is None, 30, "the axis is free")
+        until(lambda: station.state(axis)["moving_job"] is None, HANG_S, "the axis is free")
         until(lambda: _without_fault(station, axis), 60, "the drive answers without a fault")
     raise AssertionError(f"{button}: {told}")
 
