@@ -19,6 +19,7 @@ from drivers.ethercat.information import EntryDescription
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Address
 from drivers.virtual.wires.netns import Namespace, child_environment
+from tests.support.machine import OwnTime
 from tests.wire.ethercat_host.conftest import Rig, repeated, until
 
 STATUS = Address(0x6041, 0, "UINT16")
@@ -138,10 +139,10 @@ async def test_slow_states_and_slow_answers_are_waited_for(rig: Rig) -> None:
 async def test_an_answer_that_comes_too_late_is_not_taken_for_another(rig: Rig) -> None:
     async with rig.link() as bus:
         rig.do("timing", slave=0, sdo_s=1.3)
-        started = time.monotonic()
-        with pytest.raises(LinkTimeout, match="did not answer in time"):
+        late = pytest.raises(LinkTimeout, match="did not answer in time")
+        with OwnTime(with_children=True) as took, late:
             await bus.link.read(1, RECORD[1])
-        assert time.monotonic() - started < 1.5
+        assert took.s < 1.5
         rig.do("timing", slave=0, sdo_s=0.0003)
         assert await bus.link.read(1, RECORD[3]) == b"\x77\x66\x55\x44"
         assert await bus.link.read(2, STATUS) == b"\x50\x02"
@@ -150,9 +151,9 @@ async def test_an_answer_that_comes_too_late_is_not_taken_for_another(rig: Rig) 
 async def test_a_mute_mailbox_times_out_and_comes_back(rig: Rig) -> None:
     async with rig.link() as bus:
         rig.do("mute", slave=0)
-        started = time.monotonic()
-        answers = await bus.link.read_many(1, [STATUS, *RECORD])
-        assert time.monotonic() - started < 3.5, "not one time-out per parameter"
+        with OwnTime(with_children=True) as took:
+            answers = await bus.link.read_many(1, [STATUS, *RECORD])
+        assert took.s < 3.5, "not one time-out per parameter"
         assert all(isinstance(a, LinkTimeout) for a in answers)
         assert await bus.link.read(2, STATUS) == b"\x50\x02", "the neighbour is served meanwhile"
         rig.do("mute", slave=0, on=False)
@@ -164,16 +165,16 @@ async def test_dying_in_the_middle_of_a_segmented_upload_does_not_hang(rig: Rig)
     async with rig.link() as bus:
         await bus.link.write(1, LONG, bytes(1400))
         rig.do("die_in_transfer", slave=0, after_segments=1)
-        started = time.monotonic()
-        reading = asyncio.create_task(bus.link.read(1, LONG))
         slowest = 0.0
-        while not reading.done():
-            before = time.monotonic()
-            await bus.link.read(2, STATUS)
-            slowest = max(slowest, time.monotonic() - before)
-        with pytest.raises(LinkTimeout):
-            await reading
-        assert time.monotonic() - started < 4.0
+        with OwnTime(with_children=True) as took:
+            reading = asyncio.create_task(bus.link.read(1, LONG))
+            while not reading.done():
+                with OwnTime(with_children=True) as one:
+                    await bus.link.read(2, STATUS)
+                slowest = max(slowest, one.s)
+            with pytest.raises(LinkTimeout):
+                await reading
+        assert took.s < 4.0
         assert slowest < 0.8, "not the time-out of the neighbour"
         rig.do("die_in_transfer", slave=0, after_segments=None)
         rig.do("mute", slave=0, on=False)
@@ -233,12 +234,12 @@ async def test_a_heap_of_late_frames_is_never_taken_for_answers(rig: Rig) -> Non
             with contextlib.suppress(DriveError):
                 await bus.link.read(1, STATUS)
         rig.do("peace")
-        await until(lambda: not bus.link.quality(1).state.startswith("no answer"), 3.0)
+        await until(lambda: not bus.link.quality(1).state.startswith("no answer"), 30.0)
         for number in range(1, 20):
             value = number.to_bytes(2, "little")
             await bus.link.write(1, RECORD[1], value)
             assert await bus.link.read(1, RECORD[1]) == value
-        await until(lambda: int(bus.link.quality().details["late_frames"]) > 0, 1.0)
+        await until(lambda: int(bus.link.quality().details["late_frames"]) > 0, 30.0)
 
 
 async def test_a_busy_eeprom_ends_in_words(rig: Rig) -> None:
@@ -328,7 +329,7 @@ async def test_no_descriptor_is_left_behind(rig: Rig) -> None:
     for _ in range(2):
         async with rig.link():
             pass
-    await until(lambda: len(os.listdir("/proc/self/fd")) <= before, 2.0)  # noqa: PTH208
+    await until(lambda: len(os.listdir("/proc/self/fd")) <= before, 30.0)  # noqa: PTH208
 
 
 def test_hazards_of_pysoem_are_guarded(namespace: Namespace, rig: Rig) -> None:
