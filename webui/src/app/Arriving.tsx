@@ -12,7 +12,7 @@ const QUIET_LOOKS = 2
  * A page whose drive or network lets it wait longer shows what it has. What is wrong with a drive
  * stands first on its page, so that nothing moves it, and must not wait for a drive that is dead.
  */
-const LONGEST_MS = 8000
+const LONGEST_MS = 3000
 const ALARMS_MS = 1000
 
 /**
@@ -38,8 +38,11 @@ export function Arriving({
     const begun = performance.now()
     let quiet = 0
     const timer = setInterval(() => {
-      const waits =
-        !contents.link.open || (drive !== null && !contents.states.has(drive)) || outstanding(since)
+      const state = drive === null ? undefined : contents.states.get(drive)
+      // Without a connection, and from a drive that is mute, nothing comes that it could wait for.
+      const silent = contents.lostAt !== null || state?.fresh === false
+      const coming = !contents.link.open || (drive !== null && !state) || outstanding(since)
+      const waits = !silent && coming
       quiet = waits ? 0 : quiet + 1
       if (quiet >= QUIET_LOOKS || performance.now() - begun > longest) setThere(true)
     }, LOOK_MS)

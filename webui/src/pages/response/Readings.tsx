@@ -109,7 +109,9 @@ export function ResonanceTable({
               <td className="right">{hertz(each.frequency_hz)}</td>
               <td className="right">
                 {fixed(each.damping * 100, 1, '%')}
-                {each.damping_ci95 && <span className="dim"> {percentBand(each.damping_ci95)}</span>}
+                {each.damping_ci95 && (
+                  <span className="dim"> {percentBand(each.damping_ci95)}</span>
+                )}
               </td>
               <td className="right">{fixed(each.height_db, 1, 'dB')}</td>
               {onNotch && (
