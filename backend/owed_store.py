@@ -18,7 +18,6 @@ from backend.files import StorageFailed, write_atomically
 from backend.owed import Debt
 from profiles.schema import Raw
 
-
 #: What moves is this long after the last note still the doing of the server that was killed; later
 #: somebody else may have the machine.
 A_MOMENT_S = 600.0

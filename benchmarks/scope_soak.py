@@ -4,7 +4,8 @@ A station with four EtherCAT axes in a process of its own records 16 channels, a
 show them on the Scope page; the second one is stopped (SIGSTOP, as a closed lid does) for the
 middle third. ``SERVODECK_SCOPE_SOAK_S`` sets the length; 1800 s are the half hour promised.
 On a computer that is busy with other things ``SERVODECK_SCOPE_SOAK_STEADY=1`` lets the segment's
-time follow the frames: no cycle is left out, they only come more slowly.
+time follow the frames: no cycle is left out, they only come more slowly. Where this program may,
+it grants what a station grants, and says so.
 
 Aims, each judged in the last lines: no sample lost on disk beyond those that the bus itself left
 out; nothing lost in the view of the page that is awake, and what the other one missed counted;
@@ -53,6 +54,8 @@ SETTLING_PART, SETTLING_S = 1 / 3, 180.0
 FLAT_MIB = 16.0
 #: p99 of the cycle's lateness may be this much more with everything on; one histogram step.
 JITTER_FACTOR, JITTER_US = 1.5, 50.0
+#: Of the server's unit.
+NICE = -10
 #: From the bus to what a page says of it, at most.
 SHOWN_S = 1.0
 #: A page that slept is told of what it missed, less what waited for it in queues and sockets.
@@ -111,6 +114,8 @@ class Poller(threading.Thread):
         self._base = base
 
     def run(self) -> None:
+        with suppress(OSError):  # a client of its own computer does not wait for the browsers here
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)
         with httpx.Client(base_url=f"{self._base}/api/v1", timeout=30) as http:
             while not self.stop.wait(0.1):
                 began = time.monotonic()
@@ -156,15 +161,23 @@ def fieldbus(server: int) -> dict[str, int]:
 
 
 def grant_real_time(parts: dict[str, int]) -> str:
-    """What a station grants the host (docs/station.md), where the virtual bench's namespace
-    cannot; the virtual drives get it, too: real ones do not wait for this computer.
+    """What a station grants host and server (docs/station.md), where the virtual bench's namespace
+    cannot. The virtual drives get one of the cores: real ones do not take this computer's time.
     """
     try:
-        for part, priority in (("virtual segment", 45), ("host", 40)):
+        *ours, theirs = sorted(os.sched_getaffinity(0))
+        for part, priority, cores in (("virtual segment", 45, {theirs}), ("host", 40, set(ours))):
             os.sched_setscheduler(parts[part], os.SCHED_FIFO, os.sched_param(priority))
-    except OSError as error:
-        return f"not granted ({error.strerror})"
-    return "SCHED_FIFO, as on a station"
+            os.sched_setaffinity(parts[part], cores)
+        for task in Path(f"/proc/{parts['server']}/task").iterdir():
+            os.setpriority(os.PRIO_PROCESS, int(task.name), NICE)
+            os.sched_setaffinity(int(task.name), ours)
+    except (OSError, ValueError) as error:
+        return f"not granted ({error})"
+    return (
+        f"SCHED_FIFO for the bus and nice {NICE} for the server as on a station, virtual drives "
+        f"on core {theirs}, host and server on the others; browsers anywhere"
+    )
 
 
 def prepare(http: httpx.Client) -> list[str]:

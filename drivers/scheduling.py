@@ -57,7 +57,9 @@ def short_slice() -> bool:
     the same. False where the kernel does not know of it, or this task is not an ordinary one.
     """
     number = _SYS_SCHED_SETATTR.get(platform.machine())
-    if number is None or os.sched_getscheduler(0) != os.SCHED_OTHER:
+    if number is None or sys.platform != "linux":
+        return False
+    if os.sched_getscheduler(0) != os.SCHED_OTHER:
         return False
     wanted = _SchedAttr(
         size=ctypes.sizeof(_SchedAttr),

@@ -157,8 +157,11 @@ class Preparation:
     def _clocks_and_watchdogs(self) -> None:
         self._promise("starting the distributed clocks")
         if self._segment.master.config_dc() and self._dc:
-            for number in self._setups:
-                self._segment.slaves[number - 1].dc_sync(True, self._cycle_ns)
+            starts = {
+                number: setup_.start_sync0(self._stations[number - 1], plan, time.monotonic)
+                for number, plan in self._setups.items()
+            }
+            self._run("register", starts, "starting SYNC0")
         # SOEM used the mailboxes by itself: its counter is unknown to us.
         fences = {
             s.number: coe.settle(s.box, force=True) for s in self._stations if s.mailbox is not None

@@ -10,7 +10,7 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from drivers.errors import DriveError, NotAllowed, ProtocolError, Rejected
+from drivers.errors import DriveError, LinkLost, NotAllowed, ProtocolError, Rejected
 from drivers.ethercat import coe, sii
 from drivers.ethercat.al_status import AlState
 from drivers.ethercat.mapping import Entry, Pdo
@@ -27,10 +27,11 @@ _PROCESS_MEMORY = 0x1000
 """Registers end there (ETG.1000.4 clause 6.1)."""
 
 _DC_SYSTEM_TIME, _DC_OFFSET, _DC_DELAY = 0x910, 0x920, 0x928
-_DC_ACTIVATE, _DC_START, _DC_CYCLE = 0x981, 0x990, 0x9A0
+_DC_CONTROL, _DC_ACTIVATE, _DC_START, _DC_CYCLE = 0x980, 0x981, 0x990, 0x9A0
 _ASSIGN = {"rx": 0x1C12, "tx": 0x1C13}
 _SETPOINTS = {0x6040, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2}
 _SYNC_LEAD_NS = 100_000_000
+_SYNC_ACTIVE, _SYNC_TRY_S = 0x03, 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,13 +324,59 @@ def restore(
     yield Write(FMMU, snapshot.fmmu)
     yield from arm_watchdog(station, setup)
     if setup.dc:
-        yield from _restore_clock(setup, snapshot, dc_time)
+        yield from _restore_clock(snapshot, dc_time)
+        yield from start_sync0(station, setup, clock)
     yield from change_state(station, AlState.SAFEOP, clock)
 
 
-def _restore_clock(
-    setup: StationSetup, snapshot: Snapshot, dc_time: Callable[[], int]
-) -> Steps[None]:
+def start_sync0(station: Station, setup: StationSetup, clock: Callable[[], float]) -> Steps[None]:
+    """Start SYNC0 on the grid of the distributed clock, and see that it was in time.
+
+    A start that has passed when it is activated comes only after the clock has wrapped (ETG.1000.4
+    clause 6.7.3), and the drive then refuses OP: a lost frame or a pause of this computer must not
+    do that.
+
+    Raises:
+        LinkLost: frames are lost again and again.
+    """
+    deadline = clock() + _SYNC_TRY_S
+    while not (yield from _sync0_started(setup)):
+        if clock() > deadline:
+            raise LinkLost(
+                f"station {station.number}: its SYNC0 could not be started, frames are lost again"
+                " and again",
+                remedy="check the cables, and that this computer is not overloaded",
+            )
+
+
+def _sync0_started(setup: StationSetup) -> Steps[bool]:
+    """One try; False where a frame was lost, or the start had passed before it was activated."""
+    stopped = yield Write(_DC_ACTIVATE, b"\0")
+    yield Write(_DC_CONTROL, b"\0")
+    here = yield Read(_DC_SYSTEM_TIME, 8)
+    if here is None or stopped is None:
+        return False
+    start_ns = _sync_start(int.from_bytes(here, "little"), setup)
+    # What 990h holds cannot be read back: chips tell the next pulse there.
+    written = [
+        (yield Write(_DC_CYCLE, struct.pack("<I", setup.cycle_ns))),
+        (yield Write(_DC_START, struct.pack("<Q", start_ns))),
+        (yield Write(_DC_ACTIVATE, bytes([_SYNC_ACTIVE]))),
+    ]
+    now = yield Read(_DC_SYSTEM_TIME, 8)
+    if now is None or None in written:
+        return False
+    # Some chips count 32 bits only.
+    ahead_ns = (start_ns - int.from_bytes(now, "little")) & 0xFFFF_FFFF
+    return 0 < ahead_ns <= _SYNC_LEAD_NS
+
+
+def _sync_start(now_ns: int, setup: StationSetup) -> int:
+    """Whole multiples of the cycle, which all stations share."""
+    return (now_ns + _SYNC_LEAD_NS) // setup.cycle_ns * setup.cycle_ns
+
+
+def _restore_clock(snapshot: Snapshot, dc_time: Callable[[], int]) -> Steps[None]:
     """Shift the restarted clock to the reference clock; the cyclic frames do the rest."""
     yield Write(_DC_ACTIVATE, b"\0")
     yield Write(_DC_DELAY, snapshot.dc_delay)
@@ -339,7 +386,3 @@ def _restore_clock(
         raise DriveError("the slave stopped answering while its clock was set")
     shifted = struct.unpack("<q", offset)[0] + dc_time() - struct.unpack("<q", here)[0]
     yield Write(_DC_OFFSET, struct.pack("<q", shifted))
-    start = (dc_time() + _SYNC_LEAD_NS) // setup.cycle_ns * setup.cycle_ns
-    yield Write(_DC_CYCLE, struct.pack("<I", setup.cycle_ns))
-    yield Write(_DC_START, struct.pack("<q", start))
-    yield Write(_DC_ACTIVATE, b"\x03")
