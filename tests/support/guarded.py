@@ -13,7 +13,6 @@ from typing import Any, TypeVar
 import httpx
 import uvicorn
 from argon2 import PasswordHasher
-from websockets.sync.client import connect
 
 from backend.bench import Bench, Member
 from backend.commands.serve import Serving, _config, _listen
@@ -65,11 +64,6 @@ class Caller:
 
 class Page(Live):
     """A websocket with a cookie."""
-
-    def __init__(self, url: str, headers: dict[str, str]) -> None:
-        self.socket = connect(url, max_size=None, additional_headers=headers)
-        self.binary: list[bytes] = []
-        self.connection = self.wait("hello")["connection"]
 
     def refused(self, **message: object) -> Any:
         """Send, then a ping; the problem that came before the pong, or None."""

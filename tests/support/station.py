@@ -8,7 +8,7 @@ import json
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -156,9 +156,11 @@ class Station:
 class Live:
     """A page's websocket."""
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, headers: Mapping[str, str] | None = None) -> None:
         # With messages unread, this client does not see the server's close and would wait 10 s.
-        self.socket: ClientConnection = connect(url, max_size=None, close_timeout=1)
+        self.socket: ClientConnection = connect(
+            url, max_size=None, close_timeout=1, additional_headers=headers
+        )
         self.binary: list[bytes] = []
         self._heard: deque[str | bytes] = deque()
         hello = self.wait("hello")
