@@ -23,6 +23,7 @@ def _centre(page: Page, name: str) -> tuple[float, float]:
     button = page.get_by_role("button", name=name)
     expect(button).to_have_attribute("aria-disabled", "false")
     button.scroll_into_view_if_needed()
+    button.hover(trial=True)  # it stands still, and nothing lies over it
     box = button.bounding_box()
     assert box is not None
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

@@ -23,6 +23,7 @@ def jogged(
     Gives where it began. A computer that stalls for 200 ms ends a jog, rightly: then once more.
     ``settings`` are those of the message ``jog_start``; the direction is 1 unless told.
     """
+    ended = []
     for _ in range(5):
         start = float(_state(http, drive)["position"])
         page.send(**({"type": "jog_start", "drive": drive, "direction": 1} | settings))
@@ -35,8 +36,8 @@ def jogged(
             if now["moving_job"] is not None:
                 yield start
                 return
-        page.wait("jog_ended", drive=drive)
-    raise AssertionError("the machine stalls too often")
+        ended.append(page.wait("jog_ended", drive=drive))
+    raise AssertionError(ended)
 
 
 def fast(now: Any, _start: float) -> bool:

@@ -10,10 +10,11 @@ const LOOK_MS = 30
 const QUIET_LOOKS = 2
 /**
  * A page whose drive or network lets it wait longer shows what it has. What is wrong with a drive
- * stands first on its page, so that nothing moves it, and must not wait for a drive that is dead.
+ * stands first on its page, so that nothing moves it, and must not wait for a drive that is dead;
+ * nor need any page wait long without a connection, or for a drive that is mute.
  */
 const LONGEST_MS = 3000
-const ALARMS_MS = 1000
+const SHORT_MS = 1000
 
 /**
  * A page is built out of sight until what it asked for on opening is there: parts that come
@@ -29,7 +30,6 @@ export function Arriving({
   children: ReactNode
 }) {
   const t = useT()
-  const longest = page === 'alarms' ? ALARMS_MS : LONGEST_MS
   // Taken before the page's own effects ask for anything.
   const [since] = useState(moment)
   const [there, setThere] = useState(false)
@@ -39,15 +39,14 @@ export function Arriving({
     let quiet = 0
     const timer = setInterval(() => {
       const state = drive === null ? undefined : contents.states.get(drive)
-      // Without a connection, and from a drive that is mute, nothing comes that it could wait for.
       const silent = contents.lostAt !== null || state?.fresh === false
-      const coming = !contents.link.open || (drive !== null && !state) || outstanding(since)
-      const waits = !silent && coming
+      const longest = silent || page === 'alarms' ? SHORT_MS : LONGEST_MS
+      const waits = !contents.link.open || (drive !== null && !state) || outstanding(since)
       quiet = waits ? 0 : quiet + 1
       if (quiet >= QUIET_LOOKS || performance.now() - begun > longest) setThere(true)
     }, LOOK_MS)
     return () => clearInterval(timer)
-  }, [there, since, drive, longest])
+  }, [there, since, drive, page])
   return (
     <>
       {!there && (

@@ -55,7 +55,7 @@ async function refresh(): Promise<void> {
     const jobs = await ask(api.GET('/api/v1/jobs'))
     for (const job of jobs) store.setJob(job)
     store.endForgotten(before, jobs)
-    for (const id of store.contents.rows.keys()) void loadRows(id)
+    await Promise.all([...store.contents.rows.keys()].map(loadRows))
   } catch {
     // The connection went again; its banner is already shown and the next one comes here.
   }
