@@ -138,13 +138,19 @@ class Roster:
             return
         if station.al_state != before and station.al_state & ERROR_BIT:
             self.event("state", station.number, self.al_words(station))
-        if station.al_state == AlState.INIT | ERROR_BIT:
+        if station.al_state & ~ERROR_BIT == AlState.INIT and (
+            station.al_state & ERROR_BIT or station.mailbox is not None
+        ):
             self._mend(station)
         else:
             self._mending.pop(station.number, None)
 
     def _mend(self, station: Station) -> None:
-        """It fell out of PREOP, as when a frame of the search was lost: nobody could stop it so."""
+        """It fell out of PREOP, as when a frame of the search was lost: nobody could stop it so.
+
+        Or it never came there, as when it was switched on again and took longer to start than a
+        state may take: it answered no parameter, and nobody asked for another state.
+        """
         number, now = station.number, time.monotonic()
         # No search takes anything from it that it still had.
         self._powered.discard(number)

@@ -14,11 +14,12 @@ from drivers.errors import DriveError, LinkLost, NotAllowed, ProtocolError, Reje
 from drivers.ethercat import coe, sii
 from drivers.ethercat.al_status import AlState
 from drivers.ethercat.mapping import Entry, Pdo
-from drivers.ethercat.station import Station, change_state, read_again
+from drivers.ethercat.registers import TRIES, read_again
+from drivers.ethercat.station import Station, change_state
 from drivers.ethercat.steps import Read, Steps, Write
 
 FMMU, SYNC_MANAGERS = 0x600, 0x800
-_FMMU_COUNT, _TRIES = 0x004, 3
+_FMMU_COUNT = 0x004
 WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x400, 0x420
 _MANAGERS, _OUTPUTS, _SM_WATCHDOG = 4, 0x04, 0x40
 """Control byte of a sync manager (ETG.1000.4 clause 6.7): three buffers, written by the master."""
@@ -63,7 +64,7 @@ def spare(station: Station) -> Steps[None]:
     count = yield from read_again(_FMMU_COUNT, 1)
     if count is None:
         raise ProtocolError(f"station {station.number} stopped answering: it is left alone")
-    for _ in range(_TRIES if count[0] else 0):
+    for _ in range(TRIES if count[0] else 0):
         if (yield Write(FMMU, bytes(16 * count[0]))) is not None:
             return
 

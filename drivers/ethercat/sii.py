@@ -14,7 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError
-from drivers.ethercat.steps import Pause, Read, Steps, Write
+from drivers.ethercat.registers import GONE_S, TRIES, read_again
+from drivers.ethercat.steps import Pause, Steps, Write
 
 ALIAS_WORD, CHECKSUM_WORD, SERIAL_WORD, BOOT_WORD = 0x0004, 0x0007, 0x000E, 0x0014
 MAILBOX_WORD = 0x0018
@@ -29,8 +30,7 @@ _READ, _WRITE, _ENABLE_WRITE = 0x0100, 0x0200, 0x0001
 _BUSY, _FAILED = 0x8000, 0x6000
 _TAKE, _MASTER, _SLAVE = b"\x02", b"\x00", b"\x01"
 _TIMEOUT_S, _POLL_S = 0.5, 0.0005
-_TRIES, _GONE_S, _AGAIN_S = 3, 1.0, 0.005
-"""Frames that came back untouched, and for how long lost ones are sent again, as in `station`."""
+_AGAIN_S = 0.005
 _LEAST_MAILBOX, _RAM = 16, 0x1000
 
 
@@ -154,13 +154,13 @@ def _take(clock: Callable[[], float]) -> Steps[None]:
 
 
 def _give_back() -> Steps[None]:
-    for _ in range(_TRIES):
+    for _ in range(TRIES):
         if (yield Write(_OWNER, _SLAVE)) is not None:
             return
 
 
 def _command(command: int, word: int, clock: Callable[[], float]) -> Steps[None]:
-    deadline = clock() + _GONE_S
+    deadline = clock() + GONE_S
     while True:
         # It may be carried out although its frame did not come back: never into a busy EEPROM.
         yield from _ready(clock)
@@ -193,7 +193,7 @@ def _ready(clock: Callable[[], float]) -> Steps[int]:
 
 def _put(register: int, data: bytes, clock: Callable[[], float]) -> Steps[None]:
     """Write a register; what was written twice does no harm here."""
-    deadline = clock() + _GONE_S
+    deadline = clock() + GONE_S
     while (yield Write(register, data)) is None:
         if clock() > deadline:
             raise _gone()
@@ -201,14 +201,9 @@ def _put(register: int, data: bytes, clock: Callable[[], float]) -> Steps[None]:
 
 
 def _register(register: int, size: int, clock: Callable[[], float]) -> Steps[bytes]:
-    deadline = clock() + _GONE_S
-    untouched = 0
-    while not (data := (yield Read(register, size, may_be_empty=True))):
-        untouched += data is not None
-        if untouched >= _TRIES or clock() > deadline:
-            raise _gone()
-        if data is None:
-            yield Pause(_AGAIN_S)
+    data = yield from read_again(register, size, clock)
+    if data is None:
+        raise _gone()
     return data
 
 

@@ -10,6 +10,7 @@ from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Protoc
 from drivers.ethercat import coe, esc, sii
 from drivers.ethercat.al_status import ERROR_BIT, AlState, al_status_text, state_name
 from drivers.ethercat.mailbox import Mailbox
+from drivers.ethercat.registers import GONE_S, TRIES, read_again
 from drivers.ethercat.steps import Pause, Read, Steps, Write
 
 AL_CONTROL, AL_STATUS = 0x120, 0x130
@@ -20,8 +21,6 @@ STATE_TIMEOUT_S = {
     AlState.INIT: 5.0, AlState.PREOP: 3.0, AlState.BOOT: 3.0, AlState.SAFEOP: 10.0,
     AlState.OP: 10.0,
 }  # fmt: skip
-
-_TRIES, _GONE_S = 3, 1.0
 
 
 @dataclass
@@ -43,7 +42,8 @@ class Station:
     al_code: int = 0
     lost: bool = False
     badly_found: bool = False
-    """Its EEPROM names a mailbox that the search did not set up: a frame of the search was lost."""
+    """Frames of the search were lost: its clock could not be asked for, or its EEPROM names a
+    mailbox that was not set up."""
     complete_access: bool = True
     single_only: set[int] = field(default_factory=set)
     """Objects whose complete access was not certain."""
@@ -115,17 +115,17 @@ def _al_status(station: Station) -> Steps[bool | None]:
 def answers(station: Station, clock: Callable[[], float]) -> Steps[bool]:
     """Whether it is there; its AL state and code are read.
 
-    A frame that comes back untouched is certain after `_TRIES`; lost ones, as while the segment or
-    the computer stands still for a moment, are asked again for `_GONE_S`.
+    A frame that comes back untouched is certain after `registers.TRIES`; lost ones, as while the
+    segment or the computer stands still for a moment, are asked again for `registers.GONE_S`.
     """
-    deadline = clock() + _GONE_S
+    deadline = clock() + GONE_S
     untouched = 0
     while True:
         told = yield from _al_status(station)
         if told:
             return True
         untouched += told is False
-        if untouched >= _TRIES or clock() > deadline:
+        if untouched >= TRIES or clock() > deadline:
             return False
         if told is None:
             yield Pause(0.005)
@@ -194,10 +194,12 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
     What a slave does not have stays empty; a slave that refuses PREOP keeps a note in words.
     """
     station.notes.clear()
-    alias = yield from read_again(0x12, 2)
+    alias = yield from read_again(0x12, 2, clock)
     station.alias = int.from_bytes(alias or b"\0\0", "little")
-    features = yield from read_again(0x08, 2)
+    features = yield from read_again(0x08, 2, clock)
     station.distributed_clock = bool(features and features[0] & 0x04)
+    # Unheard it is not one without a distributed clock: nothing of it is known.
+    station.badly_found = features is None
     if (yield from read_ports(station)):
         station.wiring = station.ports
     try:
@@ -210,7 +212,7 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         station.notes.append(error.message)
     if station.mailbox is None:
         yield from al_status(station)
-        station.badly_found = yield from sii.has_mailbox(clock)
+        station.badly_found |= yield from sii.has_mailbox(clock)
         station.notes.append(
             "it was found only in part: the segment is searched again"
             if station.badly_found
@@ -271,15 +273,6 @@ def _try_read(station: Station, index: int, subindex: int) -> Steps[bytes | None
         return None
 
 
-def read_again(register: int, size: int) -> Steps[bytes | None]:
-    """A register, asked again when a single frame is lost."""
-    for _ in range(_TRIES):
-        data = yield Read(register, size)
-        if data is not None:
-            return data
-    return None
-
-
 def clear_ports(station: Station) -> Steps[None]:
     """Set the error counters to zero; any write to them does (ETG.1000.4 clause 6.2).
 
@@ -290,10 +283,10 @@ def clear_ports(station: Station) -> Steps[None]:
     yield Write(0x30C, b"\0")
     yield Write(0x30D, b"\0")
     for register, size in ((esc.ERROR_COUNTERS, 8), (0x310, 4)):
-        for attempt in range(_TRIES):
+        for attempt in range(TRIES):
             if (yield Write(register, bytes(size))) is not None:
                 break
-            if attempt == _TRIES - 1:
+            if attempt == TRIES - 1:
                 raise _gone(station)
 
 

@@ -180,3 +180,27 @@ def test_a_drive_that_is_being_set_up_is_left_to_that(clock: Clock) -> None:
     clock.now += 20.0
     watch(made, 1, AlState.INIT | ERROR_BIT)
     assert lanes.mailbox == []
+
+
+def test_a_drive_that_did_not_leave_init_is_asked_again(clock: Clock) -> None:
+    """Switched on again it took longer to start than a state may take, and stayed there, mute."""
+    made, wire, lanes, _ = roster(2)
+    assert ask(made, 2)
+    lanes.mailbox.clear()
+    watch(made, 2, AlState.INIT)
+    assert lanes.mailbox == [2]
+    clock.now += 1.1
+    watch(made, 2, AlState.INIT)
+    assert lanes.mailbox == [2, 2]
+    watch(made, 2, AlState.PREOP)
+    clock.now += 20.0
+    watch(made, 2, AlState.PREOP)
+    assert lanes.mailbox == [2, 2]
+    # A terminal without mailbox may stay there: nobody asks it for a parameter.
+    made.stations[0].mailbox = None
+    for _ in range(10):
+        watch(made, 1, AlState.INIT)
+        clock.now += 5.0
+        made.housekeeping(clock.now)
+    assert 1 not in lanes.mailbox
+    assert wire.searches == 1
