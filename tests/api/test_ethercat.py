@@ -19,8 +19,8 @@ from typer.testing import CliRunner
 
 from backend import cli
 from drivers.virtual.wires.netns import unavailable
-from tests.support.machine import Stopwatch
-from tests.support.station import HANG_S, Live, Station, until
+from tests.support.machine import Stopwatch, within
+from tests.support.station import Live, Station
 
 URL = "ethercat://virtual0"
 BENCH = """
@@ -191,7 +191,7 @@ def test_silence_of_the_page_brakes(station: Station, cyclic: tuple[str, str]) -
 
         ended = undisturbed(jog)
     assert "200 ms" in ended["reason"]
-    until(lambda: abs(station.state(a)["velocity"]) < 2, HANG_S)
+    within(5, lambda: abs(station.state(a)["velocity"]) < 2, "it stands")
 
 
 def test_stop_brakes_cyclic_motion(station: Station, cyclic: tuple[str, str]) -> None:
@@ -202,7 +202,8 @@ def test_stop_brakes_cyclic_motion(station: Station, cyclic: tuple[str, str]) ->
         assert a in station.ok(station.http.post("/stop", json={}))["stopped"]
         hold(page, a, 0.3)
         page.wait("jog_ended", drive=a, timeout_s=20)
-        now = until(lambda: abs(station.state(a)["velocity"]) < 2 and station.state(a), HANG_S)
+        within(5, lambda: abs(station.state(a)["velocity"]) < 2, "it stands")
+        now = station.state(a)
     assert now["state"] != "Operation enabled"
 
 

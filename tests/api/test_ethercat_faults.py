@@ -22,7 +22,7 @@ import pytest
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import unavailable
 from tests.api.test_ethercat import BENCH, JOG, URL, hold, undisturbed
-from tests.support.machine import ApiWatch
+from tests.support.machine import ApiWatch, within
 from tests.support.station import HANG_S, Live, Station, until
 
 B = 1
@@ -63,7 +63,7 @@ class Segment:
         answer = self.station.http.get("/ethercat/segment", params={"url": URL})
         return self.station.ok(answer)
 
-    def told(self, *words: str, after: int, within_s: float = 60.0) -> str:
+    def told(self, *words: str, after: int, within_s: float = 10.0) -> str:
         """The line of the log with all these words that is newer than `lines`."""
 
         def seen() -> str:
@@ -71,7 +71,7 @@ class Segment:
             new = lines[: len(lines) - after] if len(lines) >= after else lines
             return next((line for line in new if all(w in line for w in words)), "")
 
-        return str(until(seen, within_s, f"{words} in the log"))
+        return str(within(within_s, seen, f"{words} in the log"))
 
     def lines(self) -> int:
         """How many lines the log has."""
@@ -87,7 +87,7 @@ class Segment:
             speed = bytes.fromhex(str(self.trouble("read", slave=slave, index=VELOCITY)))
             return abs(int.from_bytes(speed, "little", signed=True)) < 65536 * 2 / 60
 
-        until(still, 60, "the axis stands")
+        within(10, still, "the axis stands")
 
     def settled(self) -> None:
         """Both drives were asked after now and answered; what their return began has ended."""
@@ -100,7 +100,7 @@ class Segment:
             fresh = all(state["fresh"] for state in states)
             return asked and fresh and all(job["state"] != "running" for job in jobs)
 
-        until(calm, 60, "both drives answer")
+        within(20, calm, "both drives answer")
 
     def jogs(self) -> None:
         """Everything works: B can be moved, after a fault that it kept was reset by hand."""
@@ -112,7 +112,7 @@ class Segment:
                 page.send(type="jog_start", drive=self.b, direction=1, **JOG)
                 hold(page, self.b, 0.8)
                 page.send(type="jog_stop", drive=self.b)
-                return page.wait("jog_ended", drive=self.b, timeout_s=60)
+                return page.wait("jog_ended", drive=self.b, timeout_s=20)
 
             ended = undisturbed(jog)
         assert ended["problem"] is None, ended
@@ -194,7 +194,7 @@ def turning(page: Live, segment: Segment) -> Iterator[None]:
             if now["moving_job"] is not None:
                 yield
                 return
-        page.wait("jog_ended", drive=segment.b, timeout_s=60)
+        page.wait("jog_ended", drive=segment.b, timeout_s=20)
     raise AssertionError("this machine stalls too often")
 
 
@@ -214,7 +214,7 @@ def test_cut_cable_stops_the_axis_behind_it_and_heals(running: Segment) -> None:
     before = running.lines()
     with running.station.live() as page, turning(page, running):
         running.trouble("cut", cable=1)
-        ended = page.wait("jog_ended", drive=running.b, timeout_s=60)
+        ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
     assert LOST.search(reason(ended)), ended
     running.told("station 2", "no longer answers: supply off or cable cut", after=before)
     running.stands()
@@ -239,7 +239,7 @@ def test_power_cycle_of_a_slave(running: Segment) -> None:
     before = running.lines()
     with running.station.live() as page, turning(page, running):
         running.trouble("power_cycle", slave=B, off_s=1.0)
-        ended = page.wait("jog_ended", drive=running.b, timeout_s=60)
+        ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
     assert LOST.search(reason(ended)), ended
     running.told("station 2", "no longer answers", after=before)
     running.told("station 2 was switched on again", after=before)
@@ -287,7 +287,7 @@ def test_dying_in_a_transfer_ends_in_words_and_is_read_again(running: Segment) -
     assert running.parameter(running.a)["raw"] is not None, "the neighbour is served"
     running.trouble("die_in_transfer", slave=B, after_segments=None)
     running.trouble("mute", slave=B, on=False)
-    until(lambda: running.whole(running.b, keys) == before, HANG_S, "the list can be read again")
+    within(10, lambda: running.whole(running.b, keys) == before, "the list can be read again")
     running.settled()
     running.jogs()
 
@@ -296,16 +296,16 @@ def test_single_lost_frames_are_counted_and_many_brake(running: Segment) -> None
     with running.station.live() as page:
         with turning(page, running):
             running.trouble("lose", count=300, cyclic=True)
-            ended = page.wait("jog_ended", drive=running.b, timeout_s=60)
+            ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
         assert "no valid process data" in reason(ended)
-    until(lambda: running.view()["exchange"]["lost_frames"] >= 30, 60)
+    within(5, lambda: running.view()["exchange"]["lost_frames"] >= 30, "they are counted")
     running.trouble("peace")
     running.stands()
     running.settled()
     running.trouble("lose", chance=0.01, cyclic=True)
     lost = running.view()["exchange"]["lost_frames"]
     running.jogs()
-    until(lambda: running.view()["exchange"]["lost_frames"] > lost, 60, "counted")
+    within(10, lambda: running.view()["exchange"]["lost_frames"] > lost, "counted")
     assert all(s["state"] == "OP" for s in running.view()["stations"])
 
 
@@ -313,9 +313,9 @@ def test_wrong_working_counters_are_counted_and_brake_when_they_stay(running: Se
     before = running.lines()
     with running.station.live() as page, turning(page, running):
         running.trouble("counter", by=-1)
-        page.wait("jog_ended", drive=running.b, timeout_s=60)
+        page.wait("jog_ended", drive=running.b, timeout_s=20)
     running.told("no valid process data", "the axis is braked", after=before)
-    until(lambda: running.view()["exchange"]["wkc_errors"] >= 30, 60)
+    within(10, lambda: running.view()["exchange"]["wkc_errors"] >= 30, "they are counted")
     running.stands()
     running.trouble("peace")
     running.settled()
@@ -332,7 +332,7 @@ def test_late_frames_are_waited_for_and_the_axis_goes_on(running: Segment) -> No
 def test_slow_answers_and_slow_states_take_their_time_and_no_more(running: Segment) -> None:
     # In the drive's time, which a busy machine stretches: the mailbox's own time-out is 1 s.
     running.trouble("timing", slave=B, sdo_s=0.05, al_s=0.1)
-    until(lambda: running.parameter(running.b).get("raw") is not None, 60, "it is read")
+    within(20, lambda: running.parameter(running.b).get("raw") is not None, "it is read")
     running.trouble("timing", slave=B, sdo_s=0.0)
     running.end_cyclic()
     running.start_cyclic()
@@ -359,7 +359,7 @@ def test_a_busy_eeprom_ends_in_words_and_is_written_later(running: Segment) -> N
 
 def test_damaged_frames_name_their_cable_until_cleared(running: Segment) -> None:
     running.trouble("corrupt", slave=B, port=0, count=3)
-    sentence = until(lambda: running.view()["stations"][B]["ports"][0]["findings"], HANG_S)[-1]
+    sentence = within(10, lambda: running.view()["stations"][B]["ports"][0]["findings"])[-1]
     assert "cable between station 1 and station 2: damaged frames arrived" in sentence
     with running.station.live() as other:
         other.send(type="lease", drive=running.b, take=True)
@@ -395,14 +395,14 @@ def test_killed_host_ends_the_motion_and_is_replaced(running: Segment) -> None:
     with running.station.live() as page, turning(page, running):
         first = host_process()
         os.kill(first, signal.SIGKILL)
-        ended = page.wait("jog_ended", drive=running.b, timeout_s=60)
+        ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
     assert reason(ended).strip()
     running.told("the EtherCAT process died", after=before)
     running.told("the cyclic exchange broke off: the EtherCAT process died", after=before)
     running.told("the EtherCAT process runs again", after=before)
     running.told(
         "the cyclic exchange runs again; every axis is disabled until you enable it",
-        after=before,
+        after=before, within_s=20,
     )  # fmt: skip
     assert running.exchange()["running"]
     assert not running.exchange()["problem"]
@@ -437,7 +437,7 @@ def test_killed_segment_ends_the_motion_and_is_found_again(running: Segment) -> 
     before = running.lines()
     with running.station.live() as page, turning(page, running):
         running.station.drives.segments[URL].kill()
-        ended = page.wait("jog_ended", drive=running.b, timeout_s=60)
+        ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
     assert reason(ended).strip()
     running.told("station 1", "no longer answers", after=before)
     running.told("station 2", "no longer answers", after=before)

@@ -75,8 +75,14 @@ def test_stations_in_the_order_of_the_cable(station: Station) -> None:
 def test_figures_of_the_exchange(in_real_time: Station) -> None:
     station = in_real_time
     body = {"url": URL, "cycle_us": 1000}
+
     # A computer that is kept busy by others may keep a drive from answering in time.
-    until(lambda: station.http.post("/buses/cyclic", json=body).is_success, 60, "it runs")
+    def begun() -> bool:
+        answer = station.http.post("/buses/cyclic", json=body)
+        assert answer.is_success or answer.status_code in (502, 503, 504), answer.text
+        return answer.is_success
+
+    until(begun, 60, "it runs")
     try:
         seen = until(lambda: (now := view(station))["exchange"]["cycles"] > 100 and now, 60)
         figures = seen["exchange"]

@@ -16,7 +16,7 @@ import pytest
 from drivers.virtual.wires.netns import unavailable
 from profiles import load_profile
 from tests.support.jogging import jogged
-from tests.support.machine import Stopwatch
+from tests.support.machine import Stopwatch, within
 from tests.support.station import HANG_S, Station, until
 
 ETHERCAT = "ethercat://virtual0"
@@ -228,7 +228,7 @@ def profile_move(day: Day, mode: str) -> None:
                 **limits}  # fmt: skip
         day.job("jobs/move", body)
         assert abs(float(day.state()["position"]) - before) > 0.05
-    until(lambda: abs(float(day.state()["velocity"])) < 3, HANG_S, "at rest after the move")
+    within(10, lambda: abs(float(day.state()["velocity"])) < 3, "at rest after the move")
 
 
 def start_exchange(day: Day) -> None:
@@ -266,7 +266,7 @@ def jog(day: Day) -> None:
         with jogged(day.station.http, page, day.id, third_of_a_turn, **JOG):
             page.send(type="jog_stop", drive=day.id)
         page.wait("jog_ended", drive=day.id)
-    until(lambda: abs(float(day.state()["velocity"])) < 3, HANG_S)
+    within(5, lambda: abs(float(day.state()["velocity"])) < 3, "at rest after the jog")
     if cyclic:
         day.station.ok(day.station.http.delete("/buses/cyclic", params={"url": day.maker.url}))
 
@@ -297,7 +297,7 @@ def fault(day: Day) -> None:
     assert shown["remedies"] == list(expected.remedies)
     assert day.state()["state"] == "Fault"
     day.station.ok(day.post("fault-reset"))
-    until(lambda: day.state()["state"] == "Switch on disabled", HANG_S, "the fault is gone")
+    within(5, lambda: day.state()["state"] == "Switch on disabled", "the fault is gone")
 
 
 def restore(day: Day) -> None:

@@ -137,7 +137,7 @@ def test_pulled_cable_ends_within_the_lead(station: Station, x: str, page: Live)
         time.sleep(1.0)
     station.drives.command(do="heal", wire="mlink://virtual0")
     until(lambda: station.state(x)["fresh"], HANG_S, "the drive answers again")
-    until(lambda: at_rest(station, x), HANG_S)
+    within(3, lambda: at_rest(station, x), "the axis stands")
     assert past_the_wire(station) - near < LEAD_REV
 
 

@@ -12,7 +12,8 @@ import pytest
 from profiles import load_profile
 from profiles.importer import export_eds
 from tests.support.jogging import jogged
-from tests.support.station import Station, until
+from tests.support.machine import within
+from tests.support.station import Station
 
 CAN = "canopen://virtual0"
 BENCH = """
@@ -99,7 +100,7 @@ def _jog(station: Station, drive: str) -> None:
             page.send(type="jog_stop", drive=drive)
         ended = page.wait("jog_ended", drive=drive)
     assert ended["problem"] is None, ended
-    until(lambda: abs(float(station.state(drive)["velocity"])) < 2, 30, "it stands again")
+    within(3, lambda: abs(float(station.state(drive)["velocity"])) < 2, "it stands again")
     assert float(station.state(drive)["position"]) - before > 0.5
 
 

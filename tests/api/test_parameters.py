@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from tests.support.machine import within
 from tests.support.station import HANG_S, Station, until
 
 
@@ -168,7 +169,7 @@ def test_exchanged_drive_is_noticed_before_anything_is_written(station: Station)
     try:
         station.drives.command(do="swap", wire="mlink://virtual0", first=1, second=2)
         station.drives.command(do="pull", wire="mlink://virtual0")
-        until(lambda: not station.state(x)["fresh"], HANG_S)
+        within(5, lambda: not station.state(x)["fresh"], "its silence is told")
         station.drives.command(do="heal", wire="mlink://virtual0")
         warned = until(
             lambda: station.ok(station.http.get(f"/drives/{x}"))["identity_warning"], HANG_S

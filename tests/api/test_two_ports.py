@@ -17,6 +17,7 @@ import pytest
 from backend.recording import capture
 from profiles import load_profile
 from tests.support.jogging import jogged
+from tests.support.machine import within
 from tests.support.station import HANG_S, Station, until
 
 CAN, MODBUS = "canopen://virtual0", "modbus://virtual0"
@@ -97,7 +98,7 @@ def test_jog_and_move(station: Station, z: str) -> None:
             page.send(type="jog_stop", drive=z)
         ended = page.wait("jog_ended", drive=z)
         assert ended["problem"] is None, ended
-    until(lambda: abs(station.state(z)["velocity"]) < 5, HANG_S)
+    within(3, lambda: abs(station.state(z)["velocity"]) < 5, "it stands")
     before = float(station.state(z)["position"])
     body = {"mode": "PP", "target": 1.5, "relative": True, "speed": 600, "acceleration": 6000,
             "deceleration": 6000, "travel_limit": 3, "torque_limit": 100}  # fmt: skip
@@ -137,7 +138,7 @@ def test_the_scope_knows_which_bit_is_the_alarm(station: Station, z: str) -> Non
 
 def test_unplugged_adapter_recovers(station: Station, z: str) -> None:
     station.drives.command(do="pull", wire=CAN)
-    until(lambda: not station.state(z)["fresh"], HANG_S)
+    within(5, lambda: not station.state(z)["fresh"], "its silence is told")
     station.drives.command(do="heal", wire=CAN)
     until(lambda: station.state(z)["fresh"], HANG_S, "the drive answers again")
 

@@ -28,7 +28,7 @@ FLAGS = [
 ]  # fmt: skip
 #: For what must appear: the tests run beside others, on a computer that has no time to spare. What
 #: must be told soon is waited for with `driving.TOLD_MS`.
-PATIENCE_MS = 45_000
+PATIENCE_MS = 15_000
 #: A wide and a narrow screen with a finger, as in the field.
 LAPTOP = {"viewport": {"width": 1280, "height": 800}}
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import httpx
 
@@ -86,11 +87,12 @@ class OwnTime:
         return {process: _runnable_ns(process) for process in processes}
 
 
-def within(limit_s: float, condition: Callable[[], object], what: str = "") -> None:
-    """Poll until it holds, which the product promises after ``limit_s`` of `OwnTime` at most."""
+def within(limit_s: float, condition: Callable[[], object], what: str = "") -> Any:
+    """`until`, where the product promises it after ``limit_s`` of `OwnTime` at most."""
     with OwnTime(with_children=True) as took:
-        until(condition, what=what)
+        value = until(condition, what=what)
     assert took.s < limit_s, f"it took {took.s:.2f} s: {what}"
+    return value
 
 
 class ApiWatch:
