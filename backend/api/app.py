@@ -48,6 +48,7 @@ from backend.recording.rerun_assets import ViewerAssets
 from backend.recording.rerun_feed import RerunFeed
 from backend.recording.service import Recordings
 from backend.scene.feed import SceneFeed
+from drivers import scheduling
 
 PREFIX = "/api/v1"
 _HERE = Path(__file__).resolve()
@@ -81,6 +82,8 @@ def make_app(
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        # Between answers this thread sleeps; woken, it goes before a browser's longer turns.
+        scheduling.short_slice()
         # Whatever fails on the way up or down, the bench is closed in order: axes lose their power.
         async with AsyncExitStack() as then:
             recordings.open()
