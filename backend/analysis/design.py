@@ -99,24 +99,35 @@ def _candidate(search: LoopSearch, found: Found, marks: tuple[Mark, ...]) -> Can
     gains = Gains(
         TURN * hz * search.inertia_kgm2, hz / INTEGRAL_RATIO, _position_gain(f, loops, hz), hz
     )
-    loop = speed_loop(f, plant.response(), filters, gains)
+    row = described(
+        f, plant.response(), filters, gains, worst_of(loops).promised, notches=shape.notches,
+        filters=search.filters[shape.choice],
+    )  # fmt: skip
+    cost = _phase_cost(search, found, filters, row.nominal.crossover_hz)
+    return replace(row, phase_cost_deg=cost, marks=marks)
+
+
+def described(
+    f: FloatArray, plant: ComplexArray, fixed: ComplexArray, gains: Gains, promised: Goals, *,
+    notches: tuple[Notch, ...], filters: LoopFilters,
+) -> Candidate:  # fmt: skip
+    """Prediction and step of a loop on a plant; ``fixed`` is all of the loop but its gains."""
+    loop = speed_loop(f, plant, fixed, gains)
     closed = closed_from_open(loop)
     time, value = step_of_closed_loop(f, closed)
     metrics = step_metrics(time, value, target=1.0, initial=0.0)
     outer = closed_from_open(gains.position_1_s / (1j * TURN * f) * closed)
-    nominal = margins(f, loop)
     return Candidate(
-        notches=tuple(sorted(shape.notches, key=lambda notch: notch.center_hz)),
+        notches=tuple(sorted(notches, key=lambda notch: notch.center_hz)),
         gains=gains,
         bandwidth_hz=bandwidth(f, closed).minus_3db_hz,
         position_bandwidth_hz=bandwidth(f, outer).minus_3db_hz,
-        nominal=nominal,
-        promised=worst_of(loops).promised,
-        phase_cost_deg=_phase_cost(search, found, filters, nominal.crossover_hz),
+        nominal=margins(f, loop),
+        promised=promised,
+        phase_cost_deg=0.0,
         overshoot_percent=metrics.overshoot_percent,
         settling_s=metrics.settling_s,
-        marks=marks,
-        filters=search.filters[shape.choice],
+        filters=filters,
     )
 
 

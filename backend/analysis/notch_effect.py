@@ -1,9 +1,14 @@
 """What a notch in the path of the torque does, seen in the reported torque. Pure.
 
-The same torque is played with and without the notch, with no loop closed. The ratio of the two
+With no loop closed the same torque is played with and without the notch. The ratio of the two
 reported torques is the notch, blurred by what sampling folds back: the held set-points contain
 images of every line above half the sample rate, which pass the notch untouched, so that a deep
 notch looks shallow. The shape is therefore fitted through hold and sampling.
+
+Beside a closed speed loop the reference makes the torque. There 1/T = 1/(N·C) + P, where T is the
+torque per reference, C the controller, N the notch and P the mechanics (Åström & Murray, *Feedback
+Systems*, 2nd ed. 2021, section 12.1). With P read as speed over torque that is T = N·C·(1 - V): the
+speed V is measured, and friction with it, so that no model of the mechanics is needed.
 """
 
 from __future__ import annotations
@@ -15,20 +20,71 @@ from scipy.optimize import least_squares
 
 from backend.analysis.arrays import ComplexArray, FloatArray
 from backend.analysis.notch import Notch
-from backend.analysis.sampling import SignalPath, command_response
+from backend.analysis.sampled_model import LoopModel
+from backend.analysis.sampling import (
+    SignalPath,
+    command_response,
+    delay_response,
+    lag_response,
+)
 
 #: Images that are counted on each side, multiples of the sample rate.
 _IMAGES = 25
 #: A depth that cannot be told from a deeper one.
 _DEEPEST_DB = -45.0
+#: A ratio that nowhere falls below this shows no notch.
+_NO_EFFECT = 0.93
+#: Lines beside a closed loop whose ratio is known to this (one deviation) are used; at least so
+#: many of them within an octave of the centre, and the notch must explain their median to this.
+_KNOWN_TO, _LEAST_LINES, _EXPLAINED = 0.1, 12, 0.06
+#: Noise of neighbouring lines is alike: so many are taken together.
+_ALIKE_LINES = 7
 
 
 @dataclass(frozen=True)
 class NotchEffect:
-    """The notch that explains a measured ratio, and what is left of it (median, relative)."""
+    """The notch that explains a measured ratio, and what is left of it (median, relative).
+
+    ``deviation`` is the median standard deviation of the lines that were used; 0 where the
+    measurement does not tell it.
+    """
 
     notch: Notch
     error: float
+    deviation: float = 0.0
+
+
+@dataclass(frozen=True)
+class LoopLines:
+    """Torque (Nm) and speed (rad/s) of a closed loop per unit of its reference, [lines].
+
+    With the standard deviations of these means.
+    """
+
+    torque: ComplexArray
+    velocity: ComplexArray
+    torque_deviation: FloatArray
+    velocity_deviation: FloatArray
+
+    @staticmethod
+    def of(sent: ComplexArray, torque: ComplexArray, velocity: ComplexArray) -> LoopLines:
+        """From spectra of periods: ``sent`` [lines], the others [periods, lines].
+
+        Raises:
+            ValueError: fewer than two periods, which tell nothing of noise.
+        """
+        if len(torque) < 2:
+            raise ValueError("fewer than two whole periods were recorded")
+        (t, dt), (v, dv) = (_mean_and_deviation(x / sent) for x in (torque, velocity))
+        return LoopLines(t, v, dt, dv)
+
+
+def _mean_and_deviation(blocks: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    count, lines = blocks.shape
+    variance = np.var(blocks, axis=0, ddof=1) / count
+    window = np.ones(min(_ALIKE_LINES, lines))
+    pooled = np.convolve(variance, window, "same") / np.convolve(np.ones(lines), window, "same")
+    return np.asarray(np.mean(blocks, axis=0)), np.asarray(np.sqrt(pooled))
 
 
 def seen_ratio(notch: Notch, frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
@@ -41,23 +97,97 @@ def seen_ratio(notch: Notch, frequency_hz: FloatArray, path: SignalPath) -> Comp
 
 
 def fit_effect(frequency_hz: FloatArray, ratio: ComplexArray, path: SignalPath) -> NotchEffect:
-    """Centre, width and depth behind a measured ratio of sampled torques.
+    """Centre, width and depth behind a measured ratio of sampled torques, with no loop closed.
 
     Raises:
         ValueError: nothing like a notch is seen.
     """
     f = np.asarray(frequency_hz, np.float64)
-    lowest = int(np.argmin(np.abs(ratio)))
-    if abs(ratio[lowest]) > 0.93:
+    one, nothing = np.ones(f.shape, np.complex128), np.zeros(f.shape, np.complex128)
+    return _fitted(_Seen(f, ratio, one, nothing, ratio, np.zeros(f.shape)), path)
+
+
+def fit_effect_in_loop(
+    frequency_hz: FloatArray, plain: LoopLines, notched: LoopLines, loop: LoopModel,
+    path: SignalPath,
+) -> NotchEffect:  # fmt: skip
+    """The same beside a closed speed loop, ``loop`` being its controller without the notch.
+
+    What the reference alone makes of torque is the plain torque and what the loop took of it by
+    the speed. Best above the crossover, where the loop takes little.
+
+    Raises:
+        ValueError: nothing like a notch is seen, or too few lines are known well enough.
+    """
+    f = np.asarray(frequency_hz, np.float64)
+    controller = (
+        loop.response(f) * lag_response(f, path.current_bandwidth_hz)
+        * delay_response(f, path.loop_delay_s)
+    )  # fmt: skip
+    forward = plain.torque + controller * plain.velocity
+    own = controller * notched.velocity
+    driven = forward - own
+    size = np.abs(controller)
+    noise = np.sqrt(
+        plain.torque_deviation**2 + notched.torque_deviation**2
+        + size**2 * (plain.velocity_deviation**2 + notched.velocity_deviation**2)
+    )  # fmt: skip
+    deviation = noise / np.maximum(np.abs(driven), 1e-12)
+    good = deviation < _KNOWN_TO
+    if np.count_nonzero(good) < _LEAST_LINES:
+        raise ValueError(
+            f"only {np.count_nonzero(good)} lines are known to {_KNOWN_TO:.0%} beside the loop"
+        )
+    scale = np.abs(forward[good])
+    seen = _Seen(
+        f[good], notched.torque[good] / scale, forward[good] / scale, own[good] / scale,
+        notched.torque[good] / driven[good], deviation[good],
+    )  # fmt: skip
+    found = _fitted(seen, path)
+    centre = found.notch.center_hz
+    about = np.count_nonzero((seen.frequency_hz > centre / 2) & (seen.frequency_hz < centre * 2))
+    if about < _LEAST_LINES:
+        raise ValueError(f"only {about} lines about {centre:.0f} Hz are known to {_KNOWN_TO:.0%}")
+    if found.error > _EXPLAINED:
+        raise ValueError(f"a notch leaves {found.error:.0%} of what is seen unexplained")
+    return found
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Lines of a notched torque: N·forward through hold and sampling, less N·own of the loop.
+
+    ``ratio`` is about the notch itself, for where to begin.
+    """
+
+    frequency_hz: FloatArray
+    torque: ComplexArray
+    forward: ComplexArray
+    own: ComplexArray
+    ratio: ComplexArray
+    deviation: FloatArray
+
+    def rest(self, notch: Notch, path: SignalPath) -> ComplexArray:
+        """What a notch leaves unexplained, relative to the torque without it."""
+        f = self.frequency_hz
+        made = seen_ratio(notch, f, path) * self.forward - notch.response(f) * self.own
+        return np.asarray(made - self.torque)
+
+
+def _fitted(seen: _Seen, path: SignalPath) -> NotchEffect:
+    lowest = int(np.argmin(np.abs(seen.ratio)))
+    if abs(seen.ratio[lowest]) > _NO_EFFECT:
         raise ValueError("the notch has no effect that can be seen in the torque")
-    centre = float(f[lowest])
+    centre = float(seen.frequency_hz[lowest])
+    # A line that the notch takes nearly all of counts for more, one that noise blurs for less.
+    weight = 1.0 / (np.hypot(np.abs(seen.ratio), seen.deviation / 0.05) + 0.05)
 
     def notch_of(x: FloatArray) -> Notch:
         depth = max(-float(np.exp(x[2])), _DEEPEST_DB)
         return Notch(float(np.exp(x[0])), float(np.exp(x[1])), depth)
 
     def rest(x: FloatArray) -> FloatArray:
-        error = (seen_ratio(notch_of(x), f, path) - ratio) / (np.abs(ratio) + 0.05)
+        error = seen.rest(notch_of(x), path) * weight
         return np.concatenate([error.real, error.imag])
 
     low = np.log([0.7 * centre, 0.01 * centre, 0.3])
@@ -69,7 +199,6 @@ def fit_effect(frequency_hz: FloatArray, ratio: ComplexArray, path: SignalPath) 
         )
         for share in (0.05, 0.3, 1.0) for depth in (8.0, 25.0)
     ]  # fmt: skip
-    best = min(fits, key=lambda fit: float(fit.cost))
-    found = notch_of(best.x)
-    error = np.abs(seen_ratio(found, f, path) - ratio)
-    return NotchEffect(found, float(np.median(error)))
+    found = notch_of(min(fits, key=lambda fit: float(fit.cost)).x)
+    error = float(np.median(np.abs(seen.rest(found, path))))
+    return NotchEffect(found, error, float(np.median(seen.deviation)))

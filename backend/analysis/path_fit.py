@@ -79,8 +79,8 @@ def find_paths(
 
 def reference_gain(
     records: tuple[Record, ...], path: SignalPath, integral_rad_s: float, *, hold_known: bool
-) -> float:
-    """Torque that a speed loop makes of one unit of its reference, which is the excitation.
+) -> tuple[float, SignalPath]:
+    """Torque that a speed loop makes of one unit of its reference, and the reference's path.
 
     ``records`` have the reference and ``integral_rad_s`` times its integral as what was sent. The
     loop makes its torque of the reference less the speed, both by the same gain, so that the
@@ -97,7 +97,7 @@ def reference_gain(
     gain, rest = fit.gain(best), fit.rest(best)
     if gain <= 0 or float(rest @ rest) > _UNRELATED:
         raise ValueError("the torque does not follow the reference: its gain cannot be read")
-    return gain * size
+    return gain * size, best
 
 
 def path_covariance(

@@ -201,9 +201,10 @@ async def start_autotune(bench: TheBench, member: Controlled, request: AutotuneR
             # Whoever cancels now has not seen a result: it is as if it had not been.
             await take_back(member.axis, found.before)
             raise
-        change_log(bench).add(
-            member.drive.id, Change(datetime.now(UTC), "autotune", found.before, after)
-        )
+        if found.before:
+            change_log(bench).add(
+                member.drive.id, Change(datetime.now(UTC), "autotune", found.before, after)
+            )
         return autotune.as_json(found) | {"after": after}
 
     return await _start(bench, member, request, "autotune", "Tune", tool)

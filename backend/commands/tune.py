@@ -143,11 +143,14 @@ def told(answer: Answer, *, kept: bool) -> list[str]:
         lines += ["", *_verified(applied, verified)]
         changed = answer["before"]
         count = len(changed) if isinstance(changed, dict) else 0
-        lines.append(
-            f"in force: {count} parameters were changed; they are not stored in the drive yet"
-            if kept
-            else "taken back: all parameters are as before"
-        )
+        if not count:
+            lines.append("nothing was written: what the axis had is kept")
+        elif kept:
+            lines.append(
+                f"in force: {count} parameters were changed; they are not stored in the drive yet"
+            )
+        else:
+            lines.append("taken back: all parameters are as before")
     else:
         lines += ["", "nothing was written; --apply verifies a design, --keep leaves it in force"]
     for name, word in (("tried", "not kept"), ("notes", "note")):

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from backend.analysis.design import Candidate
 from backend.analysis.loop_goals import LoadClass, Mark, goals_for
 from backend.analysis.loop_structure import Gains
+from backend.analysis.measured_plant import MeasuredPlant
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
@@ -22,12 +23,20 @@ from backend.tools import inertia as inertia_tool
 from backend.tools import step_response as step_tool
 from backend.tools import sweep as sweep_tool
 from backend.tools.axis_facts import AxisFacts, read_facts
-from backend.tools.notch_meaning import meaning_of, remember
+from backend.tools.notch_in_loop import measure_meaning_in_loop
+from backend.tools.notch_meaning import NotchMeaning, meaning_of, remember
 from backend.tools.probe import PULLED, holding_torque
 from backend.tools.recording import cycle_s
 from backend.tools.temporary import temporary
-from backend.tools.tune_apply import first_kept, part
-from backend.tools.tune_candidates import Design, candidate_json, cautious_design, design_for
+from backend.tools.tune_apply import part
+from backend.tools.tune_candidates import (
+    Design,
+    candidate_json,
+    cautious_design,
+    design_for,
+    plant_of,
+)
+from backend.tools.tune_present import Trials
 from backend.tools.tune_verify import Check, Keep, Verified
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
@@ -68,7 +77,8 @@ class AutotuneSettings:
 class AutotuneResult:
     """Everything that was measured and decided.
 
-    ``before`` holds raw values that undo what was applied (empty when nothing was). ``tried`` says
+    ``before`` holds raw values that undo what was applied, empty when nothing was written, also
+    because ``applied`` is what the axis had. ``tried`` says
     of designs that were taken back why; ``notes`` what the design does without. ``cautious``: no
     model could be relied on.
     """
@@ -210,7 +220,7 @@ async def _learn_notches(
     outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
     progress: Progress,
 ) -> str:  # fmt: skip
-    """Measure what no manual prints, where no load pulls the axis and it is worth it.
+    """Measure what no manual prints, where it is worth it: beside the loop where a load pulls.
 
     Returns why the design goes without notches; empty where it does not.
     """
@@ -220,31 +230,44 @@ async def _learn_notches(
         return ""
     found = outcome.result
     held = abs(found.gravity_nm.value) > PULLED * facts.rated_torque_nm
-    if held or settings.loop not in ("auto", "none"):
-        return (
-            "designed without notches: what they do is measured only without a loop, on an axis "
-            + ("that no load pulls" if held else "that needs none")
-        )
-    envelope: Envelope | None = settings.envelope
-    still = settings.scheme != "free"
-    if still:
-        at_rev = (await axis.units()).position(await axis.position_raw())
-        envelope = notch_effect.room_to_tremble(settings.envelope, at_rev, outcome.ends_rev)
-    if envelope is None:
-        return "designed without notches: it stands too near to an end to measure what they do"
-    rigid = excite.Rigid(found.inertia_kgm2.value, found.coulomb_nm.value)
-    rate = 1.0 / cycle_s(session)
-    path = notch_effect.path_of(rate, facts, mechanics.hold, mechanics.delay_s)
     try:
-        meaning = await notch_effect.measure_meaning(
-            axis, session, envelope, facts, rigid, path, progress, still=still
-        )
+        if held or settings.loop not in ("auto", "none"):
+            meaning = await measure_meaning_in_loop(
+                axis, session, settings.envelope, facts, mechanics, found.inertia_kgm2.value,
+                progress,
+            )  # fmt: skip
+        else:
+            meaning = await _learn_free(
+                axis, session, settings, facts, outcome, mechanics, progress
+            )
     except NotAllowed as error:
         if await axis.state() in (State.FAULT, State.FAULT_REACTION):
             raise
         return f"designed without notches: {error.message}"
     remember(axis.drive, meaning)
     return ""
+
+
+async def _learn_free(
+    axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
+    outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
+    progress: Progress,
+) -> NotchMeaning:  # fmt: skip
+    """On an axis that no load pulls, without a loop."""
+    envelope: Envelope | None = settings.envelope
+    still = settings.scheme != "free"
+    if still:
+        at_rev = (await axis.units()).position(await axis.position_raw())
+        envelope = notch_effect.room_to_tremble(settings.envelope, at_rev, outcome.ends_rev)
+    if envelope is None:
+        raise NotAllowed("it stands too near to an end to measure what its notches do")
+    found = outcome.result
+    rigid = excite.Rigid(found.inertia_kgm2.value, found.coulomb_nm.value)
+    rate = 1.0 / cycle_s(session)
+    path = notch_effect.path_of(rate, facts, mechanics.hold, mechanics.delay_s)
+    return await notch_effect.measure_meaning(
+        axis, session, envelope, facts, rigid, path, progress, still=still
+    )
 
 
 def _sweep_settings(
@@ -296,39 +319,45 @@ async def apply_and_verify(
 ) -> AutotuneResult:  # fmt: skip
     """The wanted candidate, then more careful ones, until one keeps its promise.
 
+    What the axis has comes before designs that are slower than it.
+
     Raises:
         NotAllowed: none did; all parameters are as before.
         DriveError: the drive has a fault, or the link is lost.
     """
-    tried: list[str] = []
     inertia = found.inertia.result.inertia_kgm2.value
     check = Check(
         settings.envelope, facts, inertia, found.mechanics.hold, settings.rated_torque_nm,
         settings.motor_inertia_kgm2, found.inertia.result.coulomb_nm.value,
     )  # fmt: skip
     promised = goals_for(found.load, settings.mark)
-    order = _order(found, settings.mark)
-    applied = await first_kept(axis, session, check, order, promised, tried, progress, keep)
+    trials = Trials(axis, session, check, promised, progress, keep)
+
+    def plant() -> MeasuredPlant:
+        return plant_of(found.mechanics, inertia, facts, cautious=found.cautious)
+
+    applied = await trials.first(_order(found, settings.mark), plant())
     if applied is None and not found.cautious:
         made = await asyncio.to_thread(
             cautious_design, axis.drive, facts, found.mechanics, inertia,
             1.0 / cycle_s(session), "no design on the model keeps its promise",
         )  # fmt: skip
         found = _with(found, made)
-        order = _order(found, "robust")
-        applied = await first_kept(axis, session, check, order, promised, tried, progress, keep)
+        applied = await trials.first(_order(found, "robust"), plant())
     if applied is None:
         raise NotAllowed(
             f"{axis.drive.name}: no candidate kept its promise when it was verified: "
-            + "; ".join(tried),
+            + "; ".join(trials.tried),
             drive=axis.drive.name,
             remedy="all parameters are as before; look for play and loose parts, measure again, "
             "or choose gains by hand",
         )
     notes = found.notes if applied.verified.sweep.margins else (*found.notes, _BY_STEP)
+    if said := trials.note(applied):
+        notes += (said,)
     return replace(
         found, applied=applied.candidate, verified=applied.verified, step=applied.verified.step,
-        before=applied.before, tried=tuple(tried), notes=notes,
+        before=applied.before, tried=tuple(trials.tried), notes=notes,
     )  # fmt: skip
 
 

@@ -1,8 +1,10 @@
 """What the notch values of a drive mean, measured on the drive where no manual prints it.
 
-The same torque is played without a notch and with some of its values, all at one frequency; what
-they do is read from the reported torque (:mod:`backend.analysis.notch_effect`). M6-L prints no
-depth, R6L only levels. Every value is put back.
+The same signal is played without a notch and with some of its values, all at one frequency; what
+they do is read from the reported torque (:mod:`backend.analysis.notch_effect`): of a free axis
+without a loop (here), of one that a load pulls beside its closed speed loop
+(:mod:`backend.tools.notch_in_loop`). M6-L prints no depth, R6L only levels. Every value is put
+back.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -26,7 +29,16 @@ from backend.tools.axis_facts import AxisFacts
 from backend.tools.go_back import go_back
 from backend.tools.notch import plan_notches
 from backend.tools.notch_meaning import NotchMeaning
-from backend.tools.recording import Play, bus_limits, cycle_s, enabled, play, require_signals, share
+from backend.tools.recording import (
+    Play,
+    Recording,
+    bus_limits,
+    cycle_s,
+    enabled,
+    play,
+    require_signals,
+    share,
+)
 from backend.tools.temporary import temporary
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
@@ -79,32 +91,67 @@ async def measure_meaning(
     Raises:
         NotAllowed: the axis cannot be measured so, or the notch does nothing that can be seen.
     """
+    require_signals(axis, session, Mode.CST, False)
+    sequence = await asyncio.to_thread(
+        _sequence, 1.0 / cycle_s(session), envelope, facts, rigid, still
+    )
+    free = _Free(axis, session, envelope, facts, path, sequence, await axis.position_raw())
+    return await tried_with(free, axis, session, envelope, facts, progress)
+
+
+class Player(Protocol):
+    """One way of playing the same signal again and again, and of comparing what came."""
+
+    async def plain(self, told: Callable[[float], None]) -> float:
+        """Play without a notch, first of all; the lowest centre in Hz to try notches at.
+
+        Raises:
+            NotAllowed: no notch may be tried on this axis.
+        """
+        ...
+
+    async def notched(self, told: Callable[[float], None]) -> NotchEffect:
+        """Play with the notch that the drive has now.
+
+        Raises:
+            ValueError: nothing like a notch is seen.
+        """
+        ...
+
+
+async def tried_with(
+    player: Player, axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts,
+    progress: Progress,
+) -> NotchMeaning:  # fmt: skip
+    """Try values of the first notch; all are put back, and the axis where it was.
+
+    Raises:
+        NotAllowed: the axis cannot be measured so, or the notch does nothing that can be seen.
+    """
     drive = axis.drive
     spec = drive.profile.notch
     if spec is None or not unknown(drive):
         raise NotAllowed(f"{drive.name}: what its notches do is printed in the manual",
                          drive=drive.name)  # fmt: skip
-    require_signals(axis, session, Mode.CST, False)
-    rate = 1.0 / cycle_s(session)
-    centre = round(min(max(_PLACE * rate, _LOWEST_HZ), _HIGHEST_HZ))
     slot = spec.slots[0]
-    trials = _trials(drive, slot, centre)
     home = await axis.position_raw()
-    sequence = await asyncio.to_thread(_sequence, rate, envelope, facts, rigid, still)
-    effects: list[tuple[_Trial, NotchEffect | None]] = []
     off = await plan_notches(drive, [])
-    plain: ComplexArray | None = None
-    for number, trial in enumerate([None, *trials]):
-        low = number / (len(trials) + 1)
-        words = f"notch {number} of {len(trials)}" if trial else "without a notch"
-        told = share(progress, low, low + 1.0 / (len(trials) + 1), f"trying {words}")
-        async with temporary(axis, off | ({} if trial is None else _raw(slot, centre, trial))):
-            seen = await _torque(axis, session, sequence, envelope, facts, home, told)
+    count = len(_trials(drive, slot, 1))
+    part = 1.0 / (count + 1)
+    async with temporary(axis, off):
+        lowest = await player.plain(share(progress, 0.0, part, "trying without a notch"))
+    await go_back(axis, session, home, envelope, facts)
+    centre = round(min(max(_PLACE / cycle_s(session), _LOWEST_HZ, lowest), _HIGHEST_HZ))
+    effects: list[tuple[_Trial, NotchEffect | None]] = []
+    for number, trial in enumerate(_trials(drive, slot, centre), 1):
+        low = number * part
+        told = share(progress, low, low + part, f"trying notch {number} of {count}")
+        async with temporary(axis, off | _raw(slot, centre, trial)):
+            try:
+                effects.append((trial, await player.notched(told)))
+            except ValueError:
+                effects.append((trial, None))
         await go_back(axis, session, home, envelope, facts)
-        if plain is None or trial is None:
-            plain = seen
-            continue
-        effects.append((trial, _effect(sequence, seen / plain, path)))
     return _meaning(drive, centre, effects)
 
 
@@ -167,39 +214,64 @@ def _sequence(
     return made[0]
 
 
-async def _torque(
-    axis: Axis, session: CyclicSession, sequence: excite.Sequence, envelope: Envelope,
-    facts: AxisFacts, home: int, told: Callable[[float], None],
-) -> ComplexArray:  # fmt: skip
-    """Spectrum of the reported torque at the lines, over the whole periods."""
-    units = await axis.units()
-    step = units.torque(1.0) / 100.0 * facts.rated_torque_nm
+@dataclass
+class _Free:
+    """No loop: the ratio of the torques is the notch."""
+
+    axis: Axis
+    session: CyclicSession
+    envelope: Envelope
+    facts: AxisFacts
+    path: SignalPath
+    sequence: excite.Sequence
+    home: int
+    _plain: ComplexArray | None = None
+
+    async def plain(self, told: Callable[[float], None]) -> float:
+        self._plain = await self._torque(told)
+        return 0.0
+
+    async def notched(self, told: Callable[[float], None]) -> NotchEffect:
+        assert self._plain is not None
+        seen = await self._torque(told)
+        return fit_effect(self.sequence.excitation.line_hz, seen / self._plain, self.path)
+
+    async def _torque(self, told: Callable[[float], None]) -> ComplexArray:
+        """Spectrum of the reported torque at the lines, over the whole periods."""
+        axis, facts = self.axis, self.facts
+        units = await axis.units()
+        step = units.torque(1.0) / 100.0 * facts.rated_torque_nm
+        raw = np.round(self.sequence.excitation.samples / step).astype(np.int64)
+        async with enabled(axis, self.session, Mode.CST):
+            recording = await play(
+                axis, self.session, Play(Mode.CST, raw),
+                await bus_limits(axis, self.envelope, self.home), facts.rated_torque_nm, told,
+            )  # fmt: skip
+        return np.asarray(np.mean(periods_of(axis, self.sequence, recording)[0], axis=0))
+
+
+def periods_of(
+    axis: Axis, sequence: excite.Sequence, recording: Recording
+) -> tuple[ComplexArray, ComplexArray]:
+    """Spectra of torque and speed at the lines, [whole periods, lines] each.
+
+    Raises:
+        NotAllowed: samples were lost in every period.
+    """
     e = sequence.excitation
-    raw = np.round(e.samples / step).astype(np.int64)
-    async with enabled(axis, session, Mode.CST):
-        recording = await play(
-            axis, session, Play(Mode.CST, raw), await bus_limits(axis, envelope, home),
-            facts.rated_torque_nm, told,
-        )  # fmt: skip
-    blocks = []
+    torque, velocity = [], []
     for number in range(e.transient_periods, e.periods):
-        cut = slice(e.first_sample + number * e.period_samples, None)
-        block, valid = (x[cut][: e.period_samples] for x in (recording.torque_nm, recording.valid))
-        if np.all(valid):
-            blocks.append(np.fft.rfft(block)[e.lines])
-    if not blocks:
+        first = e.first_sample + number * e.period_samples
+        cut = slice(first, first + e.period_samples)
+        if np.all(recording.valid[cut]):
+            torque.append(np.fft.rfft(recording.torque_nm[cut])[e.lines])
+            velocity.append(np.fft.rfft(recording.velocity_rad_s[cut])[e.lines])
+    if not torque:
         raise NotAllowed(
             f"{axis.drive.name}: samples were lost in every period", drive=axis.drive.name,
             remedy="look at the link quality; the computer or the bus is overloaded",
         )  # fmt: skip
-    return np.asarray(np.mean(blocks, axis=0))
-
-
-def _effect(sequence: excite.Sequence, ratio: ComplexArray, path: SignalPath) -> NotchEffect | None:
-    try:
-        return fit_effect(sequence.excitation.line_hz, ratio, path)
-    except ValueError:
-        return None
+    return np.asarray(torque), np.asarray(velocity)
 
 
 def _meaning(

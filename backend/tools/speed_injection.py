@@ -53,6 +53,35 @@ def fitting_amplitude(
     return float(min(torque_nm / gain, _SPEED_SHARE * room.speed_rad_s))
 
 
+@dataclass(frozen=True)
+class SpeedGain:
+    """What a speed loop makes of its reference: ``gain_nms``·(1 + 2π·integral_hz/s), and the path
+    between the reference and that torque. ``played`` are the records with the integral's part."""
+
+    gain_nms: float
+    integral_hz: float
+    path: SignalPath
+    played: tuple[tuple[excite.Sequence, Recording], ...]
+
+
+def speed_gain(
+    records: tuple[tuple[excite.Sequence, Recording], ...], path: SignalPath,
+    integral_hz: float | None, *, hold_known: bool,
+) -> SpeedGain:  # fmt: skip
+    """The gain that the recorded torque shows; ``integral_hz`` None: the recording tells it, too.
+
+    Raises:
+        ValueError: nothing of the torque follows the reference.
+    """
+    if integral_hz is None:
+        integral_hz = found_integral_hz(tuple(_record(s, r) for s, r in records), path)
+    corner_hz = integral_hz or 0.0
+    played = tuple((_with_integral(s, corner_hz), r) for s, r in records)
+    taken = tuple(_record(s, r) for s, r in played)
+    gain, found = reference_gain(taken, path, _TURN * corner_hz, hold_known=hold_known)
+    return SpeedGain(gain, corner_hz, found, played)
+
+
 def as_torque(
     records: tuple[tuple[excite.Sequence, Recording], ...], path: SignalPath,
     integral_hz: float | None, *, hold_known: bool,
@@ -64,16 +93,11 @@ def as_torque(
     Raises:
         ValueError: nothing of the torque follows the reference.
     """
-    if integral_hz is None:
-        integral_hz = found_integral_hz(tuple(_record(s, r) for s, r in records), path)
-    whole = [_with_integral(s, integral_hz) for s, _ in records]
-    played = [(s, r) for s, (_, r) in zip(whole, records, strict=True)]
-    taken = tuple(_record(s, r) for s, r in played)
-    gain = reference_gain(taken, path, _TURN * (integral_hz or 0.0), hold_known=hold_known)
-    return tuple((_scaled(s, gain), r) for s, r in played)
+    found = speed_gain(records, path, integral_hz, hold_known=hold_known)
+    return tuple((_scaled(s, found.gain_nms), r) for s, r in found.played)
 
 
-def _with_integral(sequence: excite.Sequence, integral_hz: float | None) -> excite.Sequence:
+def _with_integral(sequence: excite.Sequence, integral_hz: float) -> excite.Sequence:
     e = sequence.excitation
     if not integral_hz:
         return sequence

@@ -59,7 +59,7 @@ async def sweep(
         loop = "speed"
     facts = await read_facts(axis, settings.rated_torque_nm)
     home = await axis.position_raw()
-    filters = await _filters_off(axis, settings)
+    filters = await filters_off(axis, settings)
     async with temporary(axis, filters):
         probed: Probed | None = None
         if loop in ("auto", "none"):
@@ -129,7 +129,7 @@ class _Sweep:
         )  # fmt: skip
 
 
-async def _filters_off(axis: Axis, settings: SweepSettings) -> dict[str, int]:
+async def filters_off(axis: Axis, settings: SweepSettings) -> dict[str, int]:
     """Notches and the torque filter lie in the path of the torque: mechanics are measured without.
 
     A family without an enable bit takes a notch out by its highest frequency.

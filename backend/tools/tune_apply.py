@@ -39,11 +39,7 @@ async def first_kept(
     Raises:
         DriveError: the drive has a fault, or the link is lost; nothing stays written.
     """
-    told = (
-        part(progress, 0.7, 0.72, "6 of 6: verifying that it stands still"),
-        part(progress, 0.72, 0.92, "6 of 6: measuring the tuned loop"),
-        part(progress, 0.92, 0.99, "6 of 6: step"),
-    )
+    told = stages(progress)
     for candidate in candidates:
         progress(0.65, "5 of 6: applying")
         raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
@@ -67,6 +63,15 @@ async def first_kept(
             tried.append(verified.why)
             await take_back(axis, before)
     return None
+
+
+def stages(progress: Progress) -> tuple[Progress, Progress, Progress]:
+    """The three parts of a verification, as parts of the whole."""
+    return (
+        part(progress, 0.7, 0.72, "6 of 6: verifying that it stands still"),
+        part(progress, 0.72, 0.92, "6 of 6: measuring the tuned loop"),
+        part(progress, 0.92, 0.99, "6 of 6: step"),
+    )
 
 
 async def take_back(axis: Axis, before: dict[str, int]) -> None:

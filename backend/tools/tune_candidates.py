@@ -105,7 +105,7 @@ def design_for(
     caution = "no mechanical model explains the frequency response"
     if mechanics.model is not None:
         load = load or load_class(mechanics)
-        plant = measured_plant(mechanics.frf, mechanics.model)
+        plant = plant_of(mechanics, inertia_kgm2, facts, cautious=False)
         table = candidates_for(
             drive, facts, plant, inertia_kgm2, load, sample_rate_hz, filters=True
         )
@@ -113,6 +113,15 @@ def design_for(
             return Design(load, table)
         caution = f"no design meets the goals for a {load} load"
     return cautious_design(drive, facts, mechanics, inertia_kgm2, sample_rate_hz, caution)
+
+
+def plant_of(
+    mechanics: SweepResult, inertia_kgm2: float, facts: AxisFacts, *, cautious: bool
+) -> MeasuredPlant:
+    """What designs are made for: the measured axis, or only what is certain of it."""
+    if mechanics.model is None or cautious:
+        return cautious_plant(mechanics, inertia_kgm2, facts.motor_inertia_kgm2)
+    return measured_plant(mechanics.frf, mechanics.model)
 
 
 def cautious_design(
@@ -123,7 +132,7 @@ def cautious_design(
 
     An axis with play is now the whole and now the motor alone.
     """
-    plant = cautious_plant(mechanics, inertia_kgm2, facts.motor_inertia_kgm2)
+    plant = plant_of(mechanics, inertia_kgm2, facts, cautious=True)
     table = candidates_for(
         drive, facts, plant, inertia_kgm2, "compliant", sample_rate_hz, notches=False
     )

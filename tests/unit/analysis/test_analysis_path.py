@@ -195,7 +195,7 @@ def test_the_gain_of_a_speed_loop_is_read_from_what_it_makes_of_its_reference(lo
         steps = np.concatenate([[0.0], np.cumsum(e.samples)[:-1]]) + 0.5 * e.samples
         sent = replace(e, samples=e.samples + corner / 1000.0 * steps)
         records.append(Record(sent, run.velocity, run.torque))
-    gain = reference_gain(tuple(records), SignalPath(1000.0), corner, hold_known=False)
+    gain, _path = reference_gain(tuple(records), SignalPath(1000.0), corner, hold_known=False)
     assert gain == pytest.approx(kp, rel=0.01)
 
 

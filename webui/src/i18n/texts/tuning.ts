@@ -496,6 +496,10 @@ export const tuning = {
   'autotune.step.5': ['Apply', '应用'],
   'autotune.step.6': ['Verify', '验证'],
   'autotune.force.acts': ['Written and verified: {mark}.', '已写入并验证：{mark}。'],
+  'autotune.force.kept': [
+    'Nothing was written: what the axis had is faster than every design, and was verified.',
+    '未写入任何内容：该轴原有的设置比所有设计都快，并已通过验证。',
+  ],
   'autotune.force.takenBack': [
     'It was verified ({mark}) and taken back: the gains are as before.',
     '已验证（{mark}），随后撤销：增益与之前相同。',

@@ -49,19 +49,19 @@ export function AutotuneReport({
       setPressed(true)
       onChanged()
     })
-  const told = now === null ? 'acts' : forceOf(result.before, result.after ?? {}, now)
+  const told = forceOf(result.before, result.after ?? {}, now ?? {})
   const force = pressed ? 'takenBack' : told
   return (
     <>
       {applied && (
-        <div className={`note ${force === 'acts' ? 'good' : 'info'}`}>
+        <div className={`note ${force === 'acts' || force === 'kept' ? 'good' : 'info'}`}>
           <div className="row wrap middle">
             <span className="grow">
               {t(`autotune.force.${force}`, {
                 mark: applied.marks.map((mark) => known(t, 'mark', mark)).join(', '),
               })}
             </span>
-            {force !== 'takenBack' && (
+            {(force === 'acts' || force === 'changed') && (
               <Button loading={undo.busy} onClick={() => void go()}>
                 {t('undo.button')}
               </Button>

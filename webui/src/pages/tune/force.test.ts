@@ -13,4 +13,8 @@ describe('a design that was applied', () => {
   ] as const)('%s', (_name, now, force) => {
     expect(forceOf(before, after, now)).toBe(force)
   })
+
+  it('is kept where nothing was written', () => {
+    expect(forceOf({}, {}, before)).toBe('kept')
+  })
 })

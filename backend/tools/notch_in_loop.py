@@ -1,0 +1,171 @@
+"""What notch values do on an axis that must be held: measured beside its closed speed loop.
+
+A load that pulls is never let go. The speed loop's reference is the excitation, as where a drive
+takes no torque beside a loop (:mod:`backend.tools.speed_injection`); torque and speed together
+tell the notch (:mod:`backend.analysis.notch_effect`). Nothing is tried before the loop as measured
+is known to stay stable whatever a notch there may do.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.loop_goals import sensitivity_peak, stable
+from backend.analysis.measured_plant import MeasuredPlant, measured_plant
+from backend.analysis.notch import Notch
+from backend.analysis.notch_effect import LoopLines, NotchEffect, fit_effect_in_loop
+from backend.analysis.sampled_model import LoopModel
+from backend.analysis.sampling import SignalPath
+from backend.axis import Axis, Envelope
+from backend.cyclic import CyclicSession
+from backend.jobs import Progress
+from backend.tools import excite, gains, speed_injection
+from backend.tools.axis_facts import AxisFacts
+from backend.tools.notch_effect import periods_of, tried_with
+from backend.tools.notch_meaning import NotchMeaning
+from backend.tools.recording import Recording, require_signals
+from backend.tools.sweep import filters_off
+from backend.tools.sweep_evaluation import SweepResult, SweepSettings
+from backend.tools.sweep_plan import Setup, sequences_of, setup_of
+from backend.tools.sweep_play import play_fitting, scaled_by_speed
+from backend.tools.temporary import temporary
+from drivers.cia402 import Mode
+from drivers.errors import NotAllowed
+
+_TURN = 2.0 * np.pi
+#: Whatever a notch may be, the loop's sensitivity stays below this while it is tried.
+_HIGHEST_MS = 3.0
+#: What a notch may be: width as a share of its centre, depth in dB.
+_WIDTHS, _DEPTHS = (0.05, 0.3, 1.0, 2.5), (-6.0, -20.0, -45.0)
+#: Centres to try, Hz.
+_CENTRES = np.geomspace(50.0, 400.0, 19)
+
+
+async def measure_meaning_in_loop(
+    axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts,
+    mechanics: SweepResult, inertia_kgm2: float, progress: Progress,
+) -> NotchMeaning:  # fmt: skip
+    """As `notch_effect.measure_meaning`, with the speed loop closed all the time.
+
+    Raises:
+        NotAllowed: the axis cannot be measured so, a notch might make its loop swing, or it does
+            nothing that can be seen.
+    """
+    require_signals(axis, session, Mode.CSV, False)
+    if mechanics.model is None:
+        raise NotAllowed(
+            f"{axis.drive.name}: whether its loop stays stable with a notch is not known, since "
+            "no mechanical model explains its response", drive=axis.drive.name,
+            remedy="measure the frequency response again, with more excitation",
+        )  # fmt: skip
+    settings = SweepSettings(
+        envelope, loop="speed", realisations=1, rated_torque_nm=facts.rated_torque_nm,
+        inertia_kgm2=inertia_kgm2, hold=mechanics.hold,
+    )  # fmt: skip
+    setup = await setup_of(axis, session, settings, facts, "speed", None)
+    if not setup.by_speed:
+        # Where torque could be added, too: whether it passes the notch no manual says.
+        told = await gains.read_gains(axis, facts)
+        setup = replace(setup, by_speed=True, integral_hz=told.integral_hz)
+    plant = measured_plant(mechanics.frf, mechanics.model)
+    player = _Beside(axis, session, settings, setup, plant, await axis.position_raw())
+    async with temporary(axis, await filters_off(axis, settings)):
+        return await tried_with(player, axis, session, envelope, facts, progress)
+
+
+@dataclass
+class _Beside:
+    """The speed loop closed, its reference excited."""
+
+    axis: Axis
+    session: CyclicSession
+    settings: SweepSettings
+    setup: Setup
+    plant: MeasuredPlant
+    home: int
+    _sequence: excite.Sequence | None = None
+    _lines: LoopLines | None = None
+    _loop: LoopModel | None = None
+    _path: SignalPath | None = None
+
+    async def plain(self, told: Callable[[float], None]) -> float:
+        settings, setup = self.settings, self.setup
+        sequences = await asyncio.to_thread(sequences_of, setup, settings)
+        (self._sequence,) = await scaled_by_speed(
+            self.axis, self.session, settings, setup, sequences[:1], self.home, _progress(told)
+        )
+        sent, recording, self._lines = await self._played(self._sequence, told)
+        facts, rate = setup.facts, setup.rate
+        hold = settings.hold or ("linear" if facts.interpolates else "zero")
+        path = SignalPath(rate, hold=hold, current_bandwidth_hz=facts.current_bandwidth_hz)
+        name = self.axis.drive.name
+        try:
+            found = speed_injection.speed_gain(
+                ((sent, recording),), path, setup.integral_hz, hold_known=False
+            )
+        except ValueError as error:
+            raise NotAllowed(f"{name}: {error}", drive=name) from error
+        corner = _TURN * found.integral_hz
+        self._loop = LoopModel(found.gain_nms, found.gain_nms * corner)
+        self._path = found.path
+        fixed = gains.loops_of(self.axis.drive, replace(facts, torque_filter_hz=None))
+        lowest = safe_centre_hz(self._loop, self.plant, fixed.response)
+        if lowest is None:
+            raise NotAllowed(
+                f"{name}: its speed loop is so stiff that a notch might make it swing while what "
+                "it does is measured", drive=name, remedy="lower the speed gain, and tune again",
+            )  # fmt: skip
+        return lowest
+
+    async def notched(self, told: Callable[[float], None]) -> NotchEffect:
+        assert self._sequence is not None
+        assert self._lines is not None
+        assert self._loop is not None
+        assert self._path is not None
+        sent, _recording, lines = await self._played(self._sequence, told)
+        return fit_effect_in_loop(
+            sent.excitation.line_hz, self._lines, lines, self._loop, self._path
+        )
+
+    async def _played(
+        self, sequence: excite.Sequence, told: Callable[[float], None]
+    ) -> tuple[excite.Sequence, Recording, LoopLines]:
+        """Once, weaker where the loop answers with too much torque; lines per rad/s sent."""
+        ((sent, recording),) = await play_fitting(
+            self.axis, self.session, self.settings, self.setup, (sequence,), self.home,
+            _progress(told),
+        )  # fmt: skip
+        e = sent.excitation
+        period = e.samples[e.first_sample :][: e.period_samples]
+        torque, velocity = periods_of(self.axis, sent, recording)
+        return sent, recording, LoopLines.of(np.fft.rfft(period)[e.lines], torque, velocity)
+
+
+def safe_centre_hz(
+    loop: LoopModel, plant: MeasuredPlant, fixed: Callable[[FloatArray], ComplexArray]
+) -> float | None:
+    """The lowest centre at which no notch brings the loop near to its limit; None: there is none.
+
+    For all that the axis may be; ``fixed`` is the response of the rest of the loop: current loop,
+    speed filter and delay.
+    """
+    f = plant.frequency_hz
+    bare = plant.shifted() * (loop.response(f) * fixed(f))
+    for centre in _CENTRES:
+        shapes = itertools.product(_WIDTHS, _DEPTHS)
+        notches = [Notch(centre, w * centre, depth).response(f) for w, depth in shapes]
+        loops = np.concatenate([bare, *(bare * notch for notch in notches)])
+        if bool(np.all(stable(loops))) and sensitivity_peak(loops) < _HIGHEST_MS:
+            return float(centre)
+    return None
+
+
+def _progress(told: Callable[[float], None]) -> Progress:
+    own = Progress(lambda: told(own.fraction))
+    return own

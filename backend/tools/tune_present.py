@@ -1,0 +1,178 @@
+"""What an axis had before it is tuned, as one more design: it stays where no other one is better.
+
+Its gains may be higher than every design's: chosen by somebody who knows the machine, or more than
+this bus could verify in a search. They are predicted on the same measurement, for everything that
+the axis may be, and then verified like any design.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from backend.analysis.design import Candidate, described
+from backend.analysis.loop_goals import Goals, stable_with_less_gain, worst_of
+from backend.analysis.loop_structure import Gains, LoopFilters, speed_loop
+from backend.analysis.measured_plant import MeasuredPlant
+from backend.axis import Axis
+from backend.cyclic import CyclicSession
+from backend.jobs import Progress
+from backend.tools import gains as gain_tool
+from backend.tools import notch as notch_tool
+from backend.tools.axis_facts import AxisFacts
+from backend.tools.notch_effect import unknown
+from backend.tools.notch_meaning import meaning_of
+from backend.tools.tune_apply import Applied, first_kept, stages
+from backend.tools.tune_verify import Check, Keep, verify
+from drivers.cia402 import State
+from drivers.errors import DriveError, NotAllowed
+
+_TURN = 2.0 * np.pi
+#: Said where nothing was changed.
+KEPT = (
+    "kept as it was: its speed gain is higher than that of every design that is left, and the "
+    "verification kept the promise"
+)
+#: A design whose speed gain is this much below what the axis has is slower.
+_SLOWER = 0.9
+
+
+@dataclass(frozen=True)
+class Present:
+    """The loop as it is; ``candidate`` None where its gains or notches have no known meaning."""
+
+    speed_nms: float | None
+    candidate: Candidate | None = None
+    sound: bool = False
+
+    def slower(self, design: Candidate) -> bool:
+        """Whether a design would make the axis clearly slower than it is."""
+        now, then = self.candidate and self.candidate.bandwidth_hz, design.bandwidth_hz
+        if now and then and then > now:
+            return False
+        return self.speed_nms is not None and design.gains.speed_nms < _SLOWER * self.speed_nms
+
+    def told(self, design: Candidate, tried: bool) -> str:
+        """That a design is slower than what the axis had, and why it is taken all the same."""
+        if not self.slower(design) or not self.speed_nms:
+            return ""
+        share = design.gains.speed_nms / self.speed_nms
+        why = "the meaning of its notches or filters is not known"
+        if self.candidate is not None:
+            why = "it keeps too little margin for what the axis may be"
+        if tried:
+            why = "it did not keep the promise when it was verified"
+        return f"slower than it was, by {share:.0%} of the speed gain that it had: {why}"
+
+
+async def present(
+    axis: Axis, facts: AxisFacts, plant: MeasuredPlant, inertia_kgm2: float, goals: Goals
+) -> Present:
+    """What the drive holds now, and whether it keeps these goals for all that the axis may be.
+
+    Raises:
+        DriveError: a parameter cannot be read.
+    """
+    drive = axis.drive
+    now = await gain_tool.read_gains(axis, facts)
+    if not now.speed_nms:
+        return Present(None)
+    told = Present(now.speed_nms)
+    notches = []
+    if drive.profile.notch is not None:
+        for slot in await notch_tool.read_notches(drive, meaning_of(drive)):
+            if slot.enabled and slot.notch is None:
+                return told
+            if slot.enabled and slot.notch is not None:
+                notches.append(slot.notch)
+    if notches and meaning_of(drive) is None and unknown(drive):
+        return told
+    gains = Gains(
+        now.speed_nms, now.integral_hz or 0.0, now.position_1_s or 0.0,
+        now.speed_nms / (_TURN * inertia_kgm2),
+    )  # fmt: skip
+    f = plant.frequency_hz
+    try:
+        fixed = gain_tool.loops_of(drive, facts).response(f)
+        fixed = fixed * notch_tool.combined(drive.profile, notches, f, meaning_of(drive))
+    except (NotAllowed, ValueError):
+        return told
+
+    def judged() -> Present:
+        loops = speed_loop(f, plant.shifted(), fixed, gains)
+        worst = worst_of(loops)
+        candidate = described(
+            f, plant.response(), fixed, gains, worst.promised, notches=tuple(notches),
+            filters=LoopFilters(facts.speed_filter_hz, facts.torque_filter_hz),
+        )  # fmt: skip
+        sound = worst.meets(goals) and stable_with_less_gain(loops)
+        return Present(now.speed_nms, candidate, sound)
+
+    return await asyncio.to_thread(judged)
+
+
+@dataclass
+class Trials:
+    """Everything that is verified on one axis, in turn; ``tried`` says why what failed did."""
+
+    axis: Axis
+    session: CyclicSession
+    check: Check
+    promised: Goals
+    progress: Progress
+    keep: Keep | None
+    tried: list[str] = field(default_factory=list)
+    had: Present = field(default_factory=lambda: Present(None))
+    had_failed: bool = False
+
+    async def first(self, order: Sequence[Candidate], plant: MeasuredPlant) -> Applied | None:
+        """The first of these, or what the axis has where all that is left is slower.
+
+        ``plant`` is what the designs were made for.
+
+        Raises:
+            DriveError: the drive has a fault, or the link is lost; nothing stays written.
+        """
+        check = self.check
+        self.had = await present(self.axis, check.facts, plant, check.inertia_kgm2, self.promised)
+        slower = [c for c in order if self.had.slower(c)]
+        applied = await self._designs([c for c in order if c not in slower])
+        if applied is None and slower and self.had.sound and not self.had_failed:
+            applied = await self._as_it_was()
+        return applied or await self._designs(slower)
+
+    async def _designs(self, rows: Sequence[Candidate]) -> Applied | None:
+        return await first_kept(
+            self.axis, self.session, self.check, rows, self.promised, self.tried, self.progress,
+            self.keep,
+        )  # fmt: skip
+
+    async def _as_it_was(self) -> Applied | None:
+        """Verified like a design; nothing is written."""
+        candidate = self.had.candidate
+        assert candidate is not None
+        self.progress(0.65, "5 of 6: what it had is faster than the designs that are left")
+        try:
+            verified = await verify(
+                self.axis, self.session, self.check, candidate, self.promised,
+                stages(self.progress), self.keep,
+            )  # fmt: skip
+        except DriveError as error:
+            if await self.axis.state() in (State.FAULT, State.FAULT_REACTION):
+                raise
+            self.tried.append(f"as it was: {error.message}")
+        else:
+            if verified.kept:
+                return Applied(candidate, verified, {})
+            self.tried.append(f"as it was, {verified.why}")
+        self.had_failed = True
+        return None
+
+    def note(self, applied: Applied) -> str:
+        """What the result says of the axis as it was; empty where it became faster."""
+        if applied.candidate is self.had.candidate:
+            return KEPT
+        return self.had.told(applied.candidate, self.had_failed)
