@@ -73,6 +73,11 @@ class Axis(PowerState):
             self._units = units
         return self._units
 
+    @property
+    def known_units(self) -> AxisUnits | None:
+        """Units as they were read last; None before that, and after the gearing changed."""
+        return self._units
+
     def _units_may_have_changed(self, readings: list[Reading]) -> None:
         """Whoever wrote the gearing (a page, a set, the panel): units are read anew."""
         for reading in readings:

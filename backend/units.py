@@ -9,13 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from backend.drive import Drive
-from drivers.errors import NotAllowed, OutOfRange
+from drivers.errors import NotAllowed, OutOfRange, Rejected
 from profiles.schema import Parameter, UnitSpec
 
 #: Raw units per rpm for families that count speed in turns; inc/s depends on the gearing.
 _RAW_PER_RPM = {"rpm": 1.0, "0.1 rpm": 10.0}
 #: Raw units per 1 % of rated torque.
 _RAW_PER_PERCENT = {"‰ rated": 10.0, "0.1 %": 10.0, "% rated": 1.0, "0.01 %": 100.0}
+
+#: Abort codes of an object or subindex that the drive does not have (CiA 301 table 22).
+ABSENT = frozenset({0x06020000, 0x06090011})
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +93,15 @@ class AxisUnits:
         return round(percent * _RAW_PER_PERCENT.get(self.spec.torque, 10.0))
 
 
+def gentlest_ramp_rpm_s(drive: Drive, key: str) -> float | None:
+    """The gentlest ramp of a drive whose ramps are times; None where nothing bounds it."""
+    spec = drive.profile.units
+    reference, longest = spec.ramp_reference_rpm, drive.parameter(key).raw_limits[1]
+    if reference is None or not spec.acceleration.startswith("ms") or not longest:
+        return None
+    return 1000.0 * reference / longest
+
+
 def ramp_raw(units: AxisUnits, drive: Drive, key: str, rpm_per_s: float) -> int:
     """The raw ramp of this parameter for rpm/s.
 
@@ -98,11 +110,10 @@ def ramp_raw(units: AxisUnits, drive: Drive, key: str, rpm_per_s: float) -> int:
             the drive is nothing that anybody typed.
     """
     raw = units.acceleration_raw(rpm_per_s)
+    gentlest = gentlest_ramp_rpm_s(drive, key)
     reference, longest = units.spec.ramp_reference_rpm, drive.parameter(key).raw_limits[1]
-    timed = reference is not None and units.spec.acceleration.startswith("ms")
-    if not timed or reference is None or not longest or raw <= longest:
+    if gentlest is None or longest is None or raw <= longest:
         return raw
-    gentlest = 1000.0 * reference / longest
     raise OutOfRange(
         f"{drive.name}: {rpm_per_s:g} rpm/s is gentler than this drive can be: its longest ramp "
         f"({key}) takes {longest:g} ms for {reference:g} rpm",
@@ -119,7 +130,9 @@ async def read_units(drive: Drive) -> AxisUnits:
 
     User increments per motor revolution are ``feed/feed_revs * shaft_revs/motor_revs`` where the
     family has a feed constant, else the profile's resolution divided by the gear ratio. A feed
-    constant of 0 leaves the resolution unknown (M6-L with P05.05 = 0, 000:1276).
+    constant of 0 leaves the resolution unknown (M6-L with P05.05 = 0, 000:1276). Gear ratio and
+    feed constant are optional in CiA 402-2 (clause 7, 6091h and 6092h): where the drive says that
+    it has no such object, nothing is geared, and without a feed constant the resolution is unknown.
 
     Raises:
         DriveError: the gear parameters cannot be read.
@@ -134,7 +147,12 @@ async def read_units(drive: Drive) -> AxisUnits:
     ]
     raw: dict[str, float] = {}
     for key in keys:
-        value = (await drive.read(key)).raw
+        try:
+            value = (await drive.read(key)).raw
+        except Rejected as refusal:
+            if refusal.code not in ABSENT:
+                raise
+            continue
         if isinstance(value, (int, float)) and (value > 0 or key == spec.feed):
             raw[key] = float(value)
 

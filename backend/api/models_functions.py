@@ -153,9 +153,12 @@ class GearWritten(Message):
 
 
 class AxisRecordInfo(Message):
-    """What the bench keeps of an axis: its mechanics and the watch list."""
+    """What the bench keeps of an axis, its mechanics and the watch list, and its gentlest ramp."""
 
     mechanics: Mechanics | None
+    gentlest_ramp_rpm_s: float | None = Field(
+        description="gentler accelerations are refused; null where nothing bounds them"
+    )
     travel_unit: str = Field(description="mm or °, or empty without mechanics")
     travel_per_motor_turn: float | None
     watch: list[str]

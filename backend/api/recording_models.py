@@ -9,7 +9,7 @@ from pydantic import Field
 
 from backend.api.models import Message
 
-ExportKind = Literal["csv", "rrd", "mcap"]
+ExportKind = Literal["csv", "csv_raw", "rrd", "mcap"]
 
 
 class RecordChannel(Message):
@@ -43,13 +43,15 @@ class StartRecording(Message):
 
 
 class RecordedChannel(Message):
-    """A recorded signal."""
+    """A recorded signal. Its samples are in ``unit``."""
 
     drive: str
     drive_name: str
     key: str
     name: str
     unit: str
+    shown_unit: str = Field(description="as the scope shows it, and CSV and rrd are written")
+    shown_factor: float = Field(description="from unit to shown_unit")
     synchronous: bool
 
 

@@ -35,6 +35,7 @@ from backend.functions import functions_of
 from backend.mechanics_calc import GearPlan, Mechanics
 from backend.readings import Reading
 from backend.tools import identification
+from backend.units import gentlest_ramp_rpm_s
 from drivers.errors import DriveError
 from profiles.functions import FaultHistory, Functions
 
@@ -152,8 +153,8 @@ async def start_identification(
 
 @router.get(f"{_DRIVE}/record")
 async def axis_record(member: TheMember, store: TheStore) -> AxisRecordInfo:
-    """Mechanics and watch list of an axis."""
-    return _record(store.get(member.drive.id))
+    """Mechanics and watch list of an axis, and what its drive bounds motions to."""
+    return _record(member, store.get(member.drive.id))
 
 
 @router.put(f"{_DRIVE}/mechanics")
@@ -165,9 +166,8 @@ async def keep_mechanics(
         request.mechanics.travel_per_load_turn()
     old = store.get(member.drive.id)
     note_before(mechanics=None if old.mechanics is None else old.mechanics.model_dump())
-    return _record(
-        store.put(member.drive.id, old.model_copy(update={"mechanics": request.mechanics}))
-    )
+    kept = old.model_copy(update={"mechanics": request.mechanics})
+    return _record(member, store.put(member.drive.id, kept))
 
 
 @router.put(f"{_DRIVE}/watch")
@@ -186,13 +186,16 @@ async def keep_watch(member: Controlled, store: TheStore, request: WatchUpdate) 
             keys.append(parameter.key)
     old = store.get(member.drive.id)
     note_before(keys=old.watch)
-    return _record(store.put(member.drive.id, old.model_copy(update={"watch": tuple(keys)})))
+    kept = old.model_copy(update={"watch": tuple(keys)})
+    return _record(member, store.put(member.drive.id, kept))
 
 
-def _record(record: AxisRecord) -> AxisRecordInfo:
+def _record(member: Member, record: AxisRecord) -> AxisRecordInfo:
     mechanics = record.mechanics
+    ramp = member.drive.key("profile_acceleration")
     return AxisRecordInfo(
         mechanics=mechanics,
+        gentlest_ramp_rpm_s=gentlest_ramp_rpm_s(member.drive, ramp) if ramp else None,
         travel_unit=mechanics.unit if mechanics else "",
         travel_per_motor_turn=float(mechanics.travel_per_motor_turn()) if mechanics else None,
         watch=list(record.watch),

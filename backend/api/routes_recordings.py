@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import FileResponse
@@ -34,14 +34,20 @@ from backend.people.identity import acting_person
 from backend.recording.capture import AFTER_S, BEFORE_S, FaultCapture
 from backend.recording.library import Retention, Stored
 from backend.recording.reader import RecordingReader
-from backend.recording.recorder import Recorder, Settings, Trigger, describe_streams
+from backend.recording.recorder import Recorder, Settings, Trigger
 from backend.recording.service import Recordings
+from backend.recording.streams import describe_streams
 from backend.recording.writer import RESERVE_BYTES
 from drivers.errors import NotAllowed
 
 router = APIRouter()
 
-_TYPES = {"csv": "text/csv", "rrd": "application/octet-stream", "mcap": "application/octet-stream"}
+_TYPES = {
+    "csv": "text/csv",
+    "csv_raw": "text/csv",
+    "rrd": "application/octet-stream",
+    "mcap": "application/octet-stream",
+}
 
 
 def recordings_of(request: Request) -> Recordings:
@@ -91,6 +97,8 @@ def _stored(stored: Stored) -> RecordingInfo:
                 key=c.key,
                 name=c.name,
                 unit=c.unit,
+                shown_unit=c.shown_unit,
+                shown_factor=c.shown_factor,
                 synchronous=c.synchronous,
             )
             for c in (summary.channels if summary else ())
@@ -100,7 +108,7 @@ def _stored(stored: Stored) -> RecordingInfo:
         lost=summary.lost if summary else 0,
         duration_s=summary.duration_s if summary else 0.0,
         bytes=stored.bytes,
-        exports=[kind for kind in ("csv", "rrd", "mcap") if kind in stored.exports],
+        exports=[kind for kind in get_args(ExportKind) if kind in stored.exports],
         reason=summary.reason if summary else "",
         problem=stored.problem or (summary.problem if summary else ""),
     )

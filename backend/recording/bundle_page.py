@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from backend.journal import Entry
 from backend.recording.evidence import Evidence
-from backend.recording.export import labels
+from backend.recording.export import shown
 from backend.recording.reader import RecordingReader
 from backend.recording.table import merged
 
@@ -138,8 +138,9 @@ def drawings_of(reader: RecordingReader, evidence: Evidence) -> str:
     first = min(ref.t0_s for ref in reader.index())
     mark = evidence.time - reader.clock.epoch(first)
     return "".join(
-        f"<h3>{_e(label)}</h3>{curve(times[present[:, n]], values[present[:, n], n], mark)}"
-        for n, label in enumerate(labels(reader.channels))
+        f"<h3>{_e(column.title)}</h3>"
+        f"{curve(times[present[:, n]], values[present[:, n], n] * column.factor, mark)}"
+        for n, column in enumerate(shown(reader.channels))
     )
 
 

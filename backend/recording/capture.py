@@ -22,7 +22,7 @@ from backend.readings import Reading
 from backend.recording import facts
 from backend.recording.bundle import build_apart
 from backend.recording.evidence import Evidence, Value
-from backend.recording.recorder import describe_streams
+from backend.recording.streams import describe_streams
 from backend.recording.writer import RESERVE_BYTES, free_bytes
 from backend.scope import Subscription
 from drivers.errors import DriveError, NotAllowed

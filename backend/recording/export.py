@@ -1,9 +1,10 @@
 """Exports of a recording: CSV, rerun's .rrd, MCAP. Run as a process of its own.
 
-    python -m backend.recording.export FILE.sdrec OUT (csv|rrd|mcap)
+    python -m backend.recording.export FILE.sdrec OUT (csv|csv_raw|rrd|mcap)
 
-Prints the fraction done, a line at a time. Every recorded value is written as the number that it
-is; the times are exact to a nanosecond.
+Prints the fraction done, a line at a time. ``csv`` and ``rrd`` are in the units that the scope
+shows; in ``csv_raw`` and ``mcap`` every value is the number that was recorded. Times are exact to a
+nanosecond.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ import json
 import math
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -35,7 +37,7 @@ def export(source: Path, target: Path, kind: str, progress: Progress) -> None:
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f".{target.name}.part")
-    write = {"csv": to_csv, "rrd": to_rrd, "mcap": to_mcap}[kind]
+    write = {"csv": to_csv, "csv_raw": to_csv_raw, "rrd": to_rrd, "mcap": to_mcap}[kind]
     try:
         with RecordingReader(source) as reader:
             write(reader, part, progress)
@@ -44,13 +46,44 @@ def export(source: Path, target: Path, kind: str, progress: Progress) -> None:
         part.unlink(missing_ok=True)
 
 
-def labels(channels: tuple[Channel, ...]) -> list[str]:
-    """Column titles: name and unit."""
-    return [f"{c.name} [{c.unit}]" if c.unit else c.name for c in channels]
+@dataclass(frozen=True, slots=True)
+class Column:
+    """Title of a channel with its unit, and the factor from what was recorded to that unit."""
+
+    title: str
+    factor: float
+
+
+def shown(channels: Sequence[Channel]) -> list[Column]:
+    """In the units that the scope shows."""
+    return [Column(_title(c.name, c.shown_unit), c.shown_factor) for c in channels]
+
+
+def _title(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
 
 
 def to_csv(reader: RecordingReader, path: Path, progress: Progress) -> None:
+    """In the units that the scope shows; see `_write_csv`."""
+    _write_csv(reader, path, progress, shown(reader.channels))
+
+
+def to_csv_raw(reader: RecordingReader, path: Path, progress: Progress) -> None:
+    """Every number as it was recorded, in the drive's own units; see `_write_csv`."""
+    columns = [Column(_title(c.name, c.unit), 1.0) for c in reader.channels]
+    _write_csv(reader, path, progress, columns)
+
+
+def _cell(value: float, factor: float) -> str:
+    """A recorded value to the last bit; a converted one without the dust of its product."""
+    return repr(value) if factor == 1.0 else f"{value * factor:.15g}"
+
+
+def _write_csv(
+    reader: RecordingReader, path: Path, progress: Progress, columns: Sequence[Column]
+) -> None:
     """One row for each time at which anything was sampled; empty where a channel was not."""
+    factors = [column.factor for column in columns]
     summary = reader.summary()
     duration = max(summary.duration_s, 1e-9)
     marked = [n for n, s in enumerate(reader.header["streams"]) if s["synchronous"]]
@@ -59,7 +92,7 @@ def to_csv(reader: RecordingReader, path: Path, progress: Progress) -> None:
         out = csv.writer(file)
         zero = datetime.fromtimestamp(summary.clock.epoch(summary.first_s or 0.0), UTC)
         out.writerow(
-            [f"time_s (0 = {zero.isoformat()})", *labels(reader.channels)]
+            [f"time_s (0 = {zero.isoformat()})", *(column.title for column in columns)]
             + [f"{titles[n]} valid" for n in marked]
         )
         for rows in merged(reader):
@@ -67,7 +100,10 @@ def to_csv(reader: RecordingReader, path: Path, progress: Progress) -> None:
             values, present = rows.values.tolist(), rows.present.tolist()
             valid = rows.valid[:, marked].tolist()
             for t, row, here, good in zip(times, values, present, valid, strict=True):
-                cells = [repr(v) if is_here else "" for v, is_here in zip(row, here, strict=True)]
+                cells = [
+                    _cell(v, factor) if is_here else ""
+                    for v, is_here, factor in zip(row, here, factors, strict=True)
+                ]
                 out.writerow([repr(t), *cells, *("" if g < 0 else g for g in good)])
             progress(float(rows.time_ns[-1]) / 1e9 / duration)
 

@@ -15,6 +15,9 @@ from backend.fault_history import PastFault, history_of, read_history
 from backend.readings import Reading
 from drivers.errors import DriveError
 
+#: A mute drive must not keep the samples of the others waiting.
+GEARING_TIMEOUT_S = 2.0
+
 
 def identity(bench: Bench, member: Member) -> dict[str, Any]:
     """Who the axis is."""
@@ -58,6 +61,16 @@ def _row(member: Member, reading: Reading | None, key: str) -> dict[str, Any]:
         return row | {"raw": None, "value": None, "time": None, "error": "not read"}
     raw, value = _plain(reading.raw), _plain(reading.value)
     return row | {"raw": raw, "value": value, "time": reading.time, "error": reading.error}
+
+
+async def gearing(member: Member) -> None:
+    """Have the units of the axis known where its drive answers in time.
+
+    Without them the drive's own units are shown.
+    """
+    with contextlib.suppress(DriveError, TimeoutError):
+        async with asyncio.timeout(GEARING_TIMEOUT_S):
+            await member.axis.units()
 
 
 async def past_faults(member: Member, *, timeout_s: float) -> dict[str, Any]:

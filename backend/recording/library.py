@@ -15,7 +15,7 @@ from backend.recording.reader import BadRecording, RecordingReader, Summary
 from drivers.errors import NotAllowed
 
 _NOTES = ".json"
-EXPORTS = {"csv": ".csv", "rrd": ".rrd", "mcap": ".mcap"}
+EXPORTS = {"csv": ".csv", "csv_raw": ".raw.csv", "rrd": ".rrd", "mcap": ".mcap"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,10 @@ class BadRecording(NotAllowed):
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One recorded signal. ``name`` is unique in the recording; ``column`` in its stream."""
+    """One recorded signal. ``name`` is unique in the recording; ``column`` in its stream.
+
+    Samples are in ``unit``, and times ``shown_factor`` in ``shown_unit``, as the scope shows them.
+    """
 
     stream: int
     column: int
@@ -30,6 +33,8 @@ class Channel:
     key: str
     name: str
     unit: str
+    shown_unit: str
+    shown_factor: float
     synchronous: bool
 
 
@@ -249,6 +254,9 @@ def _channels(header: dict[str, Any]) -> tuple[Channel, ...]:
             key=str(channel["key"]),
             name=str(channel["name"]),
             unit=str(channel["unit"]),
+            # Recordings of earlier versions do not say it.
+            shown_unit=str(channel.get("shown_unit", channel["unit"])),
+            shown_factor=float(channel.get("shown_factor", 1.0)),
             synchronous=bool(stream["synchronous"]),
         )
         for number, stream in enumerate(header["streams"])

@@ -19,6 +19,7 @@ from backend import __version__
 from backend.bench import Bench
 from backend.files import StorageFailed
 from backend.recording import facts
+from backend.recording.streams import describe_streams
 from backend.recording.writer import RecordingWriter, Written
 from backend.scope import Subscription
 from drivers.errors import NotAllowed, OutOfRange
@@ -168,6 +169,7 @@ class Recorder:
     async def _axis(self, drive: str) -> dict[str, Any]:
         member = self._bench.member(drive)
         rows = await facts.parameters(member, fresh=False, timeout_s=PARAMETERS_TIMEOUT_S)
+        await facts.gearing(member)
         return facts.identity(self._bench, member) | {"parameters": rows}
 
     def _subscribe(self, columns: Mapping[str, Sequence[str]]) -> None:
@@ -365,34 +367,6 @@ class Recorder:
         task: asyncio.Task[None] = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-
-
-def describe_streams(
-    bench: Bench, streams: Sequence[tuple[bool, Sequence[tuple[str, str]]]]
-) -> list[dict[str, Any]]:
-    """The ``streams`` of a header; the channels' names are made unique."""
-    names: dict[tuple[str, str], str] = {}
-    for _, channels in streams:
-        for drive_id, key in channels:
-            drive = bench.member(drive_id).drive
-            name = f"{drive.name} {drive.parameter(key).name}"
-            names[drive_id, key] = f"{name} {key}" if name in names.values() else name
-    return [
-        {
-            "synchronous": synchronous,
-            "channels": [
-                {
-                    "drive": drive_id,
-                    "drive_name": bench.member(drive_id).drive.name,
-                    "key": key,
-                    "name": names[drive_id, key],
-                    "unit": bench.member(drive_id).drive.parameter(key).unit,
-                }
-                for drive_id, key in channels
-            ],
-        }
-        for synchronous, channels in streams
-    ]
 
 
 def fires(trigger: Trigger, values: npt.NDArray[np.float64]) -> bool:

@@ -19,7 +19,7 @@ from backend.journal import Entry
 from backend.readings import Reading
 from backend.recording.changed_settings import ChangedSettings
 from backend.recording.reader import Channel
-from backend.recording.recorder import describe_streams
+from backend.recording.streams import describe_streams
 from backend.scope import Subscription
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock

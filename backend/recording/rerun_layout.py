@@ -24,13 +24,17 @@ EVENTS = "events"
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """One entity: channels of one stream with the same unit. ``columns`` are of the stream."""
+    """One entity: channels of one stream that are shown in the same unit.
+
+    ``columns`` are of the stream, and times ``factors`` in that unit.
+    """
 
     entity: str
     drive_name: str
     title: str
     stream: int
     columns: tuple[int, ...]
+    factors: tuple[float, ...]
     names: tuple[str, ...]
 
 
@@ -38,7 +42,7 @@ def plots(channels: Sequence[Channel]) -> list[Plot]:
     """The plots of these channels, in their order."""
     groups: dict[tuple[int, str], list[Channel]] = {}
     for channel in channels:
-        groups.setdefault((channel.stream, channel.unit), []).append(channel)
+        groups.setdefault((channel.stream, channel.shown_unit), []).append(channel)
     result: list[Plot] = []
     for (stream, unit), members in groups.items():
         first = members[0]
@@ -53,6 +57,7 @@ def plots(channels: Sequence[Channel]) -> list[Plot]:
                 title=f"{first.drive_name} [{unit}]" if unit else first.drive_name,
                 stream=stream,
                 columns=tuple(c.column for c in members),
+                factors=tuple(c.shown_factor for c in members),
                 names=tuple(c.name for c in members),
             )
         )
@@ -109,11 +114,12 @@ def send_samples(
     epoch_ns: npt.NDArray[np.int64],
     values: npt.NDArray[np.float64],
 ) -> None:
-    """A run of samples: ``values`` [n, k] of the plot's own columns."""
+    """A run of samples: ``values`` [n, k] of the plot's own columns, as they were recorded."""
+    shown = values * np.array(plot.factors)
     rr.send_columns(
         plot.entity,
         indexes=[rr.TimeColumn(TIMELINE, timestamp=epoch_ns.astype("datetime64[ns]"))],
-        columns=rr.Scalars.columns(scalars=np.ascontiguousarray(values)),
+        columns=rr.Scalars.columns(scalars=np.ascontiguousarray(shown)),
         recording=recording,
         strict=True,
     )

@@ -52,9 +52,9 @@ def samples(station: Station, name: str) -> int:
     return int(next(r["samples"] for r in listed(station) if r["name"] == name))
 
 
-def exported_csv(station: Station, name: str) -> tuple[list[str], np.ndarray]:
-    station.done(station.http.post(f"/recordings/{name}/exports/csv"))
-    text = station.http.get(f"/recordings/{name}/exports/csv").raise_for_status().text
+def exported_csv(station: Station, name: str, kind: str = "csv") -> tuple[list[str], np.ndarray]:
+    station.done(station.http.post(f"/recordings/{name}/exports/{kind}"))
+    text = station.http.get(f"/recordings/{name}/exports/{kind}").raise_for_status().text
     titles, *rows = list(csv.reader(io.StringIO(text)))
     return titles, np.array([[float(cell or "nan") for cell in row] for row in rows])
 
@@ -79,7 +79,12 @@ def test_record_list_export_delete(station: Station, x: str) -> None:
 
     assert station.http.get(f"/recordings/{name}/exports/csv").status_code == 404
     titles, table = exported_csv(station, name)
+    assert [t.rsplit("[")[-1] for t in titles[1:]] == ["rev]", "rpm]"], "as the scope shows them"
+    titles, raw = exported_csv(station, name, "csv_raw")
     assert [t.rsplit("[")[-1] for t in titles[1:]] == ["inc]", "inc/s]"]
+    factors = [c["shown_factor"] for c in ended["channels"]]
+    assert np.allclose(table[:, 1:], raw[:, 1:] * factors, rtol=1e-14, equal_nan=True)
+    assert factors[1] == pytest.approx(factors[0] * 60), "rpm of inc/s, as rev of inc"
     assert len(table) == ended["samples"], "every sample, once"
     assert np.all(np.diff(table[:, 0]) > 0)
     assert table[-1, 0] == pytest.approx(ended["duration_s"], abs=1e-6)
@@ -90,7 +95,10 @@ def test_record_list_export_delete(station: Station, x: str) -> None:
         station.http.patch(f"/recordings/{name}", json={"notes": "cold", "kept": True})
     )
     assert (changed["notes"], changed["tags"], changed["kept"]) == ("cold", ["before"], True)
-    assert station.ok(station.http.get(f"/recordings/{name}"))["info"]["exports"] == ["csv"]
+    assert station.ok(station.http.get(f"/recordings/{name}"))["info"]["exports"] == [
+        "csv",
+        "csv_raw",
+    ]
     assert station.http.delete(f"/recordings/{name}").status_code == 204
     assert station.http.get(f"/recordings/{name}").status_code == 404
     assert station.http.get(f"/recordings/{name}/exports/csv").status_code == 404
@@ -120,7 +128,7 @@ def test_trigger_keeps_what_was_before_it(station: Station, x: str) -> None:
         lambda: listed(station, search="step")[0]["state"] == "complete", HANG_S, "it ends itself"
     )
     station.ok(station.http.post("/stop", json={}))
-    _, table = exported_csv(station, row["name"])
+    _, table = exported_csv(station, row["name"], "csv_raw")
     crossing = table[np.argmax(table[:, 2] >= RPM_100), 0]
     assert 0.45 < crossing < 0.75, "half a second before the trigger is there"
     assert table[-1, 0] - crossing == pytest.approx(0.5, abs=0.25)

@@ -97,7 +97,7 @@ def record(page: Page, bench: Bench, name: str) -> None:
 def fetched(page: Page, kind: str, folder: Path) -> Path:
     """A recording, exported by the page's button."""
     with page.expect_download(timeout=60_000) as waiting:
-        page.get_by_role("button", name=f"Export as {kind}").click()
+        page.get_by_role("button", name=f"Export as {kind}:").click()
     path = folder / f"a.{kind.lower()}"
     waiting.value.save_as(path)
     return path
@@ -117,16 +117,18 @@ def test_every_export_has_every_sample(page: Page, bench: Bench, tmp_path: Path)
     with RecordingReader(stored) as reader:
         blocks = list(reader.blocks())
         names = [channel.name for channel in reader.channels]
+        shown = [channel.shown_factor for channel in reader.channels]
     values = np.concatenate([block.values for block in blocks])
     times = np.concatenate([block.times_s for block in blocks])
     assert values.shape == (info["samples"], len(info["channels"]))
     assert np.count_nonzero(np.ptp(values, axis=0)) >= 2, "position and speed live"
     since_ns = np.rint((times - times[0]) * 1e9)
 
-    with fetched(page, "CSV", tmp_path).open(newline="") as file:
-        rows = np.array([[float(cell) for cell in row] for row in list(csv.reader(file))[1:]])
-    assert np.array_equal(rows[:, 1:], values)
-    assert np.abs(rows[:, 0] * 1e9 - since_ns).max() <= 1
+    for kind, wanted in (("CSV, raw", values), ("CSV", values * shown)):
+        with fetched(page, kind, tmp_path).open(newline="") as file:
+            rows = np.array([[float(cell) for cell in row] for row in list(csv.reader(file))[1:]])
+        assert np.allclose(rows[:, 1:], wanted, rtol=0 if kind == "CSV, raw" else 1e-14, atol=0)
+        assert np.abs(rows[:, 0] * 1e9 - since_ns).max() <= 1
 
     with fetched(page, "MCAP", tmp_path).open("rb") as file:
         messages = [
@@ -148,7 +150,7 @@ def test_every_export_has_every_sample(page: Page, bench: Bench, tmp_path: Path)
             found[entity] = np.concatenate([found[entity], part]) if entity in found else part
     # One entity for each unit: put side by side they are the recording.
     together = np.column_stack(list(found.values()))
-    assert sorted(together.T.tolist()) == sorted(values.T.tolist())
+    assert sorted(together.T.tolist()) == sorted((values * shown).T.tolist())
 
     page.get_by_role("button", name="Delete browser.sdrec").click()
     page.get_by_role("dialog").get_by_role("button", name="Delete", exact=True).click()

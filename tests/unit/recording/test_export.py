@@ -72,6 +72,32 @@ def test_csv(recording: Path) -> None:
     assert [float(row[0]) for row in rows] == sorted(float(row[0]) for row in rows)
 
 
+def test_units_of_the_scope_beside_the_drives_own(tmp_path: Path) -> None:
+    """60FF in inc/s of a drive with 131072 increments a turn is shown in rpm."""
+    head = header(2, 1)
+    head["streams"][0]["channels"][1] |= {"shown_unit": "rpm", "shown_factor": 60 / 131072}
+    head["streams"][0]["channels"][1]["unit"] = "inc/s"
+    path = tmp_path / "a.sdrec"
+    writer = RecordingWriter(path, head, fail)
+    raw = np.array([[0.1, 131072.0], [np.nan, -65536.0], [2.0, 1.0]])
+    writer.put(0, ScopeBlock(1, 100.0, 0.001, ("a", "b"), raw))
+    writer.close({"reason": "stopped"})
+    read = {}
+    for kind in ("csv", "csv_raw"):
+        with run(path, kind).open(newline="", encoding="utf-8") as file:
+            titles, *rows = list(csv.reader(file))
+        run(path, kind).unlink()
+        read[kind] = (titles[1:3], [row[1:3] for row in rows])
+    assert read["csv"] == (
+        ["X0 signal 0 [inc]", "X0 signal 1 [rpm]"],
+        [["0.1", "60"], ["nan", "-30"], ["2.0", "0.000457763671875"]],
+    )
+    assert read["csv_raw"] == (
+        ["X0 signal 0 [inc]", "X0 signal 1 [inc/s]"],
+        [["0.1", "131072.0"], ["nan", "-65536.0"], ["2.0", "1.0"]],
+    )
+
+
 def test_mcap(recording: Path) -> None:
     from mcap.reader import make_reader
 

@@ -1199,7 +1199,7 @@ export interface paths {
         };
         /**
          * Axis Record
-         * @description Mechanics and watch list of an axis.
+         * @description Mechanics and watch list of an axis, and what its drive bounds motions to.
          */
         get: operations["axis_record"];
         put?: never;
@@ -2866,9 +2866,14 @@ export interface components {
         };
         /**
          * AxisRecordInfo
-         * @description What the bench keeps of an axis: its mechanics and the watch list.
+         * @description What the bench keeps of an axis, its mechanics and the watch list, and its gentlest ramp.
          */
         AxisRecordInfo: {
+            /**
+             * Gentlest Ramp Rpm S
+             * @description gentler accelerations are refused; null where nothing bounds them
+             */
+            gentlest_ramp_rpm_s: number | null;
             mechanics: components["schemas"]["Mechanics"] | null;
             /** Travel Per Motor Turn */
             travel_per_motor_turn: number | null;
@@ -6183,7 +6188,7 @@ export interface components {
         };
         /**
          * RecordedChannel
-         * @description A recorded signal.
+         * @description A recorded signal. Its samples are in ``unit``.
          */
         RecordedChannel: {
             /** Drive */
@@ -6194,6 +6199,16 @@ export interface components {
             key: string;
             /** Name */
             name: string;
+            /**
+             * Shown Factor
+             * @description from unit to shown_unit
+             */
+            shown_factor: number;
+            /**
+             * Shown Unit
+             * @description as the scope shows it, and CSV and rrd are written
+             */
+            shown_unit: string;
             /** Synchronous */
             synchronous: boolean;
             /** Unit */
@@ -6264,7 +6279,7 @@ export interface components {
             /** Duration S */
             duration_s: number;
             /** Exports */
-            exports: ("csv" | "rrd" | "mcap")[];
+            exports: ("csv" | "csv_raw" | "rrd" | "mcap")[];
             /**
              * Kept
              * @description retention never deletes it
@@ -25132,7 +25147,7 @@ export interface operations {
             header?: never;
             path: {
                 name: string;
-                kind: "csv" | "rrd" | "mcap";
+                kind: "csv" | "csv_raw" | "rrd" | "mcap";
             };
             cookie?: never;
         };
@@ -25270,7 +25285,7 @@ export interface operations {
             header?: never;
             path: {
                 name: string;
-                kind: "csv" | "rrd" | "mcap";
+                kind: "csv" | "csv_raw" | "rrd" | "mcap";
             };
             cookie?: never;
         };

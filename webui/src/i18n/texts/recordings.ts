@@ -27,6 +27,23 @@ export const recordings = {
   'recordings.state.unusable': ['not usable', '不可用'],
   'recordings.open': ['Open in rerun', '在 rerun 中打开'],
   'recordings.export': ['Export as {kind}', '导出为 {kind}'],
+  'recordings.csvRaw': ['CSV, raw', 'CSV（原始）'],
+  'recordings.kind.csv': [
+    'In the units of the scope (rev, rpm, %), which the header names',
+    '采用示波器显示的单位（rev、rpm、%），单位写在表头',
+  ],
+  'recordings.kind.csv_raw': [
+    'In the units of the drive, every number exactly as it was recorded',
+    '采用驱动器自身的单位，每个数值与记录完全一致',
+  ],
+  'recordings.kind.rrd': [
+    'For rerun, in the units of the scope',
+    '用于 rerun，采用示波器显示的单位',
+  ],
+  'recordings.kind.mcap': [
+    'In the units of the drive, every number exactly as it was recorded',
+    '采用驱动器自身的单位，每个数值与记录完全一致',
+  ],
   'recordings.delete': ['Delete {name}', '删除 {name}'],
   'recordings.deleteText': ['It cannot be brought back.', '删除后无法恢复。'],
   'recordings.deleteNow': ['Delete', '删除'],

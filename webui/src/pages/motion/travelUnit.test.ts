@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest'
 import type { AxisRecordInfo, AxisState } from '../../api/schema'
-import { placeIn, possibleUnits, startIn, travelUnit } from './travelUnit'
+import { placeIn, possibleUnits, roundedUp, startIn, travelUnit } from './travelUnit'
 
 const TURNS = { units: { position: 'rev', velocity: 'rpm', acceleration: 'rpm/s' } } as unknown
 const COUNTS = { units: { position: 'inc', velocity: 'inc/s', acceleration: 'inc/s²' } } as unknown
@@ -39,6 +39,20 @@ describe('the unit that motions are typed in', () => {
     expect(startIn(unit, 'position', 5)).toBe(17)
     expect(startIn(travelUnit('rev', null, COUNTS as AxisState), 'velocity', 60)).toBeNull()
     expect(startIn(travelUnit('rev', null, null), 'velocity', 60)).toBeUndefined()
+  })
+  it('starts with an acceleration that the drive can do, rounded to no less', () => {
+    // DS_C: 1500 rpm/s; on this screw 1500 / 60 × 10 / 3 = 83.33 mm/s².
+    const slow = { ...screw, gentlest_ramp_rpm_s: 1500 }
+    const unit = travelUnit('mm', slow, state)
+    expect(unit.gentlest).toBeCloseTo(83.333, 3)
+    expect(startIn(unit, 'acceleration', 600)).toBe(84)
+    expect(startIn(unit, 'acceleration', 6000)).toBe(330)
+    expect(startIn(travelUnit('rev', slow, state), 'acceleration', 600)).toBe(1500)
+    expect(startIn(travelUnit('rev', screw, state), 'acceleration', 600)).toBe(600)
+    expect(startIn(travelUnit('rev', slow, state), 'velocity', 60)).toBe(60)
+    expect([roundedUp(83.333, 4), roundedUp(99.96, 2), roundedUp(1500, 4)]).toEqual([
+      83.34, 100, 1500,
+    ])
   })
   it('never remembers a number of one unit as one of another', () => {
     expect(placeIn(travelUnit('rev', screw, state), 'jog.speed')).toBe('jog.speed')

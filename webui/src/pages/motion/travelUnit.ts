@@ -14,6 +14,8 @@ export interface TravelUnit {
   units: Record<string, string>
   travel: (revolutions: number) => number
   speed: (rpm: number) => number
+  /** The gentlest acceleration that the drive can do, in this unit; null where nothing bounds it. */
+  gentlest: number | null
 }
 
 /** Units that this axis can be commanded in. */
@@ -36,8 +38,9 @@ export function travelUnit(
   const name = possibleUnits(record, state).find((each) => each === chosen) ?? 'rev'
   const perTurn = record?.travel_per_motor_turn
   const units = state?.units ?? {}
+  const gentlest = record?.gentlest_ramp_rpm_s ?? null
   if (name === 'rev' || perTurn == null) {
-    return { name: 'rev', units, travel: (rev) => rev, speed: (rpm) => rpm }
+    return { name: 'rev', units, travel: (rev) => rev, speed: (rpm) => rpm, gentlest }
   }
   return {
     name,
@@ -50,10 +53,14 @@ export function travelUnit(
     },
     travel: (rev) => rev * perTurn,
     speed: (rpm) => (rpm / 60) * perTurn,
+    gentlest: gentlest === null ? null : (gentlest / 60) * perTurn,
   }
 }
 
-/** A cautious first value, given in revolutions or rpm, in this unit; two digits are enough. */
+/**
+ * A cautious first value, given in revolutions or rpm, in this unit; two digits are enough. Of an
+ * acceleration one that the drive can do.
+ */
 export function startIn(
   unit: TravelUnit,
   quantity: 'position' | 'velocity' | 'acceleration',
@@ -61,9 +68,19 @@ export function startIn(
 ): number | null | undefined {
   const label = unit.units[quantity]
   if (label === undefined) return undefined
-  if (unit.name === 'rev') return ['rev', 'rpm', 'rpm/s'].includes(label) ? usual : null
+  if (unit.name === 'rev' && !['rev', 'rpm', 'rpm/s'].includes(label)) return null
+  const least = quantity === 'acceleration' ? unit.gentlest : null
   const value = quantity === 'position' ? unit.travel(usual) : unit.speed(usual)
-  return Number(value.toPrecision(2))
+  if (least !== null && value < least) return roundedUp(least, 2)
+  return unit.name === 'rev' ? usual : Number(value.toPrecision(2))
+}
+
+/** The next number of so many digits that is no less: a limit that was rounded down is none. */
+export function roundedUp(value: number, digits: number): number {
+  const near = Number(value.toPrecision(digits))
+  if (near >= value) return near
+  const step = 10 ** (Math.floor(Math.log10(value)) - digits + 1)
+  return Number((near + step).toPrecision(digits))
 }
 
 /** Place of a remembered number: numbers of one unit are never taken for another. */

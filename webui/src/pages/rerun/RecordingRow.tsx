@@ -12,7 +12,9 @@ import { useAction } from '../../widgets/useAction'
 import { Remarks } from './Remarks'
 import { size } from './viewer'
 
-type Kind = 'csv' | 'rrd' | 'mcap'
+type Kind = 'csv' | 'csv_raw' | 'rrd' | 'mcap'
+
+const KINDS: Record<Kind, string> = { csv: 'CSV', csv_raw: '', rrd: 'RRD', mcap: 'MCAP' }
 
 /** One recording: what it is, end, open, export, delete. */
 export function RecordingRow({
@@ -108,16 +110,20 @@ export function RecordingRow({
         recording.state !== 'unusable' && (
           <>
             <Button onClick={() => void need('rrd', true)}>{t('recordings.open')}</Button>
-            {(['csv', 'rrd', 'mcap'] as const).map((kind) => (
-              <Button
-                key={kind}
-                leftSection={<Icon name="download" />}
-                aria-label={`${t('recordings.export', { kind: kind.toUpperCase() })}: ${name}`}
-                onClick={() => void need(kind, false)}
-              >
-                {kind.toUpperCase()}
-              </Button>
-            ))}
+            {(Object.keys(KINDS) as Kind[]).map((kind) => {
+              const label = KINDS[kind] || t('recordings.csvRaw')
+              return (
+                <Button
+                  key={kind}
+                  leftSection={<Icon name="download" />}
+                  title={t(`recordings.kind.${kind}`)}
+                  aria-label={`${t('recordings.export', { kind: label })}: ${name}`}
+                  onClick={() => void need(kind, false)}
+                >
+                  {label}
+                </Button>
+              )
+            })}
           </>
         )
       )}
