@@ -46,6 +46,41 @@ class WireTime:
         return self.bits_per_char / self.baudrate
 
 
+def open_pty(path: Path) -> tuple[int, int]:
+    """A raw pty whose slave end appears at ``path``: its master, which never blocks, and slave.
+
+    The slave end is to stay open: without any, reading the master fails while no client is there.
+
+    Raises:
+        LinkLost: something that is not a wire of ours is already at the path.
+    """
+    if path.exists() and not path.is_symlink():
+        raise LinkLost(
+            f"{path} exists and is no virtual wire",
+            remedy="choose another path, or remove the file",
+        )
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = path.with_name(f".{path.name}.{os.getpid()}")
+    fresh.unlink(missing_ok=True)
+    fresh.symlink_to(os.ttyname(slave))
+    fresh.replace(path)  # at once: a client never sees half a wire
+    return master, slave
+
+
+def close_pty(path: Path, master: int, slave: int) -> None:
+    """Close both ends of `open_pty` and take the link away.
+
+    A wire that was made later at the same path is not ours to remove.
+    """
+    if path.is_symlink() and str(path.readlink()) == os.ttyname(slave):
+        path.unlink()
+    os.close(slave)
+    os.close(master)
+
+
 class PtyWire:
     """A pty whose slave end appears at ``path``.
 
@@ -71,19 +106,7 @@ class PtyWire:
         with self._lock:
             if self._master >= 0:
                 return
-            if self.path.exists() and not self.path.is_symlink():
-                raise LinkLost(
-                    f"{self.path} exists and is no virtual wire",
-                    remedy="choose another path, or remove the file",
-                )
-            self._master, self._slave = os.openpty()
-            tty.setraw(self._slave)
-            os.set_blocking(self._master, False)
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            fresh = self.path.with_name(f".{self.path.name}.{os.getpid()}")
-            fresh.unlink(missing_ok=True)
-            fresh.symlink_to(os.ttyname(self._slave))
-            fresh.replace(self.path)  # at once: a client never sees half a wire
+            self._master, self._slave = open_pty(self.path)
 
     def close(self) -> None:
         """Remove the wire. Clients that have it open see an adapter that is gone."""
@@ -92,10 +115,7 @@ class PtyWire:
             self._closing = False
             if self._master < 0:
                 return
-            if self.path.is_symlink() and str(self.path.readlink()) == os.ttyname(self._slave):
-                self.path.unlink()
-            os.close(self._slave)
-            os.close(self._master)
+            close_pty(self.path, self._master, self._slave)
             self._master = self._slave = -1
 
     def pull(self) -> None:

@@ -8,14 +8,13 @@ from __future__ import annotations
 import contextlib
 import os
 import select
-import tty
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from queue import SimpleQueue
 
 from drivers.canopen.frames import Frame
-from drivers.errors import LinkLost
+from drivers.virtual.wires.pty import close_pty, open_pty
 
 _BUS_ERROR_FLAGS = b"FA4\r"
 _NO_FLAGS = b"F00\r"
@@ -52,19 +51,7 @@ class SlcanSide:
     def _plug(self) -> None:
         if self._master >= 0:
             return
-        if self.path.exists() and not self.path.is_symlink():
-            raise LinkLost(
-                f"{self.path} exists and is no virtual wire",
-                remedy="choose another path, or remove the file",
-            )
-        self._master, self._slave = os.openpty()
-        tty.setraw(self._slave)  # the slave end stays open, or reading would fail with no client
-        os.set_blocking(self._master, False)
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = self.path.with_name(f".{self.path.name}.{os.getpid()}")
-        fresh.unlink(missing_ok=True)
-        fresh.symlink_to(os.ttyname(self._slave))
-        fresh.replace(self.path)  # at once: a client never sees half a wire
+        self._master, self._slave = open_pty(self.path)
 
     def _unplug(self) -> None:
         self._opened = False
@@ -72,13 +59,8 @@ class SlcanSide:
         self._buffer.clear()
         master, slave = self._master, self._slave
         self._master = self._slave = -1
-        # A wire that was made later at the same path is not ours to remove.
-        mine = slave >= 0 and self.path.is_symlink()
-        if mine and str(self.path.readlink()) == os.ttyname(slave):
-            self.path.unlink()
-        for descriptor in (slave, master):
-            if descriptor >= 0:
-                os.close(descriptor)
+        if master >= 0:
+            close_pty(self.path, master, slave)
 
     def bus_off(self) -> None:
         """Refuse frames with BEL until the channel is closed and opened again."""
