@@ -493,6 +493,7 @@ class Drive:
         parameter = self.parameter(key)
         port = self.port_for(parameter)
         self.rest.interrupt()
+        self.owed.commanded(parameter.key, raw)
         try:
             await port.link.write(port.station, address_of(parameter), encode(parameter.type, raw))
         except BaseException as error:

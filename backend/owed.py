@@ -113,6 +113,18 @@ class Owed:
         if debt is not None or key in self._lent:
             self._note()
 
+    def lends(self, key: str) -> bool:
+        """A motion has changed this for its length, and puts it back."""
+        return key in self._lent
+
+    def commanded(self, key: str, raw: Raw) -> None:
+        """A motion object is about to be written, which nobody reads back.
+
+        Only the mode is ever lent of these; set-points and control words leave no trace here.
+        """
+        if key in self._lent or key in self._debts:
+            self.sent(key, raw, None)
+
     def seen(self, readings: Iterable[Reading]) -> None:
         """What a drive holds as it should is owed no longer."""
         debts = self._debts

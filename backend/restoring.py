@@ -99,7 +99,9 @@ def _tell_first(earlier: BaseException | None, late: DriveError) -> None:
         return
     late.message = f"{earlier.message}; {late.message}"
     late.args = (late.message,)
-    late.remedy = "; ".join(dict.fromkeys(r for r in (earlier.remedy, late.remedy) if r)) or None
+    # Each piece of advice once, however many cleanups failed one after the other.
+    advice = "; ".join(r for r in (earlier.remedy, late.remedy) if r)
+    late.remedy = "; ".join(dict.fromkeys(advice.split("; "))) or None
 
 
 async def shielded(cleanup: Callable[[], Awaitable[None]], timeout_s: float, drive: str) -> None:

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
+from backend.cyclic_mode import keeping_mode
 from backend.drive import Drive
 from backend.jobs import JobResult, Progress
 from backend.ports import address_of
@@ -138,7 +139,7 @@ async def generate(
     values = signal(settings, cycle_s)
     mode = Mode[settings.mode]
     _require_inside(drive, settings)
-    async with axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S):
+    async with keeping_mode(axis, session), axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S):
         start = await axis.position_raw()
         if settings.mode == "CSP":
             raw = start + np.round(values * units.position_raw(1.0)).astype(np.int64)
@@ -190,7 +191,8 @@ async def jog_cyclic(
     cycle_s = _cycle(session)
     require_scale(axis, units, settings)
     progress(0.0, "enabling")
-    async with axis.enabled_cyclic(session, Mode.CSP, _STATE_TIMEOUT_S):
+    enabled = axis.enabled_cyclic(session, Mode.CSP, _STATE_TIMEOUT_S)
+    async with keeping_mode(axis, session), enabled:
         start = await axis.position_raw()
         speed = settings.speed_rpm / 60.0
         slope = settings.acceleration_rpm_s / 60.0

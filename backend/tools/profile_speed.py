@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
+from backend.cyclic_mode import keeping_mode, modes_of_the_loop
 from backend.drive import Drive
 from backend.io_functions import read_terminals
 from backend.tools.recording import Play, bus_limits, cycle_s, enabled, play, quiet
@@ -102,7 +103,8 @@ async def prepared(
 ) -> AsyncIterator[None]:
     """Around a measurement: what must hold before, and ramps and torque limit for its length.
 
-    A drive with cyclic modes is only asked whether it watches the exchange.
+    A drive with cyclic modes is only asked whether it watches the exchange, and gets the mode back
+    that it was in.
 
     Raises:
         NotAllowed: no consent where it is needed, no travel limit in the drive, the axis is
@@ -113,7 +115,8 @@ async def prepared(
     drive = axis.drive
     require_consent(session, drive, consent)
     if drive.id not in session.by_speed:
-        yield
+        async with keeping_mode(axis, session):
+            yield
         return
     await require_travel_limits(axis)
     if await axis.state() is State.OPERATION_ENABLED:
@@ -122,7 +125,10 @@ async def prepared(
         )
     ramps = [drive.require("profile_acceleration"), drive.require("profile_deceleration")]
     limits = [key for key in [drive.key("max_torque")] if key is not None]
-    async with axis.restoring(*ramps, *limits, *await axis.restorable_mode()):
+    modes = await axis.restorable_mode()
+    async with axis.restoring(*ramps, *limits, *modes):
+        for key in modes:
+            modes_of_the_loop(drive, key)
         await axis.limit_torque(limits, _ABOVE * envelope.torque_percent)
         await _write_ramps(axis, ramps, _SLOW_RPM_S)
         await _require_signed(axis, session, envelope)

@@ -315,7 +315,8 @@ class SyncLoop:
         before = self._silent_s[station]
         self._silent_s[station] = now = before + self.cycle_s
         if before < _BRAKE_WHEN_SILENT_S <= now:
-            axis.stop("its cyclic data stopped coming: the axis is braked and disabled")
+            # Where the line is cut it hears nothing of that, and goes on as its watchdog lets it.
+            axis.stop("its cyclic data stopped coming: it is told to brake, heard or not")
         if before < _GIVE_UP_WHEN_SILENT_S <= now:
             self.images.neutralise(station, "its cyclic data stopped coming")
 

@@ -11,12 +11,14 @@ from pathlib import Path
 import httpx
 import pytest
 
+from backend.axis import Envelope
 from backend.bench import Bench, Member
 from backend.restoring import RestoreFailed
 from backend.tools.temporary import temporary
+from drivers.cia402 import Mode
 from drivers.errors import LinkLost
 from drivers.link import Found
-from tests.support.servo import CONTROL, STATUS, Servo, bench_with
+from tests.support.servo import CONTROL, MODE, STATUS, Servo, bench_with
 
 #: Largest torque, and the bandwidth of the speed loop, which acts after "write settings".
 TORQUE, SPEED = "6072:00", "2005:03"
@@ -225,6 +227,35 @@ async def test_the_next_server_puts_back_what_a_killed_one_left(
     assert not member.drive.owed
     assert not any((state / "owed").iterdir())
     await again.close()
+
+
+@pytest.mark.parametrize("then", ["untouched", "chosen by somebody"])
+async def test_the_mode_that_a_killed_server_left_comes_back_by_itself(
+    x: Member, servo: Servo, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, then: str
+) -> None:
+    """6060h is written as a command, without being read back: it needed a press."""
+    servo.set(MODE, Mode.PV)
+    state = tmp_path_factory.mktemp("killed") / "state"
+    async with x.axis.enabled(Mode.PP, Envelope(1.0, 100.0, 50.0, 5.0)):
+        shutil.copytree(tmp_path / "owed", state / "owed")
+    assert servo.number(MODE) == Mode.PV
+    left = Mode.PP if then == "untouched" else Mode.HM
+    servo.set(MODE, left)
+    again, member = await bench_with(servo, state)
+    await back(again, servo)
+    assert servo.number(MODE) == (Mode.PV if then == "untouched" else Mode.HM)
+    assert {debt.key for debt in member.drive.owed.debts} == (
+        set() if then == "untouched" else {"6060:00"}
+    )
+    await again.close()
+
+
+async def test_set_points_leave_no_trace_of_themselves(x: Member) -> None:
+    """A jog sends a thousand of them in a minute."""
+    for target in range(50):
+        await x.drive.command("607A:00", target)
+    x.drive.owed.add({"607A:00": 0})
+    assert x.drive.owed.debts[0].left == frozenset()
 
 
 @pytest.mark.parametrize(("age_s", "stops"), [(0.0, True), (3600.0, False)])

@@ -45,6 +45,7 @@ from profiles.loader import load_profile
 from profiles.schema import Profile
 
 STATION = 1
+_MODE = 0x6060
 #: Simulated time for one access to the dictionary.
 _ACCESS_NS = 200_000
 #: Set-points live this much longer than on a wire: simulated time outruns the tools' clock.
@@ -79,6 +80,7 @@ class DirectLink:
         self._pump: asyncio.Task[None] | None = None
         self._consumers: list[Callable[[ScopeBlock], None]] = []
         self._channels: tuple[str, ...] = ()
+        self._written: dict[int, int] = {}
 
     # Link ----------------------------------------------------------------------------------
 
@@ -96,10 +98,15 @@ class DirectLink:
         del progress, stations
         return [Found(STATION)]
 
+    def pass_s(self, seconds: float) -> None:
+        """Let time pass without any access."""
+        self.now_ns += round(seconds * 1e9)
+        self.device.advance(self.now_ns)
+
     def _access(self) -> None:
-        if self.cut:
-            raise LinkLost("the cable is pulled")
-        if self._pump is None:
+        if not self._reached:
+            raise LinkLost("the cable is pulled, or the drive has no supply")
+        if not self.running:
             self.now_ns += _ACCESS_NS
             self.device.advance(self.now_ns)
 
@@ -126,6 +133,13 @@ class DirectLink:
     async def write(self, station: int, address: Address, data: bytes) -> None:
         del station
         self._access()
+        if self.running and address.index == _MODE and _MODE in self._written:
+            # As `drivers.ethercat.exchange` does: else the next cycle would take it back.
+            assert self._loop is not None
+            mode = int.from_bytes(data, "little", signed=True)
+            self._loop.outputs[self._written[_MODE]] = mode
+            await asyncio.sleep(0)
+            return
         try:
             self.device.write(address.index or 0, address.subindex, data)
         except SdoAbort as abort:
@@ -160,10 +174,14 @@ class DirectLink:
         self._columns = _columns(plan.rx, names), _columns(plan.tx, names)
         self._channels = tuple(n for part in self._columns for _, n in part)
         known = [e for e in plan.rx.entries if e.code != "x"]
+        self._written = places(plan.rx.entries)
         self._loop = AxisLoop(
-            STATION, inputs=places(plan.tx.entries), outputs=places(plan.rx.entries),
+            STATION, inputs=places(plan.tx.entries), outputs=self._written,
             output_count=len(known), cycle_s=cycle_s, report=lambda _n, _t: None,
         )  # fmt: skip
+        if _MODE in self._written:
+            mode = self.device.read(_MODE, 0)
+            self._loop.outputs[self._written[_MODE]] = int.from_bytes(mode, "little", signed=True)
         self._watch = places(plan.tx.entries)
         return plan.mapped
 
@@ -178,13 +196,17 @@ class DirectLink:
 
     @property
     def running(self) -> bool:
-        return self._pump is not None and not self._pump.done() and not self.cut
+        return self._pump is not None and not self._pump.done() and self._reached
+
+    @property
+    def _reached(self) -> bool:
+        return self.device.powered and not self.cut
 
     async def _run(self) -> None:
         per_turn = max(1, round(20_000_000 / self.cycle_ns))
         while True:
             rows = [self._cycle() for _ in range(per_turn)]
-            if self.cut:
+            if not self._reached:
                 return
             block = ScopeBlock(0, self.now_ns / 1e9, self.cycle_ns / 1e9, self._channels,
                                np.array(rows, np.float64))  # fmt: skip

@@ -1,0 +1,96 @@
+"""The mode of an axis that is moved through the cyclic exchange: chosen for it, and given back.
+
+The loop writes 6060h with its process data. A drive that keeps the mode of the last measurement
+would be enabled in it by whoever enables it next, from its panel or another program.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from backend.axis import Axis
+from backend.cyclic import CyclicSession
+from backend.drive import Drive
+from backend.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
+from drivers.cia402 import Mode, State
+from drivers.dialect import dialect_of
+from drivers.errors import DriveError, LinkTimeout, NotAllowed
+
+_CHOSEN = (Mode.CSP, Mode.CSV, Mode.CST)
+_STANDS_S, _TAKEN_S, _POLL_S = 2.0, 2.0, 0.01
+
+
+@asynccontextmanager
+async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None]:
+    """Around motions that choose a mode through the loop: afterwards 6060h is what it was.
+
+    Nothing where somebody further out does so already, where the loop owns no mode, and where the
+    drive shows one that cannot be written (none, at power-on).
+
+    Raises:
+        RestoreFailed: on leaving; the mode is then owed to the drive.
+    """
+    drive = axis.drive
+    keys = [] if session.power() is None else await axis.restorable_mode()
+    if not keys or drive.owed.lends(keys[0]):
+        yield
+        return
+    (key,) = keys
+    before = await drive.raw(key)
+    with drive.owed.lent({key: before}):
+        modes_of_the_loop(drive, key)
+        try:
+            yield
+        finally:
+            await shielded(
+                lambda: _give_back(axis, session, key, before), CLEANUP_TIMEOUT_S, drive.name
+            )
+
+
+def modes_of_the_loop(drive: Drive, key: str) -> None:
+    """What the loop may leave in ``key``, which is lent: it writes past the drive's own methods."""
+    for mode in _CHOSEN:
+        drive.owed.commanded(key, dialect_of(drive.profile).mode(mode))
+
+
+async def _give_back(axis: Axis, session: CyclicSession, key: str, before: int) -> None:
+    drive = axis.drive
+    left = {key: before}
+    try:
+        if await drive.raw(key) != before:
+            await _choose(axis, session, key, before)
+        left.clear()
+    except DriveError as error:
+        raise RestoreFailed(
+            f"{drive.name}: not restored: {key} (was {before}): {error.message}",
+            drive=drive.name,
+            remedy=PUT_BACK_LATER,
+        ) from error
+    finally:
+        drive.owed.add(left)
+
+
+async def _choose(axis: Axis, session: CyclicSession, key: str, mode: int) -> None:
+    """Of a disabled axis; by whoever writes its mode now.
+
+    Raises:
+        DriveError: it is enabled or turns, does not take it, or another drive answers here.
+    """
+    drive, power = axis.drive, session.power()
+    # An EP3E may trip over a mode that changes while its motor turns (001:487).
+    if await axis.state() is State.OPERATION_ENABLED or not await axis.standstill(_STANDS_S):
+        raise NotAllowed(f"{drive.name} is enabled or turns", drive=drive.name)
+    if power is None or not session.running:
+        # The link may have been lost meanwhile, and another drive be there now.
+        await drive.confirm_identity()
+        await drive.write(key, mode)
+        return
+    await power.drive_to(session.station(drive), State.SWITCH_ON_DISABLED, mode)
+    deadline = time.monotonic() + _TAKEN_S
+    while await drive.raw(key) != mode:
+        if time.monotonic() > deadline:
+            raise LinkTimeout(f"{drive.name} does not take its mode back", drive=drive.name)
+        await asyncio.sleep(_POLL_S)
