@@ -2,7 +2,8 @@
 
     python -m tests.browser.screenshots [FOLDER]
 
-Every page at laptop and phone size, light and dark, into ``docs/images`` unless told otherwise.
+Into FOLDER goes every page at laptop and phone size, light and dark; into ``docs/images``, where
+none is given, only what the documentation shows.
 """
 
 from __future__ import annotations
@@ -109,7 +110,22 @@ def _store(page: Page, file: Path) -> None:
     picture.quantize(COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
 
 
-def _shoot(browser: Browser, station: Station, drive: str, folder: Path, faulty: bool) -> None:
+def _shown() -> set[str]:
+    """Names of the pictures in the documentation."""
+    pages = (ROOT / "docs").rglob("*.md")
+    return {
+        name for page in pages for name in re.findall(r"images/([\w-]+\.png)", page.read_text())
+    }
+
+
+def _shoot(
+    browser: Browser,
+    station: Station,
+    drive: str,
+    folder: Path,
+    shown: set[str] | None,
+    faulty: bool,
+) -> None:
     pictures = {"alarms": _go("alarms")} if faulty else PICTURES
     for screen, size in SCREENS.items():
         for scheme in SCHEMES:
@@ -118,15 +134,20 @@ def _shoot(browser: Browser, station: Station, drive: str, folder: Path, faulty:
             page.goto(station.url)
             page.get_by_label("State of the drive").wait_for()
             for name, show in pictures.items():
+                file = folder / f"{name}-{screen}-{scheme}.png"
+                if shown is not None and file.name not in shown:
+                    continue
                 show(page, drive)
                 page.wait_for_timeout(SETTLE_MS)
-                _store(page, folder / f"{name}-{screen}-{scheme}.png")
+                _store(page, file)
             context.close()
 
 
 def main() -> None:
     """Take all pictures."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "images"
+    given = sys.argv[1:]
+    folder = Path(given[0]) if given else ROOT / "docs" / "images"
+    shown = None if given else _shown()
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as place, sync_playwright() as playwright:
         program = "/usr/bin/chromium"
@@ -135,12 +156,12 @@ def main() -> None:
         station.start()
         try:
             drive = _prepare(station)
-            _shoot(browser, station, drive, folder, faulty=False)
+            _shoot(browser, station, drive, folder, shown, faulty=False)
             station.http.post("/stop", json={})
             until(lambda: station.state(drive)["moving_job"] is None, what="the axis is free")
             station.drives.command(do="inject", axis="Feed screw", what="over_current")
             until(lambda: station.state(drive)["state"] == "Fault", what="the fault is there")
-            _shoot(browser, station, drive, folder, faulty=True)
+            _shoot(browser, station, drive, folder, shown, faulty=True)
             screenshots_tuning.shoot(browser, folder, Path(place) / "tuning", COLOURS)
         finally:
             browser.close()

@@ -254,9 +254,6 @@ def test_jog_stops_at_a_limit_switch() -> None:
 
 # --- magnetic poles of the M6-L (000:1163-1181) ------------------------------------------------
 
-POLE_REV = 0.25
-"""The virtual motors have four pole pairs."""
-
 
 def direct_drive(**parts: Any) -> OnWire:
     """A linear motor with an incremental encoder and without a Hall sensor."""

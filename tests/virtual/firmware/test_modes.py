@@ -13,7 +13,6 @@ from drivers.virtual.mechanics import EncoderSpec, FrictionSpec, LoadSpec, Trave
 
 from .servo_bench import REV, TURN, Bench, rigid
 
-NEW = 1 << 4
 RELATIVE = 1 << 6
 
 
