@@ -31,8 +31,9 @@ from backend.analysis.line_spectra import (
 from backend.analysis.sampling import DIRECT_SHARE, MODEL_SHARE, SignalPath
 
 #: What friction did to a line is off by this share where only the speed tells its direction, and
-#: where the balance of torques does at reversals.
-_BY_SPEED, _BY_BALANCE = 0.2, 0.08
+#: where the balance of torques does at reversals: all lines alike, as too little or too much
+#: friction makes them, and each line by itself, in size and phase.
+_BY_SPEED, _BY_BALANCE, _EACH_BY_BALANCE = 0.2, 0.08, 0.1
 
 __all__ = ["Frf", "Quantity", "Record", "estimate_periodic", "valid_band_hz"]
 
@@ -136,6 +137,10 @@ def estimate_periodic(
     told = all(record.told_direction is not None for record in records)
     # Where friction takes most of the torque, a share of it is much of what is left.
     doubt = _BY_BALANCE * (g / plain - 1.0) if told else _BY_SPEED * np.log(g / plain)
+    size, turn = np.abs(doubt.real), np.abs(doubt.imag)
+    if told:
+        # What the balance leaves is no share of what friction did: it may turn a line as well.
+        size = turn = _EACH_BY_BALANCE * np.abs(g / plain - 1.0)
     power = np.asarray(sum(np.abs(r.mean(axis=0)) ** 2 for r in s.sent))
     noise_var, total_var, freedom = _variances(s, inputs, g, smooth_lines)
     relative = total_var * power / np.abs(g * s_ur) ** 2
@@ -150,8 +155,8 @@ def estimate_periodic(
     return Frf(
         frequency_hz=s.frequency_hz,
         response=g,
-        std_db=20 / np.log(10) * np.hypot(one_sided, np.abs(doubt.real)),
-        std_deg=np.degrees(np.hypot(one_sided, np.abs(doubt.imag))),
+        std_db=20 / np.log(10) * np.hypot(one_sided, size),
+        std_deg=np.degrees(np.hypot(one_sided, turn)),
         coherence=np.asarray(np.abs(cross) ** 2 / np.maximum(raw_power * raw_response, 1e-300)),
         noise=np.sqrt(noise_var) * 2.0 / s.samples,
         distortion=np.sqrt(distortion) * 2.0 / s.samples,

@@ -21,6 +21,10 @@ _LEAST_NOISE = 0.1
 _LOWEST = 4.0
 #: Friction is taken out where that leaves less than this share of the scatter.
 _WORTH_TAKING = 0.9
+#: Where all scatter is noise (up to this multiple of it) friction is there, however little it makes
+#: of it, once what it explains is so many times what a number explains by chance (three
+#: deviations): leaving it in would be off by all of it.
+_NOISE_ONLY, _BY_NO_CHANCE = 2.0, 9.0
 
 
 def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> float:
@@ -45,13 +49,41 @@ def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> fl
     # By their noise first: behind a coarse encoder the upper lines drown friction, and elsewhere
     # the lower ones tell it best. What play does drowns it in all but the lowest.
     low = np.asarray(s.frequency_hz <= _LOWEST * s.frequency_hz[0], dtype=np.float64)
-    for weight in (_torque_weight(s, plain), np.ones(s.frequency_hz.size), low):
-        found = minimize_scalar(
-            _scatter, bounds=(0.0, limit), method="bounded", args=(s, plain, turned, weight)
-        )
-        if found.fun < _WORTH_TAKING * _scatter(0.0, s, plain, turned, weight):
-            return float(found.x)
+    by_noise = _torque_weight(s, plain)
+    found, share = _least(s, plain, turned, by_noise, limit)
+    left = _scatter(found, s, plain, turned, by_noise)
+    if share < _WORTH_TAKING or _beyond_chance(s, share, left):
+        return found
+    for weight in (np.ones(s.frequency_hz.size), low):
+        found, share = _least(s, plain, turned, weight, limit)
+        if share < _WORTH_TAKING:
+            return found
     return 0.0
+
+
+def _beyond_chance(s: LineSpectra, share: float, left: float) -> bool:
+    """Whether friction is there that makes little of the scatter because noise makes the rest.
+
+    It leaves this ``share`` of the scatter, which is ``left`` in units of one period's noise.
+    """
+    periods = s.used / len(s.sent)
+    if periods <= 1.0:
+        return False
+    freedom = 2 * s.frequency_hz.size * (len(s.sent) - 1)
+    only_noise = 2.0 * left * periods < _NOISE_ONLY * freedom
+    return only_noise and (1.0 / share - 1.0) * freedom > _BY_NO_CHANCE
+
+
+def _least(
+    s: LineSpectra, plain: list[ComplexArray], turned: list[ComplexArray], weight: FloatArray,
+    limit: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Friction up to ``limit`` that leaves the least scatter, and the share that it leaves."""
+    found = minimize_scalar(
+        _scatter, bounds=(0.0, limit), method="bounded", args=(s, plain, turned, weight)
+    )
+    before = max(_scatter(0.0, s, plain, turned, weight), 1e-300)
+    return float(found.x), max(float(found.fun) / before, 1e-12)
 
 
 def _scatter(

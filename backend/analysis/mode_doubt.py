@@ -4,6 +4,11 @@ The covariance of the fit's parameters carried over to the modes by their slopes
 Schoukens, *System Identification*, 2012, section 2.4), and beside it what all lines may be off by
 together, which no covariance of single lines shows: the friction that was taken out of them acts
 like damping, by the same share everywhere.
+
+What friction adds to the damping of a mode is the same however much that mode is damped by itself;
+and lines beside a mode that is narrower than their distance tell its damping by their phase, in
+proportion. So the range of a damping is stated by what is added to it and not as a factor, and
+where it is not known to half of itself it begins at zero.
 """
 
 from __future__ import annotations
@@ -20,17 +25,24 @@ from backend.analysis.fit_problem import Problem, robust_rows
 #: damping where the friction that every axis has did not show, and so is still in the lines.
 _SYSTEMATIC = np.array([3e-4, 0.03, 0.0])
 _UNSEEN_FRICTION = np.array([0.0, 0.1, 0.0])
+#: A larger deviation of a damping says no more than that nothing is known.
+_WIDEST = 10.0
 #: Parameters (most are logarithms) are moved by this much to see what the modes do.
 _STEP = 1e-5
 
 
 @dataclass(frozen=True)
 class ModeDoubt:
-    """One standard deviation each, of logarithms: frequency, damping and residue of a mode."""
+    """One standard deviation each, relative: frequency, damping and residue of a mode."""
 
     frequency: float
     damping: float
     residue: float
+
+    def damping_interval(self, damping: float, deviations: float) -> tuple[float, float]:
+        """Within so many deviations of a damping ratio."""
+        apart = deviations * min(self.damping, _WIDEST)
+        return damping * max(1.0 - apart, 0.0), damping * (1.0 + apart)
 
 
 def mode_doubts(

@@ -258,7 +258,7 @@ def resonance_table(
                 Resonance(
                     "resonance", mode.frequency_hz, mode.damping, height,
                     _around(mode.frequency_hz, known.frequency if known else None),
-                    _around(mode.damping, known.damping if known else None),
+                    known.damping_interval(mode.damping, _CI95) if known else None,
                 )
             )  # fmt: skip
     kept = [row.frequency_hz for row in rows]

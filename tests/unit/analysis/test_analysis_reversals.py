@@ -8,9 +8,12 @@ from drive_sim import TURN, Drive, Mechanics
 from random_axes import ENVELOPE, RATED_NM, Case, errors, facts_of, played
 
 from backend.analysis.fit import Resonance
+from backend.analysis.fit_problem import CHAIN, Problem, View
+from backend.analysis.frf import Frf
 from backend.analysis.line_spectra import Record, collect
 from backend.analysis.mechanical_model import MechanicalModel, Mode
-from backend.analysis.mode_doubt import ModeDoubt
+from backend.analysis.mode_doubt import ModeDoubt, mode_doubts
+from backend.analysis.sampled_model import LoopModel, seen_response
 from backend.analysis.sampling import SignalPath
 from backend.tools.sweep_evaluation import SweepSettings, evaluate, resonance_table
 
@@ -97,11 +100,40 @@ def test_a_mode_that_may_be_none_is_not_listed():
     [row] = [r for r in rows if r.kind == "resonance"]
     assert isinstance(row, Resonance)
     assert row.frequency_hz == 120.0
-    # 1.96 deviations of the logarithm to either side.
-    assert row.damping_ci95 == pytest.approx((0.02 * np.exp(-0.196), 0.02 * np.exp(0.196)))
+    # 1.96 deviations to either side.
+    assert row.damping_ci95 == pytest.approx((0.02 * (1 - 0.196), 0.02 * (1 + 0.196)))
     assert row.frequency_ci95_hz == pytest.approx(
         (120.0 * np.exp(-0.00196), 120.0 * np.exp(0.00196))
     )
+
+
+@pytest.mark.parametrize("damping_nms", [2e-4, 2e-3])
+def test_what_friction_adds_to_a_mode_is_the_same_however_it_is_damped(damping_nms):
+    """Two inertias: a viscous δ at the motor adds δ·φ²/2ω, φ² = J2 / J1·(J1 + J2)."""
+    inertia, stiffness, more = 1e-4, 3.0, 1e-4
+    x = np.array([np.log(inertia), np.log(1e-3), 0.0, 0.0, np.log(2000.0),
+                  np.log(inertia), np.log(stiffness), np.log(damping_nms)])  # fmt: skip
+    lines, path = np.arange(5.0, 100.0, 1.5), SignalPath(1000.0)
+    model = CHAIN.model(x)
+    none = np.zeros(lines.size)
+    seen = Frf(lines, seen_response(lines, model, 0.0, path, LoopModel()), none, none, none + 1.0,
+               none, none, 1000.0, (5.0, 400.0), 4, 0)  # fmt: skip
+    view = View.of(seen, none == 0.0, path, LoopModel(), 0.01, integrated=False, second=False)
+    problem = Problem((view,), 1e-3, CHAIN, free_filter=False)
+    taken = -more * model.response(lines)
+    [doubt] = mode_doubts(problem, x, np.zeros((8, 8)), [taken], friction_seen=True)
+    added = np.sqrt(doubt.damping**2 - 0.03**2) * model.modes[0].damping
+    w = np.sqrt(stiffness * 2.0 / inertia)
+    assert added == pytest.approx(more * 0.5 / inertia / (2.0 * w), rel=0.03)
+
+
+def test_a_damping_that_is_not_known_to_half_of_itself_may_be_none():
+    assert ModeDoubt(0.0, 0.1, 0.0).damping_interval(0.02, 1.96) == pytest.approx(
+        (0.01608, 0.02392)
+    )
+    low, high = ModeDoubt(0.0, 0.6, 0.0).damping_interval(0.02, 1.96)
+    assert low == 0.0
+    assert high == pytest.approx(0.04352)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
