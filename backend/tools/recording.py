@@ -19,12 +19,10 @@ from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession, channel
 from backend.jobs import Progress
 from backend.ports import address_of
+from backend.tools.alignment import BoolArray, FloatArray, Run, aligned
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 _RENEW_S = 0.03
 _STATE_TIMEOUT_S = 5.0
@@ -94,9 +92,9 @@ class _Catch:
         ]
         return np.concatenate(rows) if rows else np.empty((0, 3))
 
-    def runs(self) -> list[tuple[int, FloatArray, BoolArray]]:
-        """Runs without a gap: cycles missing before it, samples [n, k], validity [n]."""
-        found: list[tuple[int, FloatArray, BoolArray]] = []
+    def runs(self) -> list[Run]:
+        """Runs without a gap."""
+        found: list[Run] = []
         for block in self.blocks:
             samples = block.samples[:, [block.channels.index(name) for name in self.names]]
             good = np.ones(len(samples), dtype=np.bool_) if block.valid is None else block.valid
@@ -227,7 +225,9 @@ async def play(
     whole = np.column_stack(
         [sequence.values] if sequence.offsets is None else [sequence.values, sequence.offsets]
     ).astype(np.float64)
-    table, valid = aligned(whole, catch.runs(), drive.name, ended_early=ended_early)
+    table, valid = await asyncio.to_thread(
+        aligned, whole, catch.runs(), drive.name, ended_early=ended_early
+    )
     return await _in_si(axis, whole, table, valid, period_s, rated_torque_nm)
 
 
@@ -301,79 +301,6 @@ async def _in_si(
         offset=whole[:count, 1] if whole.shape[1] > 1 else np.zeros(count),
         valid=valid,
     )
-
-
-def aligned(
-    sent: FloatArray,
-    runs: list[tuple[int, FloatArray, BoolArray]],
-    drive: str,
-    *,
-    ended_early: bool = False,
-) -> tuple[FloatArray, BoolArray]:
-    """Rows [n, k] of the recording, row i belonging to row i of ``sent`` [n, m].
-
-    The last m columns of each run repeat the set-points that went out. Where cycles are missing
-    between two runs, either the loop skipped them (the sequence then went on later) or the
-    samples were lost (it went on meanwhile); the set-points tell which. Rows beside a gap, rows
-    that were lost and rows whose set-points differ are not valid. With ``ended_early`` the rows
-    end where the sequence was broken off.
-
-    Raises:
-        LinkLost: the sequence cannot be found.
-    """
-    wide = sent.shape[1]
-    table = np.zeros((len(sent), runs[0][1].shape[1] if runs else wide))
-    valid = np.zeros(len(sent), dtype=np.bool_)
-    place: int | None = None
-    for missing, samples, good in runs:
-        echo = samples[:, -wide:]
-        if place is None:
-            place = _begin(sent, echo)
-            if place is None:
-                continue
-        elif _fits(sent, echo, place + missing) > _fits(sent, echo, place):
-            place += missing
-        rows = np.arange(place, place + len(samples))
-        inside = (rows >= 0) & (rows < len(sent))
-        table[rows[inside]] = samples[inside]
-        right = good & (np.all(echo == sent[np.clip(rows, 0, len(sent) - 1)], axis=1))
-        if missing:
-            right[:1] = False
-        valid[rows[inside]] = right[inside]
-        place += len(samples)
-    last = np.flatnonzero(valid)
-    if last.size < 0.5 * (0 if ended_early else len(sent)) or not last.size:
-        raise LinkLost(
-            f"{drive}: the set-points do not come back from the bus as they were sent",
-            drive=drive,
-            remedy="look at the link quality; the computer or the bus is overloaded",
-        )
-    count = int(last[-1]) + 1 if ended_early else len(sent)
-    return table[:count], valid[:count]
-
-
-def _fits(sent: FloatArray, echo: FloatArray, place: int) -> float:
-    """Share of the first rows of ``echo`` that agree when they begin at row ``place``."""
-    count = min(50, len(echo), len(sent) - place)
-    if count <= 0:
-        return 0.0
-    return float(np.mean(np.all(echo[:count] == sent[place : place + count], axis=1)))
-
-
-def _begin(sent: FloatArray, echo: FloatArray) -> int | None:
-    """Row of ``sent`` that the first row of ``echo`` is (negative: it is older); None if unsure."""
-    moving = np.any(np.diff(sent, axis=0) != 0, axis=1)
-    first = int(np.argmax(moving)) if np.any(moving) else 0
-    pattern = sent[first : first + 300]
-    best, hits = 0, 0
-    for start in range(len(echo) - min(20, len(pattern))):
-        window = echo[start : start + len(pattern)]
-        if window[1, 0] != pattern[1, 0] or window[1, -1] != pattern[1, -1]:
-            continue
-        same = int(np.count_nonzero(np.all(window == pattern[: len(window)], axis=1)))
-        if same > hits:
-            best, hits = start, same
-    return first - best if hits >= 15 else None
 
 
 def share(progress: Progress, low: float, high: float, step: str) -> Callable[[float], None]:
