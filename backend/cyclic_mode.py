@@ -16,10 +16,9 @@ from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
 from drivers.cia402 import Mode, State
-from drivers.dialect import dialect_of
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
 
-_CHOSEN = (Mode.CSP, Mode.CSV, Mode.CST)
+_CYCLIC = (Mode.CSP, Mode.CSV, Mode.CST)
 _STANDS_S, _TAKEN_S, _POLL_S = 2.0, 2.0, 0.01
 
 
@@ -41,7 +40,7 @@ async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None
     (key,) = keys
     before = await drive.raw(key)
     with drive.owed.lent({key: before}):
-        modes_of_the_loop(drive, key)
+        modes_of_the_loop(drive, session, key)
         try:
             yield
         finally:
@@ -50,10 +49,10 @@ async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None
             )
 
 
-def modes_of_the_loop(drive: Drive, key: str) -> None:
+def modes_of_the_loop(drive: Drive, session: CyclicSession, key: str) -> None:
     """What the loop may leave in ``key``, which is lent: it writes past the drive's own methods."""
-    for mode in _CHOSEN:
-        drive.owed.commanded(key, dialect_of(drive.profile).mode(mode))
+    for mode in (Mode.PV,) if drive.id in session.by_speed else _CYCLIC:
+        drive.owed.commanded(key, int(mode))
 
 
 async def _give_back(axis: Axis, session: CyclicSession, key: str, before: int) -> None:

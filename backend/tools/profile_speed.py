@@ -128,7 +128,7 @@ async def prepared(
     modes = await axis.restorable_mode()
     async with axis.restoring(*ramps, *limits, *modes):
         for key in modes:
-            modes_of_the_loop(drive, key)
+            modes_of_the_loop(drive, session, key)
         await axis.limit_torque(limits, _ABOVE * envelope.torque_percent)
         await _write_ramps(axis, ramps, _SLOW_RPM_S)
         await _require_signed(axis, session, envelope)

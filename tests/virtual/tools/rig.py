@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from backend import parameter_set
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
@@ -63,13 +64,40 @@ class Bench:
     spec: MechanicsSpec
 
     async def values(self) -> dict[str, object]:
-        """Every stored setting of the drive, to see that a tool leaves all as it was."""
-        from backend import parameter_set
+        """See `settings_of`."""
+        return await settings_of(self.axis.drive)
 
-        drive = self.axis.drive
-        keys = [p.key for p in parameter_set.storable(drive.profile, motor_individual=True)]
-        readings = await drive.read_many([k for k in keys if not k.startswith("60FE")])
-        return {key: reading.raw for key, reading in readings.items()}
+
+async def settings_of(drive: Drive, *more: str) -> dict[str, object]:
+    """Every setting of the drive, motor's own ones included: a tool leaves all as it was.
+
+    ``more``: objects that are no settings, such as the mode.
+    """
+    stored = parameter_set.storable(drive.profile, motor_individual=True)
+    keys = [p.key for p in stored if not p.key.startswith("60FE")]
+    reachable = [key for key in keys if not drive.unreachable_why(drive.parameter(key))]
+    readings = await drive.read_many([*reachable, *more])
+    return {key: reading.raw for key, reading in readings.items()}
+
+
+@dataclass
+class At:
+    """A progress that does something once, when a step comes."""
+
+    step: str
+    act: Callable[[], object]
+    fraction: float = 0.0
+    done: bool = False
+    progress: Progress = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.progress = Progress(self._told)
+
+    def _told(self) -> None:
+        here = self.step in self.progress.step and self.progress.fraction >= self.fraction
+        if here and not self.done:
+            self.done = True
+            self.act()
 
 
 @asynccontextmanager

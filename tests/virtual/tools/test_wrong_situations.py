@@ -11,11 +11,10 @@ import asyncio
 import re
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import pytest
 
-from backend import parameter_set
 from backend.axis import Envelope
 from backend.jobs import Progress
 from backend.tools.autotune import (
@@ -38,7 +37,7 @@ from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.link import Address
 from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import WIDE, errors, mechanics, silent
+from tests.virtual.tools.rig import WIDE, At, errors, mechanics, settings_of, silent
 
 ONE = mechanics((1e-4, 60.0, 0.006))
 FREE = mechanics((1e-4, 60.0, 0.006), coulomb=0.005)
@@ -75,11 +74,8 @@ families = pytest.mark.parametrize("family", [MMS7, M6L], ids=lambda family: fam
 
 
 async def dump(b: DirectBench) -> dict[str, object]:
-    """Every setting of the drive, motor's own ones included."""
-    drive = b.axis.drive
-    stored = parameter_set.storable(drive.profile, motor_individual=True)
-    keys = [p.key for p in stored if not p.key.startswith("60FE")]
-    return {key: reading.raw for key, reading in (await drive.read_many(keys)).items()}
+    """Every setting of the drive."""
+    return await settings_of(b.axis.drive)
 
 
 @asynccontextmanager
@@ -226,26 +222,6 @@ async def test_an_envelope_that_is_hit_ends_the_measurement(family: Family) -> N
             await sweep(b.axis, b.session, SweepSettings(narrow), silent())
         with pytest.raises(DriveError):
             await autotune(b.axis, b.session, family.autotune(narrow), silent())
-
-
-@dataclass
-class At:
-    """A progress that does something once, when a step comes."""
-
-    step: str
-    act: Callable[[], object]
-    fraction: float = 0.0
-    done: bool = False
-    progress: Progress = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.progress = Progress(self._told)
-
-    def _told(self) -> None:
-        here = self.step in self.progress.step and self.progress.fraction >= self.fraction
-        if here and not self.done:
-            self.done = True
-            self.act()
 
 
 @families
