@@ -2,7 +2,8 @@
 
 torque = J·a + b·ω + Tc·sign(ω) + Tg, every signal through the *same* zero-phase filter (so that
 the filter drops out of the equation), samples near standstill left out, outliers weighted down
-(Huber 1964), and intervals that know how few independent samples a filtered signal holds.
+(Huber 1964), loads that swing told apart from it (`load_swing`), and intervals that know how few
+independent samples a filtered signal holds, and how long what is left swings.
 """
 
 from __future__ import annotations
@@ -14,10 +15,21 @@ from scipy.ndimage import convolve1d
 from scipy.stats import t as student_t
 
 from backend.analysis.arrays import BoolArray, FloatArray
+from backend.analysis.load_swing import find_swings, lag_of_load, lag_slopes
 
 #: Shares of J, viscous, Coulomb and gravity torque by which compliance, timing and the smoothing
 #: of standstill bend the answer however little noise there is; part of every interval.
 SYSTEMATIC_SHARE = np.array([0.005, 0.05, 0.03, 0.01])
+
+#: Swings are looked for up to this multiple of the smoothing's corner; above, their first order
+#: is enough.
+_SWINGS_TO = 2.0
+#: What the model leaves may be alike for about this long.
+_ALIKE_S = 0.2
+_FEWEST = 20
+#: Share of the Coulomb friction that may have been taken for viscous friction.
+_TOLD_APART = 0.01
+_AT_LIMIT = "the torque was at its limit: raise the limit or lower the acceleration"
 
 
 @dataclass(frozen=True)
@@ -170,6 +182,22 @@ def _independent_share(residual: FloatArray, keep: BoolArray) -> float:
     return float(1.0 / (1.0 + 2.0 * np.sum(rho[1:length])))
 
 
+def _swinging_variance(
+    a: FloatArray, residual: FloatArray, weight: FloatArray, keep: BoolArray, block: int
+) -> FloatArray:
+    """Variances of the solution of a·x = b whose residual swings (Newey & West 1987).
+
+    What a model leaves of a swing is alike for many samples, and grows and falls with the columns.
+    Bartlett's weights of the lags up to ``block`` are those of overlapping sums of that length.
+    """
+    scores = np.zeros((keep.size + 2 * block, a.shape[1]))
+    scores[block : block + keep.size][keep] = a * (weight * residual)[:, None]
+    total = np.cumsum(scores, axis=0)
+    sums = total[block:] - total[:-block]
+    normal = np.linalg.pinv((a * weight[:, None]).T @ a)
+    return np.asarray(np.diag(normal @ (sums.T @ sums / block) @ normal))
+
+
 def estimate_inertia(
     torque_nm: FloatArray,
     velocity_rad_s: FloatArray,
@@ -195,71 +223,117 @@ def estimate_inertia(
     kernel = _smoothing_kernel(sample_rate_hz, cutoff_hz)
     if n < 8 * kernel.size:
         raise ValueError(f"{n} samples are too few for a filter of {kernel.size}")
-    peak = float(np.max(np.abs(velocity_rad_s)))
-    slowest = 0.05 * peak if minimum_speed_rad_s is None else minimum_speed_rad_s
-
-    def smooth(x: FloatArray) -> FloatArray:
-        return np.asarray(convolve1d(np.asarray(x, dtype=np.float64), kernel, mode="nearest"))
-
-    velocity = smooth(velocity_rad_s)
-    # The derivative of the smoothing kernel itself: a difference of samples would smooth more
-    # than the other signals are smoothed, and J would come out small.
-    acceleration = np.asarray(
-        convolve1d(
-            np.asarray(velocity_rad_s, dtype=np.float64), _slope_kernel(kernel), mode="nearest"
-        )
-        * sample_rate_hz
-    )
-    direction = smooth(np.clip(velocity_rad_s / max(0.2 * slowest, 1e-12), -1.0, 1.0))
-    torque = smooth(torque_nm)
     saturated = np.zeros(n, dtype=np.bool_)
     if torque_limit_nm is not None:
         saturated = np.abs(torque_nm) >= 0.98 * torque_limit_nm
-    spoilt = saturated if valid is None else saturated | ~valid
-    reach = np.ones(kernel.size // 2 * 2 + 1)
-    near_spoilt = np.convolve(spoilt.astype(np.float64), reach, "same") > 0.5
-    keep = (np.abs(velocity) > slowest) & ~near_spoilt
+    spoilt = saturated
+    if valid is not None and np.any(valid):
+        spoilt = saturated | ~valid
+        # A load that swings remembers what a gap seems to do.
+        count = np.arange(n)
+        velocity_rad_s = np.interp(count, count[valid], velocity_rad_s[valid])
+    peak = float(np.max(np.abs(velocity_rad_s)))
+    slowest = 0.05 * peak if minimum_speed_rad_s is None else minimum_speed_rad_s
+    matrix = _columns(velocity_rad_s, kernel, slowest, sample_rate_hz)
+    torque = _smooth(torque_nm, kernel)
+    near_spoilt = np.convolve(spoilt.astype(np.float64), np.ones(kernel.size), "same") > 0.5
+    keep = (np.abs(matrix[:, 1]) > slowest) & ~near_spoilt
     keep[: kernel.size] = keep[-kernel.size :] = False
+    samples, saturated_share = int(np.count_nonzero(keep)), float(np.mean(saturated))
+    if samples < _FEWEST:
+        return _nothing(samples, saturated_share)
+    acceleration = matrix[:, 0]
+    swings = find_swings(matrix, torque, acceleration, keep, sample_rate_hz, _SWINGS_TO * cutoff_hz)
+    lags = [lag_of_load(acceleration, s, sample_rate_hz) for s in swings]
+    bends = [c[keep] for s in swings for c in lag_slopes(acceleration, s, sample_rate_hz)]
+    return _regress(
+        np.column_stack([matrix, *lags])[keep], torque[keep],
+        np.array(bends, dtype=np.float64).reshape(len(bends), samples).T,
+        keep, round(_ALIKE_S * sample_rate_hz), saturated_share, motor_inertia_kgm2,
+    )  # fmt: skip
+
+
+def _smooth(x: FloatArray, kernel: FloatArray) -> FloatArray:
+    return np.asarray(convolve1d(np.asarray(x, dtype=np.float64), kernel, mode="nearest"))
+
+
+def _columns(
+    velocity_rad_s: FloatArray, kernel: FloatArray, slowest: float, rate: float
+) -> FloatArray:
+    """What torque is regressed upon [n, 6]: acceleration, velocity, direction, one, and how
+    acceleration changes, to the first and second order.
+    """
+    # The derivative of the smoothing kernel itself: a difference of samples would smooth more
+    # than the other signals are smoothed, and J would come out small.
+    acceleration = _smooth(velocity_rad_s, _slope_kernel(kernel)) * rate
+    direction = _smooth(np.clip(velocity_rad_s / max(0.2 * slowest, 1e-12), -1.0, 1.0), kernel)
+    # A speed that is told later than the torque (by the drive's filter, 0.2 ms are enough) bends
+    # the two frictions against each other: to first order that is the first derivative.
+    late = np.gradient(acceleration) * rate
     # A load behind a spring of antiresonance ω_a seems heavier by (ω/ω_a)²: to first order that is
-    # the second derivative of the acceleration, which would else count as inertia.
-    springy = np.gradient(np.gradient(acceleration)) * sample_rate_hz**2
-    matrix = np.column_stack([acceleration, velocity, direction, np.ones(n), springy])
-    return _regress(matrix[keep], torque[keep], keep, float(np.mean(saturated)), motor_inertia_kgm2)
+    # the second derivative, which would else count as inertia.
+    springy = np.gradient(late) * rate
+    return np.column_stack(
+        [acceleration, _smooth(velocity_rad_s, kernel), direction, np.ones(direction.size), late,
+         springy]
+    )  # fmt: skip
+
+
+def _nothing(samples: int, saturated_share: float) -> InertiaResult:
+    """The answer where there is next to nothing to regress over."""
+    nothing = Interval(float("nan"), float("nan"), float("nan"))
+    reason = "too few samples in motion: raise travel or speed"
+    if saturated_share > 0.05:
+        reason += f"\n{_AT_LIMIT}"
+    return InertiaResult(nothing, nothing, nothing, nothing, None, 0.0, samples, False, reason)
+
+
+def _intervals(
+    a: FloatArray, bends: FloatArray, x: FloatArray, residual: FloatArray, weight: FloatArray,
+    keep: BoolArray, block: int,
+) -> list[Interval]:  # fmt: skip
+    """J, viscous, Coulomb and gravity torque with their 95 % intervals.
+
+    ``bends`` are what frequencies and dampings of swings, which were searched, do to the torque.
+    """
+    whole = np.column_stack([a, bends])
+    scale = np.maximum(np.max(np.abs(whole), axis=0), 1e-12)
+    whole = whole / scale
+    share = _independent_share(residual * np.sqrt(weight), keep)
+    count = float(np.sum(weight))
+    freedom = max(count * share - whole.shape[1], 1.0)
+    normal = np.linalg.pinv((whole * weight[:, None]).T @ whole)
+    # Sum of squares over the independent share of samples, variance inflated accordingly.
+    variance = float(np.sum(weight * residual**2)) / max(count - 4.0, 1.0) / share
+    plain = np.diag(normal) * variance * float(student_t.ppf(0.975, freedom)) ** 2
+    blocks = max(float(np.count_nonzero(keep)) / block - 1.0, 1.0)
+    swinging = _swinging_variance(whole, residual, weight, keep, block)
+    swinging = swinging * float(student_t.ppf(0.975, blocks)) ** 2
+    doubt = np.sqrt(np.maximum(np.maximum(plain, swinging), 0.0)) / scale
+    half = np.hypot(doubt[:4], SYSTEMATIC_SHARE * np.abs(x[:4]))
+    # What reversals bend of Coulomb friction, viscous friction makes up for at the speeds moved at.
+    speed = float(np.sqrt(np.mean(a[:, 1] ** 2)))
+    half[1] = np.hypot(half[1], _TOLD_APART * abs(x[2]) / speed)
+    return [
+        Interval(float(v), float(v - h), float(v + h)) for v, h in zip(x[:4], half, strict=True)
+    ]
 
 
 def _regress(
-    a: FloatArray,
-    b: FloatArray,
-    keep: BoolArray,
-    saturated_share: float,
-    motor_inertia_kgm2: float | None,
-) -> InertiaResult:
+    a: FloatArray, b: FloatArray, bends: FloatArray, keep: BoolArray, block: int,
+    saturated_share: float, motor_inertia_kgm2: float | None,
+) -> InertiaResult:  # fmt: skip
     """Solve, judge and report."""
-    if b.size < 20:
-        nothing = Interval(float("nan"), float("nan"), float("nan"))
-        reason = "too few samples in motion: raise travel or speed"
-        if saturated_share > 0.05:
-            reason += "\nthe torque was at its limit: raise the limit or lower the acceleration"
-        return InertiaResult(nothing, nothing, nothing, nothing, None, 0.0, b.size, False, reason)
     scale = np.maximum(np.max(np.abs(a), axis=0), 1e-12)
     x, weight = _huber(a / scale, b)
-    if x[1] < 0:
+    driving = min(float(x[1] / scale[1]), 0.0)
+    if driving < 0:
         # Friction does not drive: where noise says so, there is too little viscous friction to see.
-        x, weight = _huber(a / scale * np.array([1.0, 0.0, 1.0, 1.0, 1.0]), b)
+        x, weight = _huber(a / scale * (np.arange(a.shape[1]) != 1), b)
     residual = b - (a / scale) @ x
-    share = _independent_share(residual * np.sqrt(weight), keep)
-    freedom = max(float(np.sum(weight)) * share - a.shape[1], 1.0)
-    root = np.sqrt(weight)[:, None]
-    normal = np.linalg.pinv((a / scale * root).T @ (a / scale * root))
-    # Sum of squares over the independent share of samples, variance inflated accordingly.
-    variance = float(np.sum(weight * residual**2)) / max(float(np.sum(weight)) - 4.0, 1.0) / share
-    std = np.sqrt(np.maximum(np.diag(normal) * variance, 0.0)) / scale
-    value = x / scale
-    t = float(student_t.ppf(0.975, freedom))
-    half = np.hypot(t * std[:4], SYSTEMATIC_SHARE * np.abs(value[:4]))
-    parts = [
-        Interval(float(v), float(v - h), float(v + h)) for v, h in zip(value[:4], half, strict=True)
-    ]
+    parts = _intervals(a, bends, x / scale, residual, weight, keep, block)
+    # It may be as far above zero as the data put it below.
+    parts[1] = Interval(parts[1].value, parts[1].low + driving, parts[1].high - driving)
     total = float(np.sum(weight * (b - np.average(b, weights=weight)) ** 2))
     r2 = 1.0 - float(np.sum(weight * residual**2)) / total if total > 0 else 0.0
     reasons = _reasons(a, b, residual, weight, parts, r2, saturated_share)
@@ -287,7 +361,7 @@ def _reasons(
     reasons = []
     inertia = parts[0]
     if saturated_share > 0.05:
-        reasons.append("the torque was at its limit: raise the limit or lower the acceleration")
+        reasons.append(_AT_LIMIT)
     if np.min(a[:, 1]) >= 0 or np.max(a[:, 1]) <= 0:
         reasons.append("motion in one direction only: friction and gravity cannot be told apart")
     accelerating = float(np.std(a[:, 0])) * abs(inertia.value)

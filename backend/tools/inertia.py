@@ -24,6 +24,7 @@ from backend.tools.go_back import go_back
 from backend.tools.inertia_evaluation import (
     InertiaOutcome,
     InertiaSettings,
+    doubt_of,
     evaluate,
     oscillation_hz,
     ratio_against,
@@ -73,15 +74,15 @@ async def inertia(
     if abs(start - units.position(home)) > 0.01:
         await go_back(axis, session, units.position_raw(start), _wide(settings, ends), facts)
     told = share(progress, 0.35, 0.65, "moving forth and back")
-    shape = Shape()
     recording = await identification_moves(
-        axis, session, settings, facts, look, travel, shape, told
+        axis, session, settings, facts, look, travel, Shape(), told
     )
     progress(0.65, "evaluating")
-    result = await asyncio.to_thread(evaluate, recording, settings, facts, shape.cutoff_hz)
+    result = await asyncio.to_thread(evaluate, recording, settings, facts)
     swing_hz = await asyncio.to_thread(oscillation_hz, recording, result)
     if swing_hz is not None:
-        # A load that swings behind its coupling is moved again so that it does not.
+        # A load that swings in another way than couplings let it is moved again so that it does
+        # not.
         gentle = Shape.against(swing_hz)
         told = share(
             progress, 0.66, 0.9, f"once more, gently: the load swings at {swing_hz:.0f} Hz"
@@ -94,12 +95,12 @@ async def inertia(
         )
         # Too short a travel leaves too little of a gentle move: the first answer stays.
         with contextlib.suppress(NotAllowed):
-            calm = await asyncio.to_thread(evaluate, again, settings, facts, gentle.cutoff_hz)
-            if calm.r2 > result.r2:
-                recording, result, shape = again, calm, gentle
+            calm = await asyncio.to_thread(evaluate, again, settings, facts)
+            if doubt_of(calm) < doubt_of(result):
+                recording, result = again, calm
     await go_back(axis, session, home, _wide(settings, ends), facts)
     if keep is not None:
-        keep("inertia", *raw_of(recording, settings, facts, shape.cutoff_hz))
+        keep("inertia", *raw_of(recording, settings, facts))
     return InertiaOutcome(
         result, f"host, {settings.scheme}", facts.torque_known, ends,
         recording.velocity_rad_s.size / recording.sample_rate_hz, ratio_against(facts, settings),

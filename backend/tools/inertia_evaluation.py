@@ -55,17 +55,14 @@ class InertiaOutcome:
     """What the load ratio compares with, in words; empty where there is no ratio."""
 
 
-def evaluate(
-    recording: Recording, settings: InertiaSettings, facts: AxisFacts,
-    cutoff_hz: float = CUTOFF_HZ,
-) -> InertiaResult:  # fmt: skip
+def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) -> InertiaResult:
     """The regression; also works on a recording that was kept."""
     try:
         found = estimate_inertia(
             recording.torque_nm,
-            quiet_velocity(recording, cutoff_hz),
+            quiet_velocity(recording, CUTOFF_HZ),
             recording.sample_rate_hz,
-            cutoff_hz=cutoff_hz,
+            cutoff_hz=CUTOFF_HZ,
             torque_limit_nm=settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm,
             motor_inertia_kgm2=facts.motor_inertia_kgm2,
             valid=recording.valid,
@@ -80,6 +77,14 @@ def evaluate(
     if found.load_ratio is None and reference and np.isfinite(found.inertia_kgm2.value):
         return replace(found, load_ratio=found.inertia_kgm2.value / reference - 1.0)
     return found
+
+
+def doubt_of(result: InertiaResult) -> float:
+    """Half the interval of the inertia as a share of it; what is not identified is all doubt."""
+    inertia = result.inertia_kgm2
+    if not result.identifiable:
+        return float("inf")
+    return 0.5 * (inertia.high - inertia.low) / inertia.value
 
 
 def oscillation_hz(recording: Recording, result: InertiaResult) -> float | None:
@@ -120,12 +125,11 @@ def ratio_against(facts: AxisFacts, settings: InertiaSettings) -> str:
 
 
 def raw_of(
-    recording: Recording, settings: InertiaSettings, facts: AxisFacts, cutoff_hz: float
+    recording: Recording, settings: InertiaSettings, facts: AxisFacts
 ) -> tuple[dict[str, npt.NDArray[np.generic]], dict[str, object]]:
     """Arrays and facts from which `reevaluate` makes the same answer again."""
     return recording.arrays(), {
         "tool": "inertia",
-        "cutoff_hz": cutoff_hz,
         "sample_rate_hz": recording.sample_rate_hz,
         "facts": asdict(facts),
         "settings": asdict(settings),
@@ -156,9 +160,8 @@ def reevaluate(
     rate = float(str(meta["sample_rate_hz"]))
     facts = AxisFacts(**told)
     recording = Recording(rate, **columns, valid=valid)
-    cutoff_hz = float(str(meta.get("cutoff_hz", CUTOFF_HZ)))
     return InertiaOutcome(
-        evaluate(recording, settings, facts, cutoff_hz), f"host, {settings.scheme}",
+        evaluate(recording, settings, facts), f"host, {settings.scheme}",
         facts.torque_known, settings.ends_rev, recording.velocity_rad_s.size / rate,
         ratio_against(facts, settings),
     )  # fmt: skip

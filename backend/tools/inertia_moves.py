@@ -14,7 +14,7 @@ from backend.cyclic import CyclicSession
 from backend.tools import profile_speed
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.go_back import go_back
-from backend.tools.inertia_evaluation import CUTOFF_HZ, InertiaSettings
+from backend.tools.inertia_evaluation import InertiaSettings
 from backend.tools.probe import RoughFit, require_right_sign, rough_fit
 from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play, quiet
 from drivers.cia402 import Mode
@@ -37,20 +37,16 @@ _FRICTION_RAD_S = 0.5
 
 @dataclass(frozen=True)
 class Shape:
-    """How gently the moves begin and end, and the filter that goes with it."""
+    """How gently the moves begin and end."""
 
     ramp_s: float = _RAMP_S
     smoothing_s: float = _SMOOTHING_S
-    cutoff_hz: float = CUTOFF_HZ
 
     @staticmethod
     def against(swing_hz: float) -> Shape:
         """A mean over one whole swing does not excite it (a finite-impulse input shaper)."""
         period_s = 1.0 / swing_hz
-        return Shape(
-            max(_RAMP_S, 3.0 * period_s), max(_SMOOTHING_S, period_s),
-            min(CUTOFF_HZ, 0.4 * swing_hz),
-        )  # fmt: skip
+        return Shape(max(_RAMP_S, 3.0 * period_s), max(_SMOOTHING_S, period_s))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,170 @@
+"""Loads that swing behind their couplings, in the torque of slow moves.
+
+Seen from the motor, whose acceleration is a, a chain of inertias and springs is a rigid inertia and
+one oscillator for every mode that the loads have while the motor is held (the antiresonances of
+the mechanics; modal decomposition of a fixed-base structure, Craig & Bampton, AIAA J. 6 (1968)
+1313):
+
+    T = J·a + Σ mᵢ·(Fᵢ(a) − a),   Fᵢ(s) = (2ζωs + ω²) / (s² + 2ζωs + ω²)
+
+Well below ω this is J·a and a little of a's second derivative, which a regression may take as a
+column of its own. At and above ω it is not, and a load that swings freely after a ramp takes
+torque while the motor turns steadily. Such a mode is found here, by its frequency and damping;
+mᵢ is linear. The motion of the motor is measured, so what friction does to it is no matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.signal import cont2discrete, lfilter, ss2tf
+
+from backend.analysis.arrays import BoolArray, FloatArray, IntArray
+
+#: What the search looks at: ratios of neighbouring frequencies, and dampings.
+_STEP, _DAMPINGS = 1.07, (0.008, 0.03, 0.1)
+_LEAST_DAMPING, _MOST_DAMPING = 5e-4, 0.5
+#: Below this frequency a swing is not told from the move itself.
+_LOWEST_HZ = 3.0
+#: A mode must take this share of the power that is left, or it is not there to be seen.
+_WORTH = 0.5
+#: Relative step of numerical slopes.
+_DIFFERENCE = 1e-4
+#: Samples per cycle of the highest frequency that are worth regressing over.
+_PER_CYCLE = 8.0
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A mode of the loads with the motor held: Hz, share of critical damping."""
+
+    frequency_hz: float
+    damping: float
+
+
+def lag_of_load(acceleration: FloatArray, swing: Swing, sample_rate_hz: float) -> FloatArray:
+    """F(a) − a [n]: acceleration of the load less that of the motor, from rest.
+
+    Straight lines between samples (first-order hold).
+    """
+    w = 2 * np.pi * swing.frequency_hz
+    damped = 2 * swing.damping * w
+    # As states: the load's way and speed against the motor's way, driven by the acceleration.
+    states = np.array([[0.0, 1.0], [-w * w, -damped]]), np.array([[0.0], [1.0]])
+    told = np.array([[w * w, damped]]), np.array([[0.0]])
+    a, b, c, d, _ = cont2discrete((*states, *told), 1.0 / sample_rate_hz, "foh")
+    numerator, denominator = ss2tf(a, b, c, d)
+    return np.asarray(lfilter(numerator[0], denominator, acceleration)) - acceleration
+
+
+def lag_slopes(
+    acceleration: FloatArray, swing: Swing, sample_rate_hz: float
+) -> tuple[FloatArray, FloatArray]:
+    """How `lag_of_load` changes with the logarithms of frequency and damping, [n] each."""
+
+    def at(frequency: float, damping: float) -> FloatArray:
+        moved = Swing(swing.frequency_hz * frequency, swing.damping * damping)
+        return lag_of_load(acceleration, moved, sample_rate_hz)
+
+    e = _DIFFERENCE
+    return (
+        np.asarray((at(1 + e, 1.0) - at(1 - e, 1.0)) / (2 * e)),
+        np.asarray((at(1.0, 1 + e) - at(1.0, 1 - e)) / (2 * e)),
+    )
+
+
+def find_swings(
+    others: FloatArray,
+    torque_nm: FloatArray,
+    acceleration: FloatArray,
+    keep: BoolArray,
+    sample_rate_hz: float,
+    highest_hz: float,
+    most: int = 2,
+) -> tuple[Swing, ...]:
+    """Modes up to ``highest_hz`` that the torque [n] shows beside ``others`` [n, columns].
+
+    ``others`` begins with the acceleration. A mode counts only while it takes half of what was
+    left unexplained, as an inertia that is positive and smaller than the whole.
+    """
+    every = max(1, int(sample_rate_hz / (_PER_CYCLE * highest_hz)))
+    rows = np.flatnonzero(keep)[::every]
+    problem = _Problem(others[rows], torque_nm[rows], acceleration, rows, sample_rate_hz)
+    found: tuple[Swing, ...] = ()
+    left = problem.unexplained(found)
+    while len(found) < most:
+        seed = min(_grid(highest_hz), key=lambda s: problem.unexplained((*found, s)))
+        better = problem.refined((*found, seed), highest_hz)
+        power = problem.unexplained(better)
+        if not power < _WORTH * left or not problem.is_physical(better):
+            break
+        found, left = better, power
+    return found
+
+
+def _grid(highest_hz: float) -> list[Swing]:
+    count = int(np.log(highest_hz / _LOWEST_HZ) / np.log(_STEP)) + 1
+    return [
+        Swing(float(f), z) for f in np.geomspace(_LOWEST_HZ, highest_hz, count) for z in _DAMPINGS
+    ]
+
+
+class _Problem:
+    """Least squares in the inertias, for given frequencies and dampings."""
+
+    def __init__(
+        self, others: FloatArray, torque: FloatArray, acceleration: FloatArray,
+        rows: IntArray, rate: float,
+    ) -> None:  # fmt: skip
+        scale = np.maximum(np.max(np.abs(others), axis=0), 1e-12)
+        self._others, self._torque = others / scale, torque
+        self._inertia_scale = float(scale[0])
+        self._acceleration, self._rows, self._rate = acceleration, rows, rate
+        self._q = np.linalg.qr(self._others)[0]
+        self._rest = self._without_others(torque)
+
+    def _without_others(self, values: FloatArray) -> FloatArray:
+        return np.asarray(values - self._q @ (self._q.T @ values))
+
+    def _columns(self, swings: tuple[Swing, ...]) -> FloatArray:
+        lags = [lag_of_load(self._acceleration, s, self._rate)[self._rows] for s in swings]
+        return np.column_stack(lags)
+
+    def residual(self, swings: tuple[Swing, ...]) -> FloatArray:
+        """What is left of the torque [rows]."""
+        if not swings:
+            return self._rest
+        columns = self._without_others(self._columns(swings))
+        x = np.linalg.lstsq(columns, self._rest, rcond=None)[0]
+        return np.asarray(self._rest - columns @ x)
+
+    def unexplained(self, swings: tuple[Swing, ...]) -> float:
+        return float(np.sum(self.residual(swings) ** 2))
+
+    def refined(self, swings: tuple[Swing, ...], highest_hz: float) -> tuple[Swing, ...]:
+        """The nearest minimum, searched over the logarithms of frequency and damping."""
+
+        def of(q: FloatArray) -> tuple[Swing, ...]:
+            return tuple(Swing(float(f), float(z)) for f, z in np.exp(q).reshape(-1, 2))
+
+        start = np.log([(s.frequency_hz, s.damping) for s in swings]).ravel()
+        low = np.tile(np.log([0.7 * _LOWEST_HZ, _LEAST_DAMPING]), len(swings))
+        high = np.tile(np.log([1.3 * highest_hz, _MOST_DAMPING]), len(swings))
+        inside = np.clip(start, low + 1e-6, high - 1e-6)
+        size = max(float(np.sqrt(np.mean(self._rest**2))), 1e-300)
+
+        def left(q: FloatArray) -> FloatArray:
+            return np.asarray(self.residual(of(q)) / size)
+
+        best = least_squares(left, inside, bounds=(low, high), max_nfev=60)
+        return of(best.x)
+
+    def is_physical(self, swings: tuple[Swing, ...]) -> bool:
+        """Every inertia positive, and together no more than the whole."""
+        columns = self._columns(swings)
+        x = np.linalg.lstsq(np.column_stack([self._others, columns]), self._torque, rcond=None)[0]
+        whole = x[0] / self._inertia_scale
+        masses = x[self._others.shape[1] :]
+        return bool(np.all(masses > 0.0) and np.sum(masses) < 1.05 * whole)
