@@ -7,7 +7,7 @@ import pytest
 from backend.drive import Drive
 from backend.ports import Port
 from backend.units import AxisUnits, ramp_raw, read_units
-from drivers.errors import NotAllowed, OutOfRange
+from drivers.errors import NotAllowed, OutOfRange, Rejected
 from drivers.link import Found
 from profiles import load_profile
 from tests.support.memory_link import MemoryLink
@@ -53,6 +53,35 @@ async def test_other_units_are_refused(switches: dict[str, int], number: str) ->
     with pytest.raises(NotAllowed, match=number) as refusal:
         await read_units(m6l(10000, **switches))
     assert "set it back" in (refusal.value.remedy or "")
+
+
+def plain(**objects: tuple[int, int]) -> Drive:
+    """A drive that is not listed: CiA 402 without what the standard leaves to the maker."""
+    places = {"position": (0x6064, 0), "numerator": (0x6091, 1), "denominator": (0x6091, 2)}
+    link = MemoryLink(
+        {places[name]: value.to_bytes(size, "little") for name, (value, size) in objects.items()}
+    )
+    link.kind = "canopen"
+    profile = load_profile("generic402")
+    drive = Drive("n", "N axis", profile, [Port(link, 1, profile.link("canopen"))])
+    drive.found = Found(1)
+    return drive
+
+
+async def test_a_drive_without_gear_objects_counts_in_increments() -> None:
+    """6091h and 6092h are optional in CiA 402-2: their absence must not hide where the axis is."""
+    units = await read_units(plain(position=(5, 4)))
+    assert units.counts_per_rev is None
+    assert (units.names["position"], units.position(5)) == ("inc", 5)
+
+
+async def test_a_gear_that_cannot_be_read_for_another_reason_is_no_gear_of_1() -> None:
+    drive = plain(numerator=(3, 4), denominator=(1, 4))
+    link = drive.ports[0].link
+    assert isinstance(link, MemoryLink)
+    link.read_errors[0x6091, 1] = Rejected("a general error", code=0x08000000)
+    with pytest.raises(Rejected):
+        await read_units(drive)
 
 
 def test_unit_switches_make_the_units_be_read_again() -> None:
