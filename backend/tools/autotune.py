@@ -17,15 +17,13 @@ from backend.analysis.measured_plant import MeasuredPlant
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
-from backend.tools import excite, inertia_evaluation, notch_effect, sweep_evaluation
 from backend.tools import gains as gain_tool
 from backend.tools import inertia as inertia_tool
+from backend.tools import inertia_evaluation, sweep_evaluation
 from backend.tools import step_response as step_tool
 from backend.tools import sweep as sweep_tool
 from backend.tools.axis_facts import AxisFacts, read_facts
-from backend.tools.notch_in_loop import measure_meaning_in_loop
-from backend.tools.notch_meaning import NotchMeaning, meaning_of, remember
-from backend.tools.probe import PULLED, holding_torque
+from backend.tools.probe import holding_torque
 from backend.tools.recording import cycle_s
 from backend.tools.temporary import temporary
 from backend.tools.tune_apply import part
@@ -36,8 +34,9 @@ from backend.tools.tune_candidates import (
     design_for,
     plant_of,
 )
+from backend.tools.tune_notches import Learning, learn_notches
 from backend.tools.tune_present import Trials
-from backend.tools.tune_verify import Check, Keep, Verified
+from backend.tools.tune_verify import Check, Keep, Verified, otherwise
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 
@@ -150,9 +149,10 @@ async def _measured(
             part(progress, 0.3, 0.5, "3 of 6: frequency response"), keep,
         )  # fmt: skip
         _require_torque(axis, mechanics)
-        plain = await _learn_notches(
-            axis, session, settings, sweep_evaluation.completed(facts, mechanics), outcome,
-            mechanics, part(progress, 0.5, 0.6, "3 of 6: what the drive's notches do"),
+        plain = await learn_notches(
+            axis, session, Learning(settings.envelope, settings.loop, settings.scheme),
+            sweep_evaluation.completed(facts, mechanics), outcome, mechanics,
+            part(progress, 0.5, 0.6, "3 of 6: what the drive's notches do"),
         )  # fmt: skip
     return AutotuneResult(
         outcome, mechanics, "medium", (), None, None, None, {}, (), (plain,) if plain else (), False
@@ -213,61 +213,6 @@ def _require_inertia(axis: Axis, outcome: inertia_evaluation.InertiaOutcome) -> 
             f"{axis.drive.name}: the inertia cannot be identified: {outcome.result.verdict}",
             drive=axis.drive.name, remedy="widen the envelope as the text says, and try again",
         )  # fmt: skip
-
-
-async def _learn_notches(
-    axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
-    outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
-    progress: Progress,
-) -> str:  # fmt: skip
-    """Measure what no manual prints, where it is worth it: beside the loop where a load pulls.
-
-    Returns why the design goes without notches; empty where it does not.
-    """
-    if not notch_effect.unknown(axis.drive) or meaning_of(axis.drive) is not None:
-        return ""
-    if mechanics.model is None or not any(r.kind == "resonance" for r in mechanics.resonances):
-        return ""
-    found = outcome.result
-    held = abs(found.gravity_nm.value) > PULLED * facts.rated_torque_nm
-    try:
-        if held or settings.loop not in ("auto", "none"):
-            meaning = await measure_meaning_in_loop(
-                axis, session, settings.envelope, facts, mechanics, found.inertia_kgm2.value,
-                progress,
-            )  # fmt: skip
-        else:
-            meaning = await _learn_free(
-                axis, session, settings, facts, outcome, mechanics, progress
-            )
-    except NotAllowed as error:
-        if await axis.state() in (State.FAULT, State.FAULT_REACTION):
-            raise
-        return f"designed without notches: {error.message}"
-    remember(axis.drive, meaning)
-    return ""
-
-
-async def _learn_free(
-    axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
-    outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
-    progress: Progress,
-) -> NotchMeaning:  # fmt: skip
-    """On an axis that no load pulls, without a loop."""
-    envelope: Envelope | None = settings.envelope
-    still = settings.scheme != "free"
-    if still:
-        at_rev = (await axis.units()).position(await axis.position_raw())
-        envelope = notch_effect.room_to_tremble(settings.envelope, at_rev, outcome.ends_rev)
-    if envelope is None:
-        raise NotAllowed("it stands too near to an end to measure what its notches do")
-    found = outcome.result
-    rigid = excite.Rigid(found.inertia_kgm2.value, found.coulomb_nm.value)
-    rate = 1.0 / cycle_s(session)
-    path = notch_effect.path_of(rate, facts, mechanics.hold, mechanics.delay_s)
-    return await notch_effect.measure_meaning(
-        axis, session, envelope, facts, rigid, path, progress, still=still
-    )
 
 
 def _sweep_settings(
@@ -352,9 +297,9 @@ async def apply_and_verify(
             remedy="all parameters are as before; look for play and loose parts, measure again, "
             "or choose gains by hand",
         )
-    notes = found.notes if applied.verified.sweep.margins else (*found.notes, _BY_STEP)
-    if said := trials.note(applied):
-        notes += (said,)
+    by_step = "" if applied.verified.sweep.margins else _BY_STEP
+    said = (by_step, trials.note(applied), otherwise(applied.verified))
+    notes = (*found.notes, *(each for each in said if each))
     return replace(
         found, applied=applied.candidate, verified=applied.verified, step=applied.verified.step,
         before=applied.before, tried=tuple(trials.tried), notes=notes,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 
 from backend.analysis.design import Candidate
@@ -13,9 +13,14 @@ from backend.jobs import Progress
 from backend.restoring import CLEANUP_TIMEOUT_S, shielded
 from backend.tools.temporary import put_back, write_settings
 from backend.tools.tune_candidates import plan
-from backend.tools.tune_verify import Check, Keep, Verified, verify
+from backend.tools.tune_verify import HUM_PERCENT, Check, Keep, Verified, verify
 from drivers.cia402 import State
 from drivers.errors import DriveError
+
+#: A candidate with this share of its gain; None where that keeps no margins.
+Softer = Callable[[Candidate, float], Awaitable[Candidate | None]]
+#: So often a candidate that hums is made softer, and to this share of the hum that is permitted.
+_SOFTENED, _QUIETER = 2, 0.85
 
 
 @dataclass(frozen=True)
@@ -30,17 +35,21 @@ class Applied:
 async def first_kept(
     axis: Axis, session: CyclicSession, check: Check, candidates: Sequence[Candidate],
     promised: Goals, tried: list[str], progress: Progress, keep: Keep | None,
+    softer: Softer | None = None,
 ) -> Applied | None:  # fmt: skip
     """The first candidate that keeps its promise stays written; ``tried`` says why others do not.
 
     ``candidates`` are tried in their order; what is ``promised`` is what was asked for, which a
-    more careful one may keep where it does not reach its own goals.
+    more careful one may keep where it does not reach its own goals. One that only hums is tried
+    again with less gain, as ``softer`` makes it, before a slower one is.
 
     Raises:
         DriveError: the drive has a fault, or the link is lost; nothing stays written.
     """
     told = stages(progress)
-    for candidate in candidates:
+    waiting, softened = list(candidates), 0
+    while waiting:
+        candidate = waiting.pop(0)
         progress(0.65, "5 of 6: applying")
         raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
         earlier = {key: await axis.drive.raw(key) for key in raw}
@@ -62,7 +71,20 @@ async def first_kept(
                 return Applied(candidate, verified, before)
             tried.append(verified.why)
             await take_back(axis, before)
+        if softer is not None and verified.hum_percent is not None and softened < _SOFTENED:
+            softened += 1
+            # A sensor's noise comes back as torque by the gain.
+            less = await softer(candidate, _QUIETER * HUM_PERCENT / verified.hum_percent)
+            if less is not None:
+                waiting = _in_turn(waiting, candidate, less)
     return None
+
+
+def _in_turn(waiting: Sequence[Candidate], hummed: Candidate, less: Candidate) -> list[Candidate]:
+    """With ``less`` before what is slower; what has more gain and the same filters would hum."""
+    gain = less.gains.speed_nms
+    faster = [c for c in waiting if c.gains.speed_nms >= gain and c.filters != hummed.filters]
+    return [*faster, less, *(c for c in waiting if c.gains.speed_nms < gain)]
 
 
 def stages(progress: Progress) -> tuple[Progress, Progress, Progress]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from backend.analysis.design import Candidate, described
 from backend.analysis.loop_goals import Goals, stable_with_less_gain, worst_of
 from backend.analysis.loop_structure import Gains, LoopFilters, speed_loop
 from backend.analysis.measured_plant import MeasuredPlant
+from backend.analysis.notch import Notch
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
@@ -65,7 +66,7 @@ class Present:
             why = "it keeps too little margin for what the axis may be"
         if tried:
             why = "it did not keep the promise when it was verified"
-        return f"slower than it was, by {share:.0%} of the speed gain that it had: {why}"
+        return f"slower than it was, with {share:.0%} of the speed gain that it had: {why}"
 
 
 async def present(
@@ -94,24 +95,35 @@ async def present(
         now.speed_nms, now.integral_hz or 0.0, now.position_1_s or 0.0,
         now.speed_nms / (_TURN * inertia_kgm2),
     )  # fmt: skip
-    f = plant.frequency_hz
     try:
-        fixed = gain_tool.loops_of(drive, facts).response(f)
-        fixed = fixed * notch_tool.combined(drive.profile, notches, f, meaning_of(drive))
+        candidate, sound = await asyncio.to_thread(
+            _judged, axis, facts, plant, gains, tuple(notches),
+            LoopFilters(facts.speed_filter_hz, facts.torque_filter_hz), goals,
+        )  # fmt: skip
     except (NotAllowed, ValueError):
         return told
+    return Present(now.speed_nms, candidate, sound)
 
-    def judged() -> Present:
-        loops = speed_loop(f, plant.shifted(), fixed, gains)
-        worst = worst_of(loops)
-        candidate = described(
-            f, plant.response(), fixed, gains, worst.promised, notches=tuple(notches),
-            filters=LoopFilters(facts.speed_filter_hz, facts.torque_filter_hz),
-        )  # fmt: skip
-        sound = worst.meets(goals) and stable_with_less_gain(loops)
-        return Present(now.speed_nms, candidate, sound)
 
-    return await asyncio.to_thread(judged)
+def _judged(
+    axis: Axis, facts: AxisFacts, plant: MeasuredPlant, gains: Gains, notches: tuple[Notch, ...],
+    filters: LoopFilters, goals: Goals,
+) -> tuple[Candidate, bool]:  # fmt: skip
+    """A loop as a design, and whether it keeps the goals for all that the axis may be.
+
+    Raises:
+        NotAllowed, ValueError: a part of the loop has no known meaning.
+    """
+    drive, f = axis.drive, plant.frequency_hz
+    fixed = gain_tool.loops_of(drive, facts).with_filters(filters).response(f)
+    if notches:
+        fixed = fixed * notch_tool.combined(drive.profile, notches, f, meaning_of(drive))
+    loops = speed_loop(f, plant.shifted(), fixed, gains)
+    worst = worst_of(loops)
+    candidate = described(
+        f, plant.response(), fixed, gains, worst.promised, notches=notches, filters=filters
+    )
+    return candidate, worst.meets(goals) and stable_with_less_gain(loops)
 
 
 @dataclass
@@ -139,15 +151,27 @@ class Trials:
         check = self.check
         self.had = await present(self.axis, check.facts, plant, check.inertia_kgm2, self.promised)
         slower = [c for c in order if self.had.slower(c)]
-        applied = await self._designs([c for c in order if c not in slower])
+        applied = await self._designs([c for c in order if c not in slower], plant)
         if applied is None and slower and self.had.sound and not self.had_failed:
             applied = await self._as_it_was()
-        return applied or await self._designs(slower)
+        return applied or await self._designs(slower, plant)
 
-    async def _designs(self, rows: Sequence[Candidate]) -> Applied | None:
+    async def _designs(self, rows: Sequence[Candidate], plant: MeasuredPlant) -> Applied | None:
+        async def softer(candidate: Candidate, share: float) -> Candidate | None:
+            g = candidate.gains
+            gains = Gains(
+                share * g.speed_nms, share * g.integral_hz, share * g.position_1_s,
+                share * g.speed_bandwidth_hz,
+            )  # fmt: skip
+            made, sound = await asyncio.to_thread(
+                _judged, self.axis, self.check.facts, plant, gains, candidate.notches,
+                candidate.filters, self.promised,
+            )  # fmt: skip
+            return replace(made, marks=candidate.marks) if sound else None
+
         return await first_kept(
             self.axis, self.session, self.check, rows, self.promised, self.tried, self.progress,
-            self.keep,
+            self.keep, softer,
         )  # fmt: skip
 
     async def _as_it_was(self) -> Applied | None:

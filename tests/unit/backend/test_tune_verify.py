@@ -11,7 +11,7 @@ from backend.analysis.frf import Frf
 from backend.analysis.loop_goals import Goals
 from backend.tools.step_response import LEAD_S, StepResult
 from backend.tools.sweep_evaluation import SweepResult
-from backend.tools.tune_verify import hum, sharp_margins, worse_than
+from backend.tools.tune_verify import Verified, hum, otherwise, sharp_margins, worse_than
 
 PROMISED = Goals(gain_margin_db=9.0, phase_margin_deg=48.0, ms=1.8)
 
@@ -80,3 +80,16 @@ def test_a_loop_that_is_seen_above_its_crossover_only_tells_no_margins(from_hz: 
     swept = loop_swept(1.0)
     blurred = np.where(swept.frf.frequency_hz < from_hz, 10.0, 1.0)
     assert sharp_margins(replace(swept, frf=replace(swept.frf, std_deg=blurred))) == {}
+
+
+@pytest.mark.parametrize(
+    ("predicted_hz", "measured_hz", "told"),
+    [(152.0, 135.0, True), (100.0, 112.0, True), (152.0, 140.0, False), (None, 140.0, False),
+     (152.0, None, False)],
+)  # fmt: skip
+def test_a_bandwidth_that_is_not_as_predicted_is_told(
+    predicted_hz: float | None, measured_hz: float | None, told: bool
+) -> None:
+    """The aim is 10 % (tuning.md, section 5)."""
+    verified = Verified(loop_swept(1.0), None, PROMISED, predicted_hz, measured_hz, True, "")
+    assert bool(otherwise(verified)) is told

@@ -1,0 +1,79 @@
+"""What a drive's notches do, where no manual prints it: learned on the way to a design."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from backend.axis import Axis, Envelope
+from backend.cyclic import CyclicSession
+from backend.jobs import Progress
+from backend.tools import excite, inertia_evaluation, notch_effect, sweep_evaluation
+from backend.tools.axis_facts import AxisFacts
+from backend.tools.notch_in_loop import measure_meaning_in_loop
+from backend.tools.notch_meaning import NotchMeaning, meaning_of, remember
+from backend.tools.probe import PULLED
+from backend.tools.recording import cycle_s
+from drivers.cia402 import State
+from drivers.errors import NotAllowed
+
+
+@dataclass(frozen=True)
+class Learning:
+    """What the user permits: the envelope, which loop, and how the axis may travel."""
+
+    envelope: Envelope
+    loop: sweep_evaluation.Loop
+    scheme: inertia_evaluation.Scheme
+
+
+async def learn_notches(
+    axis: Axis, session: CyclicSession, how: Learning, facts: AxisFacts,
+    outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
+    progress: Progress,
+) -> str:  # fmt: skip
+    """Measure what no manual prints, where it is worth it: beside the loop where a load pulls.
+
+    Returns why the design goes without notches; empty where it does not.
+    """
+    if not notch_effect.unknown(axis.drive) or meaning_of(axis.drive) is not None:
+        return ""
+    if mechanics.model is None or not any(r.kind == "resonance" for r in mechanics.resonances):
+        return ""
+    found = outcome.result
+    held = abs(found.gravity_nm.value) > PULLED * facts.rated_torque_nm
+    try:
+        if held or how.loop not in ("auto", "none"):
+            meaning = await measure_meaning_in_loop(
+                axis, session, how.envelope, facts, mechanics, found.inertia_kgm2.value,
+                progress,
+            )  # fmt: skip
+        else:
+            meaning = await _learn_free(axis, session, how, facts, outcome, mechanics, progress)
+    except NotAllowed as error:
+        if await axis.state() in (State.FAULT, State.FAULT_REACTION):
+            raise
+        return f"designed without notches: {error.message}"
+    remember(axis.drive, meaning)
+    return ""
+
+
+async def _learn_free(
+    axis: Axis, session: CyclicSession, how: Learning, facts: AxisFacts,
+    outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
+    progress: Progress,
+) -> NotchMeaning:  # fmt: skip
+    """On an axis that no load pulls, without a loop."""
+    envelope: Envelope | None = how.envelope
+    still = how.scheme != "free"
+    if still:
+        at_rev = (await axis.units()).position(await axis.position_raw())
+        envelope = notch_effect.room_to_tremble(how.envelope, at_rev, outcome.ends_rev)
+    if envelope is None:
+        raise NotAllowed("it stands too near to an end to measure what its notches do")
+    found = outcome.result
+    rigid = excite.Rigid(found.inertia_kgm2.value, found.coulomb_nm.value)
+    rate = 1.0 / cycle_s(session)
+    path = notch_effect.path_of(rate, facts, mechanics.hold, mechanics.delay_s)
+    return await notch_effect.measure_meaning(
+        axis, session, envelope, facts, rigid, path, progress, still=still
+    )

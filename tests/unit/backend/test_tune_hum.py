@@ -1,0 +1,89 @@
+"""A design that only hums is tried again with less gain before a much slower one is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from backend.analysis.design import Candidate
+from backend.analysis.loop_goals import Goals
+from backend.analysis.loop_structure import Gains, LoopFilters
+from backend.analysis.margins import Margins
+from backend.jobs import Progress
+from backend.tools import tune_apply
+
+GOALS = Goals(9.0, 48.0, 1.8)
+#: More gain than this makes the torque hum with more than 4 % of the rated.
+QUIET_NMS = 6.0
+
+
+def design(speed_nms: float, speed_filter_hz: float = 1000.0) -> Candidate:
+    nominal = Margins(50.0, 60.0, 50.0, 12.0, 300.0, 1.5, 100.0, stable=True)
+    return Candidate(
+        (), Gains(speed_nms, 5.0, 20.0, 50.0), 60.0, 10.0, nominal, GOALS, 0.0, 5.0, 0.1,
+        filters=LoopFilters(speed_filter_hz),
+    )  # fmt: skip
+
+
+async def kept_of(
+    monkeypatch: pytest.MonkeyPatch, rows: list[Candidate], *, soft: bool = True
+) -> tuple[list[float], float | None]:
+    """The speed gains that were verified, in turn, and the one that stayed."""
+    seen: list[float] = []
+
+    async def verify(_axis: Any, _session: Any, _check: Any, candidate: Candidate, *_: Any) -> Any:
+        gain = candidate.gains.speed_nms
+        seen.append(gain)
+        kept = gain <= QUIET_NMS
+        hum = None if kept else 4.0 * gain / QUIET_NMS
+        return SimpleNamespace(kept=kept, why="" if kept else "hums", hum_percent=hum)
+
+    async def softer(candidate: Candidate, share: float) -> Candidate | None:
+        gains = replace(candidate.gains, speed_nms=share * candidate.gains.speed_nms)
+        return replace(candidate, gains=gains) if soft else None
+
+    async def nothing(*_: Any) -> dict[str, int]:
+        return {}
+
+    @contextmanager
+    def lent(_earlier: dict[str, int]) -> Iterator[None]:
+        yield
+
+    for name in ("plan", "write_settings", "put_back"):
+        monkeypatch.setattr(tune_apply, name, nothing)
+    monkeypatch.setattr(tune_apply, "verify", verify)
+    axis: Any = SimpleNamespace(drive=SimpleNamespace(name="X", owed=SimpleNamespace(lent=lent)))
+    check: Any = SimpleNamespace(inertia_kgm2=1e-4, motor_inertia_kgm2=None)
+    tried: list[str] = []
+    session: Any = None
+    applied = await tune_apply.first_kept(
+        axis, session, check, rows, GOALS, tried, Progress(lambda: None), None, softer
+    )
+    assert tried == ["hums"] * (len(seen) - (applied is not None))
+    return seen, None if applied is None else applied.candidate.gains.speed_nms
+
+
+async def test_a_hum_costs_as_much_gain_as_it_must(monkeypatch: pytest.MonkeyPatch) -> None:
+    # 0.85 of the gain at which the hum, which goes by the gain, would be at its limit.
+    seen, kept = await kept_of(monkeypatch, [design(10.0), design(8.0), design(2.0)])
+    assert kept == pytest.approx(0.85 * QUIET_NMS)
+    # With the same filters 8 Nms would hum, too, and is not tried.
+    assert seen == [10.0, pytest.approx(0.85 * QUIET_NMS)]
+
+
+async def test_other_filters_may_be_quiet_with_more_gain(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen, kept = await kept_of(monkeypatch, [design(10.0), design(5.5, 500.0), design(2.0)])
+    assert kept == 5.5
+    assert seen == [10.0, 5.5]
+
+
+async def test_where_less_gain_keeps_no_margins_the_next_design_is_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen, kept = await kept_of(monkeypatch, [design(10.0), design(2.0)], soft=False)
+    assert (seen, kept) == ([10.0, 2.0], 2.0)
