@@ -59,6 +59,8 @@ class ParameterSet:
     vendor_id: int | None = None
     product_code: int | None = None
     revision: int | None = None
+    not_read: tuple[str, ...] = ()
+    """Keys of settings that could not be read when the file was made."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,7 @@ def storable(profile: Profile, *, motor_individual: bool) -> list[Parameter]:
 def dump(
     drive: Drive, readings: Iterable[Reading], *, author: str, notes: str, saved: datetime
 ) -> bytes:
-    """The file of these readings; those that failed are left out and named in a comment."""
+    """The file of these readings; those that failed are left out and named at its end."""
     profile, found = drive.profile, drive.found
     lines = [
         f"# {FORMAT}; see docs/parameter-sets.md. Values are written from `raw`;",
@@ -129,10 +131,13 @@ def dump(
     ]
     count = 0
     group = None
+    not_read = []
     for reading in readings:
         parameter = drive.parameter(reading.key)
         if reading.raw is None:
             lines.append(f"# {reading.key} {parameter.name}: not read: {_comment(reading.error)}")
+            if not reading.unused:
+                not_read.append(reading.key)
             continue
         if parameter.group != group:
             group = parameter.group
@@ -142,8 +147,10 @@ def dump(
             lines += [f"value = {_raw(reading.value)}", f"unit = {_text(parameter.unit)}"]
         lines.append(f"name = {_text(parameter.name)}")
         count += 1
-    lines += ["", "[end]", f"parameters = {count}", ""]
-    return "\n".join(lines).encode()
+    lines += ["", "[end]", f"parameters = {count}"]
+    if not_read:
+        lines.append(f"not_read = [{', '.join(map(_text, not_read))}]")
+    return "\n".join([*lines, ""]).encode()
 
 
 def parse(data: bytes, name: str = "the file") -> ParameterSet:
@@ -188,7 +195,13 @@ def parse(data: bytes, name: str = "the file") -> ParameterSet:
         vendor_id=_number(identity, "vendor_id"),
         product_code=_number(identity, "product_code"),
         revision=_number(identity, "revision"),
+        not_read=_keys(content["end"], "not_read"),
     )
+
+
+def _keys(table: object, field: str) -> tuple[str, ...]:
+    value = table.get(field) if isinstance(table, dict) else None
+    return tuple(map(str, value)) if isinstance(value, list) else ()
 
 
 def _number(table: dict[str, Any], field: str) -> int | None:

@@ -56,7 +56,12 @@ async def save_set(bench: TheBench, member: Controlled, request: SaveSetRequest)
         motor_individual=request.include_motor_individual,
         overwrite=request.overwrite,
     )
-    bench.journal.add(f"{member.drive.name}: saved {name}", drive=member.drive.id)
+    missing = parameters.without((await _parsed(bench, name)).not_read)
+    bench.journal.add(
+        f"{member.drive.name}: saved {name}{missing}",
+        level="warning" if missing else "info",
+        drive=member.drive.id,
+    )
     return await _info(bench, name)
 
 

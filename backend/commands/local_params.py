@@ -46,9 +46,9 @@ async def dump(
 ) -> None:
     """Read all settings and write them as a parameter set."""
     async with drive_at(place.url, place.station, place.profile) as drive:
-        wanted = parameter_set.storable(drive.profile, motor_individual=motor_individual)
-        keys = [p.key for p in wanted if not drive.unreachable_why(p)]
-        readings = await drive.read_many(keys, show_progress)
+        readings = await parameters.read_settings(
+            drive, motor_individual=motor_individual, progress=show_progress
+        )
         data = parameter_set.dump(
             drive, readings.values(), author=author, notes=notes, saved=datetime.now(UTC)
         )
@@ -57,6 +57,7 @@ async def dump(
     else:
         write_atomically(out, data)
         print(f"{out}: {sum(r.raw is not None for r in readings.values())} parameters")
+    values.tell_missing(data)
 
 
 async def save(place: Place) -> None:

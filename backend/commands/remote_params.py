@@ -60,9 +60,10 @@ async def dump(
         data = (await at.raw("GET", f"/sets/{quote(kept.file)}")).content
     if out is None:
         sys.stdout.write(data.decode())
-        return
-    write_atomically(out, data)
-    print(f"{out}: also kept by the server as {kept.file}")
+    else:
+        write_atomically(out, data)
+        print(f"{out}: also kept by the server as {kept.file}")
+    values.tell_missing(data)
 
 
 async def diff(place: Place, file: Path, *, as_json: bool) -> bool:

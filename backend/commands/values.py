@@ -10,8 +10,17 @@ from typing import NamedTuple, Protocol, TypeVar
 
 import typer
 
+from backend import parameter_set
+from backend.tools.parameters import without
 from drivers.errors import NotAllowed
 from profiles.schema import Raw
+
+
+def tell_missing(data: bytes) -> None:
+    """Say on standard error which settings a set that was just made lacks."""
+    missing = without(parameter_set.parse(data).not_read)
+    if missing:
+        typer.echo(f"the set is{missing}", err=True)
 
 
 class Described(Protocol):

@@ -13,12 +13,15 @@ from backend.jobs import JobResult
 from backend.library import SetStore
 from backend.library.identity import doubts
 from backend.parameter_set import ParameterSet
+from backend.readings import Reading
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
 from drivers.link import Progress
 from profiles.schema import Raw
 
 #: Tag of the sets that are made before something is loaded.
 UNDO = "undo"
+#: As many of the settings that a set lacks are named.
+_NAMED = 5
 
 
 def readable_keys(drive: Drive) -> list[str]:
@@ -41,6 +44,35 @@ async def read_all(drive: Drive, keys: Sequence[str] | None, progress: Progress)
     return {"read": read, "failed": failed}
 
 
+async def read_settings(
+    drive: Drive, *, motor_individual: bool, progress: Progress | None = None
+) -> dict[str, Reading]:
+    """Everything that belongs in a parameter set, as it is now.
+
+    Raises:
+        LinkTimeout: not one could be read. LinkLost: the bus is gone.
+    """
+    wanted = parameter_set.storable(drive.profile, motor_individual=motor_individual)
+    keys = [p.key for p in wanted if not drive.unreachable_why(p)]
+    readings = await drive.read_many(keys, progress)
+    if all(r.raw is None for r in readings.values()):
+        raise LinkTimeout(
+            f"{drive.name}: no parameter could be read, so nothing was saved",
+            drive=drive.name,
+            remedy="check the connection",
+        )
+    return readings
+
+
+def without(keys: Sequence[str]) -> str:
+    """What a set lacks, in words to be added to a sentence; empty where it lacks nothing."""
+    if not keys:
+        return ""
+    named = ", ".join(keys[:_NAMED]) + (" …" if len(keys) > _NAMED else "")
+    plural = "s" if len(keys) > 1 else ""
+    return f" without {len(keys)} setting{plural} that could not be read ({named})"
+
+
 async def save_set(
     drive: Drive,
     library: SetStore,
@@ -57,15 +89,7 @@ async def save_set(
     Raises:
         NotAllowed: the name is taken. StorageFailed: disk. LinkLost: the bus is gone.
     """
-    wanted = parameter_set.storable(drive.profile, motor_individual=motor_individual)
-    keys = [p.key for p in wanted if not drive.unreachable_why(p)]
-    readings = await drive.read_many(keys, progress)
-    if all(r.raw is None for r in readings.values()):
-        raise LinkTimeout(
-            f"{drive.name}: no parameter could be read, so nothing was saved",
-            drive=drive.name,
-            remedy="check the connection",
-        )
+    readings = await read_settings(drive, motor_individual=motor_individual, progress=progress)
     data = parameter_set.dump(
         drive, readings.values(), author=author, notes=notes, saved=datetime.now(UTC)
     )

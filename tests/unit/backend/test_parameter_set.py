@@ -14,7 +14,7 @@ from backend.drive import Drive
 from backend.library import SetLibrary
 from backend.parameter_set import BadSet
 from backend.tools import parameters
-from drivers.errors import LinkLost, NotAllowed, OutOfRange
+from drivers.errors import LinkLost, LinkTimeout, NotAllowed, OutOfRange, Rejected
 from drivers.link import Address
 from tests.support.memory_link import MemoryLink
 
@@ -70,6 +70,28 @@ async def test_a_load_that_the_link_ends_says_how_far_it_came_and_how_to_take_it
     name = told.value.message.split("“")[1].removesuffix("”")
     undo = library.load(name)
     assert {row.key: row.raw for row in undo.rows} == {"2005:03": 400, "2005:10": 0}
+
+
+async def test_a_set_names_what_it_lacks(drive: Drive, link: MemoryLink, tmp_path: Path) -> None:
+    assert parameter_set.parse(await written(drive)).not_read == ()
+    link.read_errors[0x2005, 3] = Rejected("a general error", code=0x08000000)
+    library = SetLibrary(tmp_path)
+    name = await parameters.save_set(
+        drive, library, "partial", author="", notes="", motor_individual=False, overwrite=False
+    )
+    stored = library.load(name)
+    assert stored.not_read == ("2005:03",)
+    assert {row.key for row in stored.rows} == {"2005:10", "2100:00"}
+    words = parameters.without(stored.not_read)
+    assert words == " without 1 setting that could not be read (2005:03)"
+    assert "…" in parameters.without([*"abcdef"])
+    assert parameters.without(()) == ""
+
+
+async def test_a_set_of_nothing_is_not_made(drive: Drive, link: MemoryLink, tmp_path: Path) -> None:
+    link.objects.clear()
+    with pytest.raises(LinkTimeout, match="no parameter could be read"):
+        await parameters.read_settings(drive, motor_individual=False)
 
 
 async def test_every_truncation_is_noticed(drive: Drive) -> None:
