@@ -39,6 +39,23 @@ EXCEPTION_TEXTS: dict[int, str] = {
     11: "the drive behind the gateway does not answer",
 }
 
+#: The drive could not do it now and did nothing: to be asked again later (V1.1b3 clause 7).
+BUSY = 6
+#: What to do about an exception code.
+EXCEPTION_REMEDIES: dict[int, str] = {
+    1: "this drive or firmware may speak another dialect: check that the profile fits the drive",
+    2: "this model or firmware may not have it: compare with the drive's manual",
+    3: "choose one of the values in the help text",
+    4: "disable the drive or leave its own panel, check that the parameter is not write-protected, "
+    "and try again",
+    5: "wait, then read the value back before writing again",
+    6: "nothing was done: wait a moment and try again",
+    8: "switch the drive off and on; if it comes back, the drive needs service",
+    10: "check how the gateway is set up",
+    11: "check the drive's supply and wiring behind the gateway",
+}
+UNKNOWN_EXCEPTION_REMEDY = "look the code up in the drive's manual"
+
 
 def _crc_table() -> tuple[int, ...]:
     table = []

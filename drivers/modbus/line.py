@@ -18,8 +18,10 @@ from typing import NoReturn
 from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError, Rejected
 from drivers.link import LinkQuality
 from drivers.modbus.framing import (
+    EXCEPTION_REMEDIES,
     EXCEPTION_TEXTS,
     READ,
+    UNKNOWN_EXCEPTION_REMEDY,
     Answer,
     Query,
     find_answer,
@@ -253,7 +255,11 @@ class Line:
         if code is not None:
             counters.refusals += 1
             text = EXCEPTION_TEXTS.get(code, "the drive refused for a reason Modbus does not name")
-            raise Rejected(f"station {query.station}: {text} (exception {code})", code=code)
+            raise Rejected(
+                f"station {query.station}: {text} (exception {code})",
+                code=code,
+                remedy=EXCEPTION_REMEDIES.get(code, UNKNOWN_EXCEPTION_REMEDY),
+            )
         late.answered(query)
         return answer.frame
 

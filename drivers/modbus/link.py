@@ -32,6 +32,7 @@ from drivers.link import (
     Progress,
     Unsubscribe,
 )
+from drivers.modbus.framing import BUSY
 from drivers.modbus.layout import Layout, TableLayout
 from drivers.modbus.line import Line
 from drivers.modbus.port import LineSettings
@@ -49,6 +50,8 @@ T = TypeVar("T")
 
 #: A job on the bus's thread gives way to others after this time (and always after a failure).
 _TURN_S = 0.005
+#: A drive that says that it is busy is asked again after this time, then after twice as long.
+_BUSY_S = 0.05
 _REOPEN_S = 0.25
 _STATIONS = range(1, 248)
 _ASKED_AGAIN = 4
@@ -73,6 +76,8 @@ class _Batch:
     todo: deque[tuple[Block, int]]
     results: list[bytes | DriveError | None]
     silent_blocks: int = 0
+    wait_s: float = 0.0
+    """Before its next turn: the drive said that it is busy."""
 
 
 class RegisterLink:
@@ -190,7 +195,8 @@ class RegisterLink:
     ) -> list[bytes | DriveError]:
         """Read several values, neighbours in one request where the layout allows it.
 
-        Only reads are repeated (``retries`` of the settings). After two values without any
+        Only reads are repeated (``retries`` of the settings), also where the drive says that it is
+        busy, which leaves the line to others meanwhile. After two values without any
         answer the rest fails at once instead of waiting for each.
         """
         plan = self._plan(station, tuple(addresses))
@@ -200,6 +206,8 @@ class RegisterLink:
         batch = _Batch(plan, deque((block, 0) for block in plan.blocks), results)
         while batch.todo:
             await self._run(partial(self._read_turn, station, batch))
+            if batch.wait_s:
+                await asyncio.sleep(batch.wait_s)
         return [_decided(result) for result in results]
 
     async def write(self, station: int, address: Address, data: bytes) -> None:
@@ -229,6 +237,7 @@ class RegisterLink:
     def _read_turn(self, station: int, batch: _Batch) -> None:
         """Work on a batch until its turn is over; a failure ends the turn."""
         end = time.monotonic() + _TURN_S
+        batch.wait_s = 0.0
         while batch.todo:
             block, attempt = batch.todo.popleft()
             try:
@@ -254,7 +263,13 @@ class RegisterLink:
     def _failed_block(
         self, station: int, batch: _Batch, block: Block, attempt: int, error: DriveError
     ) -> None:
-        if isinstance(error, Rejected) and len(block.items) > 1:
+        busy = isinstance(error, Rejected) and error.code == BUSY
+        if busy and attempt < self._settings.retries:
+            self._line.count_retry(station)
+            batch.wait_s = _BUSY_S * 2**attempt
+            batch.todo.appendleft((block, attempt + 1))
+            return
+        if isinstance(error, Rejected) and not busy and len(block.items) > 1:
             # One register in it is refused: ask one by one, now and from now on.
             self._refused_blocks.add((station, block.start, block.count))
             self._plans.clear()

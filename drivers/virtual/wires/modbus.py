@@ -158,13 +158,14 @@ class Trouble:
     """What goes wrong with one answer.
 
     ``seconds`` is the delay of ``delay``; ``data`` the bytes of ``noise`` before the answer;
-    ``keep`` how many bytes of a truncated answer are sent.
+    ``keep`` how many bytes of a truncated answer are sent; ``code`` the exception of ``refuse``.
     """
 
-    kind: Literal["drop", "delay", "truncate", "corrupt", "double", "noise"]
+    kind: Literal["drop", "delay", "truncate", "corrupt", "double", "noise", "refuse"]
     seconds: float = 0.0
     data: bytes = b"\x00\xff\x55"
     keep: int = 3
+    code: int = 6
 
 
 class ModbusSlave:
@@ -286,6 +287,8 @@ class ModbusSlave:
             frame = frame + frame
         elif trouble.kind == "noise":
             frame = trouble.data + frame
+        elif trouble.kind == "refuse":
+            frame = exception_response(frame[0], frame[1], trouble.code)
         self.wire.write(frame)
 
 

@@ -12,6 +12,7 @@ from drivers.link import Address, Found
 from drivers.modbus.framing import EXCEPTION_TEXTS
 from drivers.modbus.layout import TableLayout
 from drivers.modbus.link import RegisterLink, _again
+from drivers.virtual.wires.modbus import Trouble
 from profiles.schema import DataType
 
 from .conftest import OpenLink
@@ -136,3 +137,24 @@ def test_copied_errors_keep_what_they_say(error: DriveError) -> None:
 def test_default_block_is_the_standards_longest() -> None:
     # V1.1b3 clause 6.3: at most 125 registers.
     assert TableLayout().limits(1).max_registers == 125
+
+
+async def test_a_busy_drive_is_asked_again(port: Path, opened: OpenLink) -> None:
+    """Exception 6: engaged for now, to be asked later (V1.1b3 clause 7); a block stays a block."""
+    shelf = shelf_with({r: r for r in range(0x30, 0x40)})
+    with serving(port, {1: shelf}, by_table=True) as slave:
+        link = await opened(f"modbus://{port}?silence_us=0")
+        slave.trouble(Trouble("refuse"), Trouble("refuse"))
+        addresses = [register(r) for r in (0x30, 0x31, 0x32)]
+        assert await link.read_many(1, addresses) == [b"\x30\0", b"\x31\0", b"\x32\0"]
+        assert slave.requests == 3
+        assert await link.read_many(1, addresses) == [b"\x30\0", b"\x31\0", b"\x32\0"]
+        assert slave.requests == 4
+        slave.trouble(*[Trouble("refuse")] * 3)
+        with pytest.raises(Rejected, match="busy") as caught:
+            await link.read(1, register(0x30))
+        assert "try again" in (caught.value.remedy or "")
+        slave.trouble(Trouble("refuse"))
+        with pytest.raises(Rejected, match="busy"):
+            await link.write(1, register(0x30), b"\x01\0")
+        assert slave.requests == 8  # a write is never repeated

@@ -6,6 +6,7 @@ import pytest
 
 from drivers.errors import LinkLost, LinkTimeout, ProtocolError, Rejected
 from drivers.modbus.framing import (
+    EXCEPTION_TEXTS,
     exception_response,
     read_query,
     read_response,
@@ -291,6 +292,15 @@ def test_exception_becomes_words() -> None:
     with pytest.raises(Rejected, match="no such register") as caught:
         line_on(port).read(1, 0, 1)
     assert caught.value.code == 2
+    assert "manual" in (caught.value.remedy or "")
+
+
+@pytest.mark.parametrize("code", [*EXCEPTION_TEXTS, 0x55])
+def test_every_exception_says_what_to_do(code: int) -> None:
+    port = ScriptedPort([(0.001, exception_response(1, 3, code))])
+    with pytest.raises(Rejected) as caught:
+        line_on(port).read(1, 0, 1)
+    assert caught.value.remedy
 
 
 def test_damaged_answer_to_a_write_leaves_it_unknown() -> None:
