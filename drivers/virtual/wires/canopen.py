@@ -31,6 +31,8 @@ _HEARTBEAT_LOST = 0x8130
 _PDO_TOO_SHORT = 0x8210
 _SERVO_DEVICE_TYPE = 0x00020192
 _HISTORY = 8
+#: Bits of the error register (CiA 301 clause 7.5.2.2): any error, and an error of communication.
+_COMMUNICATION_ERROR = 0x11
 
 
 class CanopenNode:
@@ -60,7 +62,7 @@ class CanopenNode:
         self._answers_due_ns = 0
         self._delays: list[int] = []
         self._guard_toggle = 0
-        self._error_register = 0
+        self._own_errors: set[int] = set()
         self._history: list[int] = []
         self._heartbeat_due_ns = 0
         self._master_seen_ns: int | None = None
@@ -68,7 +70,6 @@ class CanopenNode:
         self._pending: dict[int, bytes] = {}
         self._sent: dict[int, tuple[int, bytes]] = {}
         self._was_powered = False
-        self._error_told = False
 
     def delay_answers(self, seconds: float, count: int = 1) -> None:
         """The next ``count`` SDO answers come that late, in order as from a slow drive."""
@@ -98,6 +99,7 @@ class CanopenNode:
         elif frame.cob_id >> 7 == 0x0E and not frame.remote:
             if frame.cob_id & 0x7F == self._objects.consumer >> 16 & 0x7F:
                 self._master_seen_ns = now
+                self._clear_own(_HEARTBEAT_LOST, now)
         else:
             self._take_pdo(frame, now)
 
@@ -147,6 +149,8 @@ class CanopenNode:
         self._syncs = 0
         self._pending.clear()
         self._sent.clear()
+        self._own_errors.clear()
+        self._server.reset()
         self.state = _PREOPERATIONAL
         self._say(frames.HEARTBEAT + self.node_id, b"\0", now)
 
@@ -165,6 +169,9 @@ class CanopenNode:
             self.state = _PREOPERATIONAL
 
     def _guard(self, now: int) -> None:
+        if self._objects.heartbeat_ms:
+            # One node uses one of the two, and the heartbeat counts (CiA 301 clause 7.2.8.2.2).
+            return
         self._say(
             frames.HEARTBEAT + self.node_id, bytes([self.state | self._guard_toggle << 7]), now
         )
@@ -173,15 +180,18 @@ class CanopenNode:
 
     def _beat(self, now: int) -> None:
         period = self._objects.heartbeat_ms * 1_000_000
+        if self._objects.take_heartbeat_change():
+            # A period that was written counts from now, whatever was due before.
+            self._heartbeat_due_ns = now
         if period and now >= self._heartbeat_due_ns:
-            self._heartbeat_due_ns = max(self._heartbeat_due_ns + period, now)
+            self._heartbeat_due_ns += period * (1 + (now - self._heartbeat_due_ns) // period)
             self._say(frames.HEARTBEAT + self.node_id, bytes([self.state]), now)
 
     def _watch_master(self, now: int) -> None:
         limit = (self._objects.consumer & 0xFFFF) * 1_000_000
         if limit and self._master_seen_ns is not None and now - self._master_seen_ns > limit:
             self._master_seen_ns = None
-            self._emergency(_HEARTBEAT_LOST, 0x10, bytes(5), now)
+            self._raise_own(_HEARTBEAT_LOST, now)
             self.device.communication_lost("heartbeat of the master")
 
     # SDO
@@ -199,6 +209,8 @@ class CanopenNode:
     def _read(self, index: int, subindex: int) -> bytes:
         if self._objects.owns(index):
             return self._objects.read(index, subindex)
+        if (index, subindex) == (0x1001, 0):
+            return bytes([self._error_register()])
         try:
             value = self.device.read(index, subindex)
         except SdoAbort as refusal:
@@ -215,8 +227,6 @@ class CanopenNode:
         identity = self.device.profile.identity
         if (index, subindex) == (0x1000, 0):
             return struct.pack("<I", _SERVO_DEVICE_TYPE)
-        if (index, subindex) == (0x1001, 0):
-            return bytes([self._error_register])
         if index == 0x1003:
             return self._past_error(subindex)
         if index == 0x1018 and identity.vendor_id is not None:
@@ -268,12 +278,32 @@ class CanopenNode:
         for code, register, extra in self.device.take_emergencies():
             self._emergency(code, register, extra, now)
 
+    def _error_register(self) -> int:
+        """1001h: the drive's errors, where it has the object, and those of the network."""
+        try:
+            register = self.device.read(0x1001, 0)[0]
+        except SdoAbort:
+            register = 0
+        return register | (_COMMUNICATION_ERROR if self._own_errors else 0)
+
+    def _raise_own(self, code: int, now: int) -> None:
+        """An error of the network, told once for as long as it lasts (CiA 301 clause 7.2.7.1)."""
+        if code not in self._own_errors:
+            self._own_errors.add(code)
+            self._emergency(code, self._error_register(), bytes(5), now)
+
+    def _clear_own(self, code: int, now: int) -> None:
+        """It is over: told with code 0 and what the register still holds."""
+        if code in self._own_errors:
+            self._own_errors.discard(code)
+            self._emergency(0, self._error_register(), bytes(5), now)
+
     def _emergency(self, code: int, register: int, extra: bytes, now: int) -> None:
-        self._error_register = register
         if code:
             self._history = [code, *self._history][:_HISTORY]
         if self.state != _STOPPED:
-            data = struct.pack("<HB", code, register) + extra[:5].ljust(5, b"\0")
+            head = struct.pack("<HB", code, register | self._error_register())
+            data = head + extra[:5].ljust(5, b"\0")
             self._say(frames.EMERGENCY + self.node_id, data, now)
 
     # Process data
@@ -288,8 +318,10 @@ class CanopenNode:
                 self._say(pdo.identifier, pdo.image.pack(), now)
             elif pdo.direction == "rx" and not frame.remote:
                 if len(frame.data) < pdo.image.size:
-                    self._emergency(_PDO_TOO_SHORT, 0x10, bytes(5), now)
-                elif pdo.kind <= 240:
+                    self._raise_own(_PDO_TOO_SHORT, now)
+                    continue
+                self._clear_own(_PDO_TOO_SHORT, now)
+                if pdo.kind <= 240:
                     self._pending[pdo.number] = frame.data
                 else:
                     pdo.image.unpack(frame.data[: pdo.image.size])

@@ -75,6 +75,7 @@ class CommunicationObjects:
         self.offers_consumer = link is None or link.watchdog.present
         """A family whose manual names no watchdog has no heartbeat consumer either (DS_C)."""
         self.heartbeat_ms = 0
+        self._heartbeat_changed = False
         self.consumer = 0
         self.sync_cob = 0x80
         self.pdos: list[Pdo] = []
@@ -84,6 +85,7 @@ class CommunicationObjects:
         """Power-on values."""
         self.heartbeat_ms = 0
         self.consumer = 0
+        self.sync_cob = 0x80
         self.pdos = [self._default("rx", n) for n in range(4)]
         self.pdos += [self._default("tx", n) for n in range(4)]
 
@@ -133,6 +135,11 @@ class CommunicationObjects:
         pdo = self._pdo(index)
         return self._read_mapping(pdo, subindex) if index & 0x200 else _read_pdo(pdo, subindex)
 
+    def take_heartbeat_change(self) -> bool:
+        """Whether 1017h was written since the last call."""
+        changed, self._heartbeat_changed = self._heartbeat_changed, False
+        return changed
+
     def _read_mapping(self, pdo: Pdo, subindex: int) -> bytes:
         if subindex == 0:
             return bytes([pdo.count])
@@ -144,6 +151,7 @@ class CommunicationObjects:
         """Write an object. Raises SdoAbort with nothing changed."""
         if (index, subindex) == (0x1017, 0):
             self.heartbeat_ms = _number(data, 2)
+            self._heartbeat_changed = True
         elif (index, subindex) == (0x1016, 1):
             self.consumer = _number(data, 4)
         elif (index, subindex) == (0x1005, 0):

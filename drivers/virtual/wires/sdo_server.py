@@ -60,6 +60,10 @@ class SdoServer:
         self._offers_block = offers_block
         self._transfer: _Transfer | None = None
 
+    def reset(self) -> None:
+        """Communication starts anew: a transfer under way is over."""
+        self._transfer = None
+
     def request(self, frame: bytes) -> list[bytes]:
         """All frames that answer ``frame``; often one, in a block up to 127, or none."""
         if len(frame) != 8:
@@ -71,8 +75,7 @@ class SdoServer:
             return self._dispatch(frame)
         except SdoAbort as refusal:
             transfer, self._transfer = self._transfer, None
-            opens = frame[0] >> 5 in (1, 2) or transfer is None
-            mux = frame[1:4] if opens or transfer is None else transfer.mux
+            mux = frame[1:4] if transfer is None or _opens(frame[0], transfer) else transfer.mux
             return [b"\x80" + mux + struct.pack("<I", refusal.code)]
 
     def _dispatch(self, frame: bytes) -> list[bytes]:
@@ -221,6 +224,19 @@ class SdoServer:
         if transfer.last_seen:
             transfer.kind = "block_download_end"
         return [bytes([0xA2, good, _BLOCK]) + bytes(5)]
+
+
+def _opens(command: int, under_way: _Transfer) -> bool:
+    """Whether a request names its own object, so that its refusal is about that one."""
+    if under_way.kind == "block_download":
+        # A segment of the block: its first byte is a number.
+        return False
+    specifier = command >> 5
+    return (
+        specifier in (1, 2)
+        or (specifier == 5 and command & 0x03 == 0)
+        or (specifier == 6 and not command & 0x01)
+    )
 
 
 def _object(mux: bytes) -> tuple[int, int]:

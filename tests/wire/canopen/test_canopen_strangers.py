@@ -157,3 +157,52 @@ def test_each_nmt_command_leads_where_it_should(master: RawMaster) -> None:
     assert master.send(0, "8205") == ["705#00"]
     assert master.send(0, "8100") == ["705#00"]
     assert state() == "7f"
+
+
+def test_an_error_of_the_network_is_told_once_and_again_when_it_is_over(master: RawMaster) -> None:
+    """CiA 301 clause 7.2.7.1: one emergency per error, code 0 after it; 7.5.2.2: bits 0 and 4."""
+    for value in (0x80000205, 0x205):
+        if value == 0x205:
+            assert master.write(0x1600, 0, 0, 1) == 0
+            assert master.write(0x1600, 1, 0x60400010, 4) == 0
+            assert master.write(0x1600, 0, 1, 1) == 0
+        assert master.write(0x1400, 1, value, 4) == 0
+    master.send(0, "0105")
+    assert master.read(0x1001, 0) == "4f01100000000000"
+    assert master.send(0x205, "06") == ["085#1082110000000000"]  # PDO too short
+    assert master.send(0x205, "06") == []
+    assert master.read(0x1001, 0) == "4f01100011000000"
+    assert "085#0000000000000000" in master.send(0x205, "0600")
+    assert master.read(0x1001, 0) == "4f01100000000000"
+    assert master.read(0x1003, 0) == "4f03100001000000"  # code 0 is no error of the list
+
+
+def test_a_heartbeat_has_its_new_period_at_once(master: RawMaster) -> None:
+    assert master.send(0x605, "2b17100088130000") == ["585#6017100000000000", "705#7f"]  # 5000 ms
+    assert master.node.due() == []
+    assert master.send(0x605, "2b17100064000000") == ["585#6017100000000000", "705#7f"]  # 100 ms
+    times_ms = []
+    for _ in range(45):
+        master.now_ns += 10_000_000
+        if master.node.due():
+            times_ms.append(master.now_ns // 1_000_000)
+    assert times_ms == [100, 200, 300, 400]
+
+
+def test_a_node_with_heartbeat_is_not_guarded(master: RawMaster) -> None:
+    """CiA 301 clause 7.2.8.2.2: one of the two, and the heartbeat where its time is not 0."""
+    assert master.send(0x705, remote=True) == ["705#7f"]
+    assert len(master.send(0x605, "2b171000e8030000")) == 2
+    assert master.send(0x705, remote=True) == []
+
+
+def test_communication_that_starts_anew_forgets_the_number_of_sync(master: RawMaster) -> None:
+    assert master.write(0x1005, 0, 0x90, 4) == 0
+    master.send(0, "8205")
+    assert master.read(0x1005, 0) == "4305100080000000"
+
+
+def test_a_refused_block_names_its_own_object(master: RawMaster) -> None:
+    """An older transfer may still be under way; clause 7.2.4.3.17 names what is refused."""
+    assert master.read(0x1008, 0).startswith("41")  # 27 letters: to be fetched in segments
+    assert master.sdo("a43412007f000000") == "8034120000000206"
