@@ -63,7 +63,8 @@ def plain(**objects: tuple[int, int]) -> Drive:
     )
     link.kind = "canopen"
     profile = load_profile("generic402")
-    drive = Drive("n", "N axis", profile, [Port(link, 1, profile.link("canopen"))])
+    spec = next(spec for spec in profile.links if spec.kind == "canopen")
+    drive = Drive("n", "N axis", profile, [Port(link, 1, spec)])
     drive.found = Found(1)
     return drive
 
