@@ -12,14 +12,17 @@ import pytest
 
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
+from backend.tools import profile_speed
+from backend.tools.settling import settle
 from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import SweepSettings
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
 from drivers.virtual.wires.netns import Namespace
-from tests.virtual.tools.rig import WIDE, Bench, bench, mechanics, silent
+from tests.virtual.tools.rig import WIDE, Bench, bench, mechanics, settings_of, silent
 
 ONE = mechanics((1e-4, 60.0, 0.006))
+MODE = "6060:00"
 
 
 def spy(reached: Callable[[Progress], bool]) -> tuple[Progress, asyncio.Event]:
@@ -64,17 +67,40 @@ async def test_a_fault_in_the_middle(namespace: Namespace) -> None:
         await as_before(b, before)
 
 
-async def test_the_cable_is_pulled(namespace: Namespace) -> None:
+async def test_the_cable_is_pulled_and_put_back(namespace: Namespace) -> None:
+    """What the drive is owed, its mode above all, comes back over the healed segment."""
     async with bench(namespace, ONE) as b:
+        before = await settings_of(b.axis.drive, MODE)
         progress, there = spy(lambda p: "measuring" in p.step and p.fraction > 0.15)
-        task = asyncio.create_task(sweep(b.axis, b.session, SweepSettings(WIDE), progress))
+
+        async def measure() -> None:
+            async with profile_speed.prepared(b.axis, b.session, WIDE, False):
+                await sweep(b.axis, b.session, SweepSettings(WIDE), progress)
+
+        task = asyncio.create_task(measure())
         await asyncio.wait_for(there.wait(), 100.0)
         b.segment.command("cut", cable=0)
         try:
-            with pytest.raises(DriveError):
+            with pytest.raises(DriveError, match=r"not restored: .*6060:00 \(was"):
                 await asyncio.wait_for(task, 30.0)
         finally:
             b.segment.command("heal")
+        async with asyncio.timeout(60.0):
+            while not await settled(b, before):  # noqa: ASYNC110 - nothing tells of it
+                await asyncio.sleep(0.1)
+        assert not b.axis.drive.owed
+        assert not b.axis.owes_stop
+
+
+async def settled(b: Bench, before: dict[str, object]) -> bool:
+    """What a server does when a drive answers again; whether all is as before now."""
+    try:
+        if b.axis.owes_stop and not await b.axis.repeat_stop():
+            return False
+        await settle(b.axis, asked=False)
+        return await settings_of(b.axis.drive, MODE) == before
+    except DriveError:
+        return False
 
 
 async def test_a_load_that_pulls_is_measured_only_under_a_loop(namespace: Namespace) -> None:

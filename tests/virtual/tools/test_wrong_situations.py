@@ -306,6 +306,8 @@ async def test_a_link_that_is_lost_while_it_is_measured(
         assert at.done
         owed = {debt.key for debt in b.axis.drive.owed.debts}
         b.link.cut = False
+        # Disabled in the middle of a motion it coasts for a while.
+        b.link.pass_s(3.0)
         assert await b.axis.state() is not State.OPERATION_ENABLED
         # Nothing but what the list holds is other than before; reading it takes the rest off it.
         after = await dump(b)
