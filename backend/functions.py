@@ -6,7 +6,6 @@ none, and still get the pages that the standard objects make possible.
 
 from __future__ import annotations
 
-from drivers.errors import NotAllowed
 from profiles.functions import (
     FaultHistory,
     Functions,
@@ -77,15 +76,3 @@ def _standard_probe(profile: Profile) -> TouchProbe | None:
         probes=tuple(each for each in found if each is not None),
         source="CiA 402-2, 60B8h",
     )
-
-
-def require_probe(profile: Profile) -> TouchProbe:
-    """The touch probes of a family.
-
-    Raises:
-        NotAllowed: it has none.
-    """
-    probe = functions_of(profile).probe
-    if probe is None:
-        raise NotAllowed(f"{profile.title} has no touch probe", remedy="use another drive")
-    return probe

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from profiles.schema import Raw
 
@@ -49,8 +49,3 @@ class CommandRecord:
     parameter: str
     raw: int
     problem: str = ""
-
-
-def with_error(reading: Reading, error: str) -> Reading:
-    """The old reading marked as not renewed."""
-    return replace(reading, error=error)

@@ -1,6 +1,6 @@
 """Braking energy and the resistor that must take it: pure, in SI units.
 
-Equations 9 to 12 of manual 004 (004:2250 to 004:2300), which are the energy balance of a mass
+Equations 9, 11 and 12 of manual 004 (004:2250 to 004:2300), which are the energy balance of a mass
 that is braked: what the capacitors of the DC bus do not take up must go into the resistor.
 """
 
@@ -71,11 +71,6 @@ class BrakingResult:
     min_ohm: float | None
     max_ohm: float | None
     possible: bool
-
-
-def capacitor_energy(capacitance_f: float, on_voltage_v: float, supply_v: float) -> float:
-    """Energy up to the threshold of the resistor (equation 10, 004:2263)."""
-    return max(0.0, 0.5 * capacitance_f * (on_voltage_v**2 - supply_v**2))
 
 
 def braking(cycle: BrakingCycle, limits: BrakingLimits) -> BrakingResult:

@@ -41,11 +41,6 @@ def worst_case_bits(data_bytes: int) -> int:
     return stuffable + (stuffable - 1) // 4 + 13
 
 
-def wire_time_s(data_bytes: int, bitrate: int) -> float:
-    """Longest time a frame occupies a bus of ``bitrate`` bit/s, in seconds."""
-    return worst_case_bits(data_bytes) / bitrate
-
-
 def exact_bits(frame: Frame) -> int:
     """Bits that this very frame occupies, with the stuff bits its contents need.
 

@@ -19,7 +19,7 @@ import can
 from drivers.canopen.adapter import open_bus
 from drivers.canopen.channel import SdoChannel
 from drivers.canopen.cyclic import CanopenCyclic
-from drivers.canopen.frames import HEARTBEAT, NMT, SDO_ANSWER, SDO_REQUEST, Frame
+from drivers.canopen.frames import HEARTBEAT, SDO_ANSWER, SDO_REQUEST, Frame
 from drivers.canopen.nodes import NodeWatch
 from drivers.canopen.port import CanPort
 from drivers.canopen.scanning import identify, probe
@@ -198,10 +198,6 @@ class CanopenLink:
                 await self._run(station, lambda: self._sdo_write(station, index, subindex, data))
             finally:
                 self._urgent[station] -= 1
-
-    async def nmt(self, command: int, station: int = 0) -> None:
-        """Send an NMT command (`drivers.canopen.frames`) to one node, or to all with 0."""
-        await self._in_worker(lambda: self._port.send(Frame(NMT, bytes([command, station]))))
 
     def quality(self, station: int | None = None) -> LinkQuality:
         """Counters; for one station its SDO figures and NMT state, else those of the bus."""

@@ -20,7 +20,6 @@ Message = dict[str, Any]
 
 _LENGTH = struct.Struct("<I")
 MAX_MESSAGE_BYTES = 64 << 20
-HEARTBEAT_S = 0.5
 
 
 class WireError(TypedDict):

@@ -17,7 +17,6 @@ from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.schedule import Timer
 
 _FAR = 1e9
-_LIMITS = k.SIG_NEGATIVE | k.SIG_POSITIVE
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,6 @@ from backend.regeneration import (
     BrakingLimits,
     Resistor,
     braking,
-    capacitor_energy,
 )
 from drivers.errors import OutOfRange
 
@@ -78,12 +77,6 @@ def test_falling_load_counts_in_every_cycle() -> None:
 
 def test_without_limits_no_verdict_is_pretended() -> None:
     assert braking(EXAMPLE, BrakingLimits()).verdict == "unknown"
-
-
-def test_capacitor_energy() -> None:
-    # 1000 µF from 311 V to 380 V.
-    assert capacitor_energy(1e-3, 380, 311) == pytest.approx(0.5e-3 * (380**2 - 311**2))
-    assert capacitor_energy(1e-3, 300, 311) == 0
 
 
 def test_stops_longer_than_their_cycle_are_refused() -> None:

@@ -11,7 +11,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from types import TracebackType
 from typing import IO, Any
 
@@ -61,13 +60,6 @@ class VirtualSegment:
             segment.close()
             raise
         return segment
-
-    @classmethod
-    def from_bench(
-        cls, interface: str, bench: Path, url: str, namespace: Namespace | None = None
-    ) -> VirtualSegment:
-        """The EtherCAT axes of a bench file that hang on ``url``."""
-        return cls.start(interface, ["--bench", str(bench), "--on", url], namespace)
 
     @property
     def pid(self) -> int:
