@@ -56,7 +56,7 @@ async def save_set(bench: TheBench, member: Controlled, request: SaveSetRequest)
         motor_individual=request.include_motor_individual,
         overwrite=request.overwrite,
     )
-    missing = parameters.without((await _parsed(bench, name)).not_read)
+    missing = parameters.without((await _parsed(bench, name, None)).not_read)
     bench.journal.add(
         f"{member.drive.name}: saved {name}{missing}",
         level="warning" if missing else "info",
