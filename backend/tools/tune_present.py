@@ -26,8 +26,9 @@ from backend.tools import notch as notch_tool
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.notch_effect import unknown
 from backend.tools.notch_meaning import meaning_of
-from backend.tools.tune_apply import Applied, first_kept, stages
-from backend.tools.tune_verify import Check, Keep, verify
+from backend.tools.temporary import write_settings
+from backend.tools.tune_apply import Applied, first_kept, stages, take_back
+from backend.tools.tune_verify import Check, Keep, otherwise, verify
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
 
@@ -154,7 +155,26 @@ class Trials:
         applied = await self._designs([c for c in order if c not in slower], plant)
         if applied is None and slower and self.had.sound and not self.had_failed:
             applied = await self._as_it_was()
-        return applied or await self._designs(slower, plant)
+        if applied is None:
+            applied = await self._designs(slower, plant)
+            if applied is not None and otherwise(applied.verified) and self.had.candidate:
+                applied = await self._as_it_was_or(applied)
+        return applied
+
+    async def _as_it_was_or(self, slower: Applied) -> Applied:
+        """The prediction was wrong for a slower design, so it is no reason against what it had.
+
+        That is measured in turn, and stays where it keeps the promise; else the design is back.
+        """
+        if self.had_failed:
+            return slower
+        raw = {key: await self.axis.drive.raw(key) for key in slower.before}
+        await take_back(self.axis, slower.before)
+        kept = await self._as_it_was()
+        if kept is not None and kept.verified.sweep.margins:
+            return kept
+        self.had_failed = True
+        return Applied(slower.candidate, slower.verified, await write_settings(self.axis, raw))
 
     async def _designs(self, rows: Sequence[Candidate], plant: MeasuredPlant) -> Applied | None:
         async def softer(candidate: Candidate, share: float) -> Candidate | None:
