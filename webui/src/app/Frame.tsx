@@ -1,5 +1,5 @@
 import { ActionIcon, Drawer, NativeSelect } from '@mantine/core'
-import { type ReactNode, useEffect, useLayoutEffect, useRef, useState } from 'react'
+import { type ReactNode, useEffect, useRef, useState } from 'react'
 import { known, useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '../live/store'
@@ -15,6 +15,8 @@ import {
   useRoute,
 } from './router'
 import { FaultElsewhere } from './FaultElsewhere'
+import { AxisNotes } from './AxisNotes'
+import { Late } from './Late'
 import { LeaseControl, LeaseNotices } from './LeaseControl'
 import { PointerLayer } from './PointerLayer'
 import { Preferences } from './Preferences'
@@ -44,10 +46,6 @@ export function Frame({ children }: { children: ReactNode }) {
   const chosen = useChosen()
   const key = `${page} ${drive}`
   useEffect(() => setOpen(false), [key])
-  // Each page from its top, not from where the one before it was left.
-  useLayoutEffect(() => {
-    document.getElementById('main')?.scrollTo(0, 0)
-  }, [key])
   const axis = useDrive(isAxisPage(page) ? drive : null)
   useEffect(() => {
     // Tabs, bookmarks and screen readers tell pages apart by it.
@@ -98,10 +96,13 @@ export function Frame({ children }: { children: ReactNode }) {
         </div>
       </Drawer>
       <main id="main" tabIndex={-1}>
-        <Refused />
-        <LeaseNotices />
-        <SupportBar />
-        {children}
+        <Late page={key}>
+          <Refused />
+          <LeaseNotices />
+          <SupportBar />
+          {axis && <AxisNotes key={key} drive={axis.id} page={page} />}
+        </Late>
+        <div className="room">{children}</div>
       </main>
       <PointerLayer />
       <nav className="bottom" aria-label={t('frame.pages')}>

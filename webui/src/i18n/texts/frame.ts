@@ -9,6 +9,7 @@ export const frame = {
     '所有轴已停止。再次移动之前请先询问原因。',
   ],
   'frame.faultElsewhere': ['Fault on {names}: show it', '{names} 有故障：查看'],
+  'frame.faultHere': ['Causes and remedies', '原因与处理方法'],
   'stop.label': ['STOP', '停止'],
   'stop.help': ['Stop all axes (Esc)', '停止所有轴（Esc）'],
   'stop.sent': ['STOP sent. Waiting for the answer…', '已发送停止命令，等待应答…'],

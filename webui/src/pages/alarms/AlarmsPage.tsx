@@ -22,11 +22,6 @@ export function AlarmsPage({ drive }: { drive: string }) {
       <h1>
         {t('page.alarms')} <small className="dim">{summary?.name}</small>
       </h1>
-      {state && !state.fresh && (
-        <p className="note warn">
-          <strong>{t('state.noAnswer')}</strong> {state.problem}
-        </p>
-      )}
       <Panel
         title={t('faults.active')}
         tools={
@@ -34,7 +29,11 @@ export function AlarmsPage({ drive }: { drive: string }) {
         }
       >
         <FaultResetProblem reset={reset} />
-        {state?.fresh && faults.length === 0 && <p className="good-text">{t('faults.none')}</p>}
+        {faults.length === 0 && (
+          <p className={state?.fresh ? 'good-text' : 'dim'}>
+            {t(state?.fresh ? 'faults.none' : 'state.noAnswer')}
+          </p>
+        )}
         <FaultList drive={drive} faults={faults} />
       </Panel>
       {warnings.length > 0 && (

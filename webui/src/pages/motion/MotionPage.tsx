@@ -35,11 +35,6 @@ export function MotionPage({ drive }: { drive: string }) {
       <h1>
         {t('page.motion')} <small className="dim">{summary.name}</small>
       </h1>
-      {state && !state.fresh && (
-        <p className="note warn" role="status">
-          <strong>{t('state.noAnswer')}</strong> {state.problem}
-        </p>
-      )}
       <div className="columns motion-columns">
         <div>
           <SegmentedControl

@@ -1,3 +1,4 @@
+import { useFaultAtOpening } from '../../app/AxisNotes'
 import { api, ask } from '../../api/client'
 import type { AxisState, TransitionRequest } from '../../api/schema'
 import { known, useT } from '../../i18n'
@@ -21,6 +22,7 @@ export function OverviewPage({ drive }: { drive: string }) {
   const state = useAxisState(drive)
   const summary = useDrive(drive)
   const change = useAction()
+  const told = useFaultAtOpening(state)
   const reset = useFaultReset(drive)
   const goTo = (goal: string) =>
     change.run(async () =>
@@ -38,15 +40,11 @@ export function OverviewPage({ drive }: { drive: string }) {
       <h1>
         {summary?.name} <small className="dim">{summary?.title}</small>
       </h1>
-      {state && !state.fresh && (
-        <p className="note warn" role="status">
-          <strong>{t('state.noAnswer')}</strong> {state.problem}
-        </p>
-      )}
-      {state && state.faults.length > 0 && (
+      {told && state && (
         <Panel title={t('faults.active')} className="fault-panel">
           <FaultList drive={drive} faults={state.faults} />
-          <FaultResetButton reset={reset} />
+          {state.faults.length === 0 && <p className="good-text">{t('faults.none')}</p>}
+          <FaultResetButton reset={reset} disabled={state.faults.length === 0} />
           <FaultResetProblem reset={reset} />
         </Panel>
       )}

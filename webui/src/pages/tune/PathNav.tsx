@@ -30,7 +30,10 @@ export function PathNav({ drive, known }: { drive: string; known: Known }) {
             >
               <strong>
                 {i + 1} {t(`path.${step}`)}
-                {done[step] && <Icon name="check" size={16} />}
+                {/* It keeps its place, so that a step that is done or undone moves no other. */}
+                <span style={{ visibility: done[step] ? 'visible' : 'hidden' }}>
+                  <Icon name="check" size={16} />
+                </span>
               </strong>
               <small className="dim">
                 {t(done[step] ? 'path.done' : step === next ? 'path.next' : 'path.open')}

@@ -73,7 +73,12 @@ export function TunePage({ drive }: { drive: string }) {
       <h1>
         {t('page.tune')} <small className="dim">{summary.name}</small>
       </h1>
-      {possible && measured.asked && reports.asked && <PathNav drive={drive} known={path} />}
+      {possible && (
+        // It has its place before it is known how far one has come, which moves what is below it.
+        <div className={measured.asked && reports.asked ? 'arrived' : 'arriving'}>
+          <PathNav drive={drive} known={path} />
+        </div>
+      )}
       {state && !possible && <p className="note info">{t('tune.needsCyclic')}</p>}
       <div className="columns">
         <div className="stack">

@@ -1,0 +1,60 @@
+import { type ReactNode, useEffect, useLayoutEffect, useRef } from 'react'
+import { settled } from './settle'
+
+/**
+ * What somebody must be told at once, whatever page is open. It stands above the page, also of one
+ * that is scrolled, and coming or going it moves nothing: the page is scrolled by its height, and
+ * what it lies over is reached by scrolling up. `page` names what is open.
+ */
+export function Late({ page, children }: { page: string; children: ReactNode }) {
+  const told = useRef<HTMLDivElement>(null)
+  const room = useRef({ height: 0, left: 0, scrolled: 0 })
+  const opened = useRef('')
+  useLayoutEffect(() => {
+    // Each page from its top, not from where the one before it was left.
+    const main = told.current?.parentElement
+    if (!main || !told.current || opened.current === page) return
+    opened.current = page
+    told.current.style.marginBottom = ''
+    main.scrollTo(0, 0)
+    room.current.left = 0
+    room.current.scrolled = 0
+  }, [page])
+  useEffect(() => {
+    const box = told.current
+    const main = box?.parentElement
+    if (!box || !main) return
+    const kept = room.current
+    const scrolled = () => {
+      // What the browser scrolls as a notice comes or goes may be told before its new height.
+      if (box.offsetHeight === kept.height) kept.scrolled = main.scrollTop
+    }
+    const resized = () => {
+      const height = box.offsetHeight
+      if (height === kept.height) return
+      const before = kept.height
+      kept.height = height
+      // A page that is only being built has nothing yet that could move.
+      if (!main.querySelector(':scope > .room > .arrived')) return
+      const anchored = main.scrollTop - kept.scrolled
+      const was = { scrolled: main.scrollTop, left: kept.left }
+      const now = settled(was, before, height, anchored)
+      kept.left = now.left
+      box.style.marginBottom = now.left > 0 ? `${now.left}px` : ''
+      main.scrollTop = now.scrolled
+      kept.scrolled = main.scrollTop
+    }
+    const observer = new ResizeObserver(resized)
+    observer.observe(box)
+    main.addEventListener('scroll', scrolled, { passive: true })
+    return () => {
+      observer.disconnect()
+      main.removeEventListener('scroll', scrolled)
+    }
+  }, [])
+  return (
+    <div className="late" ref={told}>
+      {children}
+    </div>
+  )
+}
