@@ -129,18 +129,21 @@ async def _page(server: str) -> AsyncIterator[ClientConnection]:
         ) from error
 
 
+def _told(message: str) -> Hello | JogEnded | ScopeInfo | None:
+    """What a message says, None where it is about something else; a refusal is raised."""
+    try:
+        news = _News.validate_json(message)
+    except ValidationError:
+        return None
+    if isinstance(news, Refused):
+        raise NotAllowed(news.problem.detail, remedy=news.problem.remedy)
+    return news
+
+
 async def _next(page: ClientConnection, kind: type[Hello | JogEnded]) -> Hello | JogEnded:
     """The next message of this kind; a refusal is raised."""
     async for message in page:
-        if isinstance(message, bytes):
-            continue
-        try:
-            news = _News.validate_json(message)
-        except ValidationError:
-            continue
-        if isinstance(news, Refused):
-            raise NotAllowed(news.problem.detail, remedy=news.problem.remedy)
-        if isinstance(news, kind):
+        if not isinstance(message, bytes) and isinstance(news := _told(message), kind):
             return news
     raise LinkLost("the server ended the live connection", remedy="look at its log")
 
@@ -237,13 +240,7 @@ async def _record(
                     for block in decode(message):
                         into.add(block)
                     continue
-                try:
-                    news = _News.validate_json(message)
-                except ValidationError:
-                    continue
-                if isinstance(news, Refused):
-                    raise NotAllowed(news.problem.detail, remedy=news.problem.remedy)
-                if isinstance(news, ScopeInfo):
+                if isinstance(news := _told(message), ScopeInfo):
                     if news.problem is not None:
                         raise NotAllowed(news.problem.detail, remedy=news.problem.remedy)
                     into.head(news)
