@@ -3,12 +3,17 @@
 The axes are `drive_sim`'s, which shares nothing with the product; closed forms tell the rest.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drive_sim import TURN, Drive, Mechanics, simulate
 
 from backend.analysis.inertia import (
     MoveLimits,
+    _columns,
+    _smooth,
+    _smoothing_kernel,
     _swinging_variance,
     design_moves,
     estimate_inertia,
@@ -97,6 +102,16 @@ def test_a_swing_is_found_with_its_frequency_and_damping():
     (found,) = find_swings(others, run.torque, a, np.ones(a.size, np.bool_), RATE, 50.0, most=1)
     assert found.frequency_hz == pytest.approx(hz, rel=0.01)
     assert found.damping == pytest.approx(zeta, rel=0.1)
+
+
+def test_an_axis_of_one_piece_has_no_swing():
+    mechanics = Mechanics(4e-4, (), 2e-4, 0.05)
+    run = moved(mechanics, replace(Drive(), kp_nms=1e-2, ki_nm=0.1, noise_counts=30.0))
+    kernel = _smoothing_kernel(RATE, 25.0)
+    others = _columns(run.velocity, kernel, 5.0, RATE)
+    moving = np.abs(others[:, 1]) > 5.0
+    torque = _smooth(run.torque, kernel)
+    assert find_swings(others, torque, others[:, 0], moving, RATE, 50.0) == ()
 
 
 def test_a_load_lags_behind_its_motor_as_an_oscillator_does():
