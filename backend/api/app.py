@@ -15,6 +15,7 @@ from fastapi.routing import APIRoute
 import backend
 from backend.api import (
     errors,
+    routes_accounts,
     routes_audit,
     routes_bench,
     routes_description,
@@ -25,12 +26,13 @@ from backend.api import (
     routes_library,
     routes_lists,
     routes_owed,
-    routes_people,
     routes_recordings,
     routes_rerun,
     routes_scene,
     routes_scope,
+    routes_session,
     routes_sets,
+    routes_support,
     routes_tune,
 )
 from backend.api.audited import AuditedAnswers
@@ -150,7 +152,9 @@ def make_app(
         routes_io,
         routes_library,
         routes_audit,
-        routes_people,
+        routes_session,
+        routes_accounts,
+        routes_support,
     ):
         api.include_router(part.router)
     app.include_router(api)

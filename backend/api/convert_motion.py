@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from backend.api.live_messages import JogStart
-from backend.api.models import GenerateRequest, HomeRequest, MoveRequest, SequenceRequest
+from backend.api.models_motion import GenerateRequest, HomeRequest, MoveRequest, SequenceRequest
 from backend.axis import Envelope
 from backend.bench import Bench, Member
 from backend.tools.cyclic_motion import GeneratorSettings

@@ -21,7 +21,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
-from backend.api.live_people_messages import PeopleNews, PeopleRequest
+from backend.api.live_people_messages import PeopleRequest
 from backend.api.models import (
     AxisState,
     DriveSummary,
@@ -247,19 +247,3 @@ class Pong(Message):
 
     type: Literal["pong"] = "pong"
     n: int
-
-
-ToPage = (
-    Hello
-    | StateChanged
-    | DrivesChanged
-    | ValuesChanged
-    | JobChanged
-    | LeaseChanged
-    | JogEnded
-    | ScopeInfo
-    | Logged
-    | Refused
-    | Pong
-    | PeopleNews
-)

@@ -218,6 +218,3 @@ class ChatLine(Message):
     person: str
     guest: bool
     text: str
-
-
-PeopleNews = PeopleHere | LeaseNotice | PointerMoved | CursorMoved | ChatLine

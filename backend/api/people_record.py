@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
+from fastapi import Depends
+
+from backend.api.context import TheBench
 from backend.audit.facts import Fact
 from backend.bench import Bench
 from backend.journal import Level
@@ -37,3 +40,10 @@ class PeopleRecord:
             kind, action, axis=axis, target=target, old=old, new=new, outcome=outcome, person=person
         )
         self._bench.audit.add(fact)
+
+
+def _record_of(bench: TheBench) -> PeopleRecord:
+    return PeopleRecord(bench)
+
+
+TheRecord = Annotated[PeopleRecord, Depends(_record_of)]

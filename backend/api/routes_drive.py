@@ -13,12 +13,8 @@ from backend.api.errors import NotFound, problem_of
 from backend.api.models import (
     ActiveFault,
     AxisState,
-    GenerateRequest,
-    HomeRequest,
-    HomingMethodInfo,
     JobInfo,
     LoadSetRequest,
-    MoveRequest,
     ParameterRow,
     ParameterValue,
     ParameterWrite,
@@ -26,9 +22,15 @@ from backend.api.models import (
     ProcedureInfo,
     ProcedureRequest,
     ReadAllRequest,
-    SequenceRequest,
     TransitionRequest,
     WriteResult,
+)
+from backend.api.models_motion import (
+    GenerateRequest,
+    HomeRequest,
+    HomingMethodInfo,
+    MoveRequest,
+    SequenceRequest,
 )
 from backend.bench import Bench, Member
 from backend.jobs import JobResult, Progress

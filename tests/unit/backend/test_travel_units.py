@@ -14,7 +14,7 @@ import pytest
 
 from backend.api import convert_motion
 from backend.api.live_messages import JogStart
-from backend.api.models import GenerateRequest, HomeRequest, MoveRequest, SequenceRequest
+from backend.api.models_motion import GenerateRequest, HomeRequest, MoveRequest, SequenceRequest
 from backend.axis import Envelope
 from backend.axis_store import AxisRecord
 from backend.bench import Bench, Member

@@ -1,0 +1,76 @@
+"""Who asks by which log-in: the session that the page is told, its cookie, its account."""
+
+from __future__ import annotations
+
+from fastapi import Request, Response
+
+from backend.api.models_people import Session
+from backend.api.security import COOKIE, SECURE_COOKIE
+from backend.people.accounts import Accounts
+from backend.people.credentials import csrf_of
+from backend.people.errors import Forbidden
+from backend.people.identity import Identity
+from backend.people.records import Account
+from backend.people.rights import Right
+from backend.people.station import People
+
+
+def session_of(people: People, identity: Identity | None, cookie: str | None) -> Session:
+    """What a page is told of who asks; ``identity`` is None where nobody is logged in."""
+    by_cookie = identity is not None and identity.kind in ("session", "guest") and cookie
+    return Session(
+        person=None if identity is None else identity.person,
+        role=None if identity is None else identity.role,
+        rights=[] if identity is None else sorted(identity.rights),
+        login_required=people.accounts_needed,
+        setup_required=people.setup_needed,
+        guest=identity is not None and identity.is_guest,
+        csrf=csrf_of(cookie) if by_cookie and cookie else None,
+        expires=None if identity is None else people.expires(identity),
+    )
+
+
+def with_cookie(request: Request, response: Response, people: People, secret: str) -> Session:
+    """Set the cookie of a fresh session, which HTTPS alone carries where the page came by it."""
+    secure = request.url.scheme == "https" or request.headers.get("origin", "").startswith("https:")
+    response.set_cookie(
+        SECURE_COOKIE if secure else COOKIE,
+        secret,
+        httponly=True,
+        secure=secure,
+        samesite="strict",
+        path="/",
+    )
+    return session_of(people, people.identify(secret, None), secret)
+
+
+def address_of(request: Request) -> str:
+    """The address that a request comes from, empty where it is not known."""
+    return request.client.host if request.client else ""
+
+
+def client_of(request: Request) -> str:
+    """The browser or program that asks, as it calls itself."""
+    return request.headers.get("user-agent", "")
+
+
+def own_account(accounts: Accounts, me: Identity) -> Account:
+    """The account behind a log-in; a token or a guest has none that it may change.
+
+    Raises:
+        Forbidden: there is none.
+    """
+    if me.kind != "session":
+        raise Forbidden("this needs a log-in with a password", remedy="log in")
+    return accounts.owner(me.session)
+
+
+def whose_sessions(accounts: Accounts, me: Identity) -> int | None:
+    """Account whose sessions and tokens may be seen; None for all, as administrators may.
+
+    Raises:
+        Forbidden: a guest or the one user of a station without accounts has none.
+    """
+    if Right.ADMINISTER in me.rights:
+        return None
+    return own_account(accounts, me).id

@@ -1,0 +1,169 @@
+"""Routes of accounts and of the tokens that scripts log in with."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+from fastapi import APIRouter, Response
+
+from backend.api.context import Me, ThePeople
+from backend.api.models_people import (
+    AccountChange,
+    AccountInfo,
+    MadeToken,
+    NewAccount,
+    NewToken,
+    TokenInfo,
+)
+from backend.api.own_session import own_account, whose_sessions
+from backend.api.people_record import TheRecord
+from backend.people.accounts import Accounts
+from backend.people.errors import NoSuchPerson
+from backend.people.identity import Identity
+from backend.people.records import Account, Token
+
+router = APIRouter()
+
+
+# --- tokens ---------------------------------------------------------------------------
+
+
+@router.get("/tokens")
+async def tokens(people: ThePeople, me: Me) -> list[TokenInfo]:
+    """Tokens for scripts: the own ones; for an administrator all."""
+    accounts = people.accounts
+    return [_token(accounts, each) for each in accounts.tokens(whose_sessions(accounts, me))]
+
+
+def _token(accounts: Accounts, token: Token) -> TokenInfo:
+    return TokenInfo(
+        id=token.id,
+        person=accounts.account(token.account).name,
+        name=token.name,
+        scopes=sorted(token.scopes),
+        created=token.created,
+        expires=token.expires,
+    )
+
+
+@router.post("/tokens", status_code=201)
+async def make_token(people: ThePeople, record: TheRecord, me: Me, body: NewToken) -> MadeToken:
+    """Make a token for a script. It can do no more than its owner."""
+    account = own_account(people.accounts, me)
+    secret, token = await people.accounts.make_token(
+        account.id, body.name, frozenset(body.scopes), timedelta(days=body.days)
+    )
+    record.note(
+        "account",
+        "token made",
+        f"{me.person} made the token {token.name} ({', '.join(sorted(token.scopes))})",
+        target=token.name,
+        new=", ".join(sorted(token.scopes)),
+        person=me.person,
+    )
+    return MadeToken(token=_token(people.accounts, token), secret=secret)
+
+
+@router.delete("/tokens/{token_id}", status_code=204)
+async def revoke_token(people: ThePeople, record: TheRecord, me: Me, token_id: str) -> Response:
+    """Revoke a token at once."""
+    accounts = people.accounts
+    found = next(
+        (t for t in accounts.tokens(whose_sessions(accounts, me)) if t.id == token_id), None
+    )
+    if found is None:
+        raise NoSuchPerson("there is no such token", value=token_id)
+    await accounts.revoke_token(found)
+    record.note(
+        "account",
+        "token revoked",
+        f"{me.person} revoked the token {found.name}",
+        target=found.name,
+        person=me.person,
+    )
+    return Response(status_code=204)
+
+
+# --- accounts -------------------------------------------------------------------------
+
+
+@router.get("/accounts")
+async def accounts(people: ThePeople, me: Me) -> list[AccountInfo]:
+    """Who may log in."""
+    return [_account(people.accounts, each, me) for each in people.accounts.all()]
+
+
+def _account(accounts: Accounts, account: Account, me: Identity) -> AccountInfo:
+    sessions = accounts.sessions(account.id)
+    return AccountInfo(
+        id=account.id,
+        name=account.name,
+        role=account.role,
+        created=account.created,
+        sessions=len(sessions),
+        tokens=len(accounts.tokens(account.id)),
+        me=any(each.id == me.session for each in sessions),
+    )
+
+
+@router.post("/accounts", status_code=201)
+async def add_account(
+    people: ThePeople, record: TheRecord, me: Me, body: NewAccount
+) -> AccountInfo:
+    """Make an account."""
+    people.require_accounts()
+    made = await people.accounts.add(body.name, body.password, body.role)
+    record.note(
+        "account",
+        "made",
+        f"{me.person} made the account {made.name} ({made.role})",
+        target=made.name,
+        new=made.role,
+        person=me.person,
+    )
+    return _account(people.accounts, made, me)
+
+
+@router.patch("/accounts/{account_id}")
+async def change_account(
+    people: ThePeople, record: TheRecord, me: Me, account_id: int, body: AccountChange
+) -> AccountInfo:
+    """Change role or password; with the password all sessions of the account end."""
+    known = people.accounts.account(account_id)
+    before = known.role
+    if body.role is not None:
+        known = await people.accounts.set_role(account_id, body.role)
+        record.note(
+            "account",
+            "role changed",
+            f"{me.person} made {known.name} {known.role}",
+            target=known.name,
+            old=before,
+            new=known.role,
+            person=me.person,
+        )
+    if body.password is not None:
+        await people.accounts.set_password(account_id, body.password)
+        record.note(
+            "account",
+            "password set",
+            f"{me.person} set a password for {known.name}",
+            target=known.name,
+            person=me.person,
+        )
+    return _account(people.accounts, people.accounts.account(account_id), me)
+
+
+@router.delete("/accounts/{account_id}", status_code=204)
+async def remove_account(people: ThePeople, record: TheRecord, me: Me, account_id: int) -> Response:
+    """Delete an account; its sessions and tokens end at once."""
+    name = people.accounts.account(account_id).name
+    await people.accounts.remove(account_id)
+    record.note(
+        "account",
+        "deleted",
+        f"{me.person} deleted the account {name}",
+        target=name,
+        person=me.person,
+    )
+    return Response(status_code=204)

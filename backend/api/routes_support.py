@@ -1,0 +1,181 @@
+"""Routes of those who are here, and of guests who help from elsewhere."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request, Response
+
+from backend.api.context import Me, ThePeople
+from backend.api.live import LiveHub
+from backend.api.live_people import chat_line
+from backend.api.live_people_messages import InvitationView
+from backend.api.models_people import (
+    ChatLog,
+    JoinAsGuest,
+    MadeInvitation,
+    NewGrant,
+    NewInvitation,
+    PeopleList,
+    Session,
+)
+from backend.api.own_session import address_of, with_cookie
+from backend.api.people_record import TheRecord
+from backend.api.security import require_right
+from backend.people.errors import Forbidden, NotLoggedIn
+
+router = APIRouter()
+
+
+def _live_of(request: Request) -> LiveHub:
+    live = request.app.state.live
+    if not isinstance(live, LiveHub):
+        raise TypeError("the application was made without a live hub")
+    return live
+
+
+TheLive = Annotated[LiveHub, Depends(_live_of)]
+
+
+# --- who is here ----------------------------------------------------------------------
+
+
+@router.get("/people")
+async def people_here(live: TheLive, me: Me) -> PeopleList:
+    """Who is connected."""
+    return PeopleList(people=live.people.here(me.session))
+
+
+@router.get("/chat")
+async def chat(people: ThePeople) -> ChatLog:
+    """The last lines of the chat."""
+    return ChatLog(lines=[chat_line(said) for said in people.support.chat()])
+
+
+# --- remote support -------------------------------------------------------------------
+
+
+@router.post("/guests", status_code=201)
+async def join(
+    request: Request, response: Response, people: ThePeople, record: TheRecord, body: JoinAsGuest
+) -> Session:
+    """Come in as a guest, by the link and the code of an invitation."""
+    people.require_accounts()
+    try:
+        secret, invitation = people.support.join(body.link, body.code, address_of(request))
+    except NotLoggedIn as error:
+        record.note(
+            "invitation",
+            "refused",
+            f"a guest was refused from {address_of(request)}: {error.message}",
+            target=address_of(request),
+            person="",
+            outcome=error.message,
+            level="warning",
+        )
+        raise
+    record.note(
+        "invitation",
+        "joined",
+        f"{invitation.guest} joined as a guest from {address_of(request)}",
+        target=address_of(request),
+        person=f"{invitation.guest} (guest)",
+        level="warning",
+    )
+    return with_cookie(request, response, people, secret)
+
+
+@router.get("/invitations")
+async def invitations(live: TheLive, me: Me) -> list[InvitationView]:
+    """Invitations since the server was started, newest first."""
+    return live.people.invitations(me)
+
+
+@router.post("/invitations", status_code=201)
+async def invite(
+    people: ThePeople, live: TheLive, record: TheRecord, me: Me, body: NewInvitation
+) -> MadeInvitation:
+    """Invite a guest. The link and the code go to them by different ways."""
+    people.require_accounts()
+    if me.kind == "token":
+        raise Forbidden("a script invites nobody", remedy="do it on the page")
+    secret, made = people.support.invite(
+        me.person, body.guest, frozenset(body.allowed), body.minutes * 60.0
+    )
+    allowed = ", ".join(sorted(made.allowed)) or "look only"
+    record.note(
+        "invitation",
+        "made",
+        f"{me.person} invited {made.guest} for {body.minutes:g} min ({allowed})",
+        target=made.guest,
+        new=f"{allowed}, {body.minutes:g} min",
+        level="warning",
+        person=me.person,
+    )
+    view = live.people.invitation(made, host=True, identity=me)
+    return MadeInvitation(invitation=view, link=f"/guest/{secret}")
+
+
+@router.delete("/invitations/{invitation_id}")
+async def revoke_invitation(
+    people: ThePeople, live: TheLive, record: TheRecord, me: Me, invitation_id: str
+) -> InvitationView:
+    """End an invitation; its guest is out at once and what they move stops."""
+    ended = people.support.revoke(invitation_id, f"ended by {me.person}")
+    record.note(
+        "invitation",
+        "ended",
+        f"{me.person} ended the invitation of {ended.guest}",
+        target=ended.guest,
+        level="warning",
+        person=me.person,
+    )
+    return live.people.invitation(ended, host=True, identity=me)
+
+
+@router.put("/invitations/{invitation_id}/grant")
+async def grant(
+    people: ThePeople,
+    live: TheLive,
+    record: TheRecord,
+    me: Me,
+    invitation_id: str,
+    body: NewGrant,
+) -> InvitationView:
+    """Let a guest do more for some minutes. One cannot give what one does not have."""
+    for right in body.rights:
+        require_right(people, me, right, body.drive)
+    if body.drive is not None:
+        live.bench.member(body.drive)
+    rights = f"{', '.join(sorted(body.rights))} for {body.minutes:g} min"
+    granted = people.support.grant(
+        invitation_id, me.person, frozenset(body.rights), body.minutes * 60.0, body.drive
+    )
+    record.note(
+        "invitation",
+        "granted",
+        f"{me.person} granted {granted.guest} {rights}",
+        target=granted.guest,
+        new=rights,
+        level="warning",
+        drive=body.drive,
+        person=me.person,
+    )
+    return live.people.invitation(granted, host=True, identity=me)
+
+
+@router.delete("/invitations/{invitation_id}/grant")
+async def withdraw_grant(
+    people: ThePeople, live: TheLive, record: TheRecord, me: Me, invitation_id: str
+) -> InvitationView:
+    """Withdraw a grant at once; what the guest moves stops."""
+    ended = people.support.withdraw(invitation_id, f"the grant was withdrawn by {me.person}")
+    record.note(
+        "invitation",
+        "grant withdrawn",
+        f"{me.person} withdrew the grant of {ended.guest}",
+        target=ended.guest,
+        level="warning",
+        person=me.person,
+    )
+    return live.people.invitation(ended, host=True, identity=me)
