@@ -92,11 +92,6 @@ def parents(stations: Sequence[PortCounters]) -> dict[int, tuple[int, int]]:
     return found
 
 
-def cable_findings(stations: Sequence[PortCounters]) -> list[str]:
-    """The sentences of `findings`."""
-    return [finding.text for finding in findings(stations, parents(stations))]
-
-
 def findings(
     stations: Sequence[PortCounters], upstream: Mapping[int, tuple[int, int]]
 ) -> list[Finding]:

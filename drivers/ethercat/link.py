@@ -231,11 +231,6 @@ class EthercatLink:
         """
         await self._call({"op": "state", "station": station, "state": state.name}, _ANSWER_S)
 
-    async def port_counters(self) -> tuple[list[Message], list[str]]:
-        """ESC error counters per port, and which cable they accuse, in words."""
-        answer: Message = await self._call({"op": "counters"}, _ANSWER_S)
-        return answer["ports"], answer["findings"]
-
     async def survey(self) -> Survey:
         """The segment as it is now: stations in the order of the cable, ports, findings.
 

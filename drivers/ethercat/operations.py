@@ -257,8 +257,7 @@ class Operations:
         found = esc.findings(known, upstream)
         return {
             "ports": [asdict(p) for p in known],
-            "findings": [finding.text for finding in found],
-            "accused": [asdict(finding) for finding in found],
+            "findings": [asdict(finding) for finding in found],
             "stations": [
                 self._found(station)
                 | {

@@ -81,7 +81,7 @@ def survey_from(answer: Message) -> Survey:
     """From the host's answer to "counters"."""
     ports = {item["station"]: _ports(item) for item in answer["ports"]}
     stations = tuple(_station(item, ports.get(item["station"])) for item in answer["stations"])
-    return Survey(stations, tuple(Finding(**item) for item in answer["accused"]))
+    return Survey(stations, tuple(Finding(**item) for item in answer["findings"]))
 
 
 def exchange_from(status: Message) -> ExchangeFigures | None:

@@ -193,10 +193,11 @@ async def test_a_cut_cable_is_told_and_heals_by_itself(rig: Rig) -> None:
         rig.do("heal")
         await bus.told("station 2", "answers again")
         assert await bus.link.read(2, STATUS) == b"\x50\x02"
-        ports, findings = await bus.link.port_counters()
-        assert len(ports) == 2
+        survey = await bus.link.survey()
+        assert len(survey.stations) == 2
         assert any(
-            "cable between station 1 and station 2: the link was lost" in f for f in findings
+            "cable between station 1 and station 2: the link was lost" in finding.text
+            for finding in survey.findings
         )
 
 

@@ -183,8 +183,9 @@ def test_counters_name_the_cable() -> None:
     counters = bytearray(20)
     counters[1] = 7  # port 0: RX errors
     counters[17] = 2  # port 1: lost links
-    found = esc.cable_findings([ports(1, 1), ports(2, 1, counters=bytes(counters)), ports(3)])
-    assert found == [
+    line = [ports(1, 1), ports(2, 1, counters=bytes(counters)), ports(3)]
+    found = esc.findings(line, esc.parents(line))
+    assert [finding.text for finding in found] == [
         "cable between station 1 and station 2: damaged frames arrived 7 times;"
         " check cable, screen and earth",
         "cable between station 2 and station 3: the link was lost 2 times; check plug and cable",
@@ -194,7 +195,8 @@ def test_counters_name_the_cable() -> None:
 def test_errors_that_were_only_passed_on_accuse_nobody() -> None:
     counters = bytearray(20)
     counters[0], counters[8] = 5, 5  # port 0: invalid frames, all of them forwarded
-    assert esc.cable_findings([ports(1, 1), ports(2, counters=bytes(counters))]) == []
+    line = [ports(1, 1), ports(2, counters=bytes(counters))]
+    assert esc.findings(line, esc.parents(line)) == []
 
 
 def test_eeprom_checksum() -> None:
