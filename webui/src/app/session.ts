@@ -9,7 +9,7 @@ let asking = false
 /** A flag of the browser's tab: somebody was logged in, so STOP may still be theirs. */
 const WAS_IN = 'servodeck.wasIn'
 
-export const currentSession = () => session
+const currentSession = () => session
 export const useSession = () => useStore('session', currentSession)
 export const mayHaveStop = () => sessionStorage.getItem(WAS_IN) !== null
 

@@ -21,7 +21,7 @@ export function stateLook(state: AxisState | null): { tone: string; icon: IconNa
 }
 
 /** Counters that mean trouble on a link. */
-export function troubles(quality: Quality): number {
+function troubles(quality: Quality): number {
   return (
     quality.timeouts +
     quality.crc_errors +

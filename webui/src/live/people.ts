@@ -24,7 +24,6 @@ export const people: People = {
 export const usePeople = () => useStore('people', () => people.here)
 export const useNotices = () => useStore('notices', () => people.notices)
 export const usePointers = () => useStore('pointers', () => people.pointers)
-export const useCursors = () => useStore('cursors', () => people.cursors)
 export const useChat = () => useStore('chat', () => people.chat)
 
 export function setPeople(here: PeopleHere): void {

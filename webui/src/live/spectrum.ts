@@ -89,7 +89,7 @@ function weights(kind: WindowKind, n: number): Float64Array {
 }
 
 /** Equally spaced samples, and whether they had to be made so. */
-export function evenly(
+function evenly(
   times: Float64Array,
   values: Float64Array,
   tolerance = EVEN.polled,

@@ -2,6 +2,7 @@ import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { figure } from '../widgets/format'
+import { axisLook } from './axis'
 import { lineWidth } from './line-width'
 import { sharedCursor } from './shared-cursor'
 
@@ -61,16 +62,8 @@ function options(
   look: { xLabel: string; yLabel: string; label: string; color: string; logarithmic: boolean },
   size: { width: number; height: number },
 ): uPlot.Options {
-  const style = getComputedStyle(document.documentElement)
-  const line = { stroke: style.getPropertyValue('--line'), width: 1 }
-  const font = `12px ${getComputedStyle(document.body).fontFamily}`
   const axis = {
-    stroke: style.getPropertyValue('--dim'),
-    font,
-    labelFont: font,
-    grid: line,
-    ticks: line,
-    labelSize: 18,
+    ...axisLook(),
     values: (_plot: uPlot, splits: number[]) =>
       splits.map((value) => (value === null ? '' : figure(value, 5))),
   }

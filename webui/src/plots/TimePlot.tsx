@@ -3,6 +3,7 @@ import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import type { Columns } from '../live/decimate'
 import { figure } from '../widgets/format'
+import { axisLook } from './axis'
 import { listen, type PlotEvents } from './gestures'
 import { lineWidth } from './line-width'
 import { Extent, type Span, withAir } from './yscale'
@@ -177,16 +178,9 @@ function options(
   frame: () => PlotFrame | null,
   stretch: (from: number, to: number) => void,
 ): uPlot.Options {
-  const style = getComputedStyle(document.documentElement)
-  const text = style.getPropertyValue('--dim')
-  const grid = style.getPropertyValue('--line')
-  const font = `12px ${getComputedStyle(document.body).fontFamily}`
+  const look = axisLook()
   const axis = (extra: Partial<uPlot.Axis>): uPlot.Axis => ({
-    stroke: text,
-    font,
-    labelFont: font,
-    grid: { stroke: grid, width: 1 },
-    ticks: { stroke: grid, width: 1 },
+    ...look,
     values: (_plot, splits) => splits.map((value) => figure(value, 6)),
     ...extra,
   })
@@ -200,7 +194,7 @@ function options(
             values: (_plot, splits) =>
               splits.map((value, i) => (i === splits.length - 1 ? name : figure(value, 4))),
           }
-        : { label: name, labelSize: 18 }
+        : { label: name }
   return {
     ...size,
     legend: { show: false },
@@ -211,16 +205,16 @@ function options(
       ...Object.fromEntries(names.map((name) => [name, { auto: false }])),
     },
     axes: [
-      axis({ label: timeLabel, labelSize: 18, size: 34 }),
+      axis({ label: timeLabel, size: 34 }),
       ...names.map((name, i) =>
         axis({
           scale: name,
           ...named(name),
-          stroke: ownColor(series, name) ?? text,
+          stroke: ownColor(series, name) ?? look.stroke,
           size: narrow ? 42 : 60,
           // eslint-disable-next-line @typescript-eslint/no-unsafe-enum-assignment -- see LEFT
           side: i % 2 === 0 ? LEFT : RIGHT,
-          grid: { show: i === 0, stroke: grid, width: 1 },
+          grid: { ...look.grid, show: i === 0 },
         }),
       ),
     ],
@@ -235,7 +229,7 @@ function options(
       })),
     ],
     hooks: {
-      draw: [(plot) => drawMarks(plot, frame(), text), (plot) => drawBeyond(plot, frame(), series)],
+      draw: [(plot) => drawMarks(plot, frame(), look.stroke), (plot) => drawBeyond(plot, frame(), series)],
       setSelect: [
         (plot) => {
           const now = frame()

@@ -19,7 +19,7 @@ export function useReachable(drive: string, keys: readonly string[]): ParameterR
 }
 
 /** Read parameters whose values are not known yet, or all of them. */
-export async function readKeys(drive: string, keys: string[]): Promise<void> {
+async function readKeys(drive: string, keys: string[]): Promise<void> {
   if (keys.length === 0) return
   setJob(
     await ask(
@@ -32,7 +32,7 @@ export async function readKeys(drive: string, keys: string[]): Promise<void> {
 }
 
 /** Raw values as they are before a write, to take it back. */
-export function rawsOf(drive: string, keys: string[]): Record<string, number> {
+function rawsOf(drive: string, keys: string[]): Record<string, number> {
   const readings = contents.readings.get(drive)
   const found: Record<string, number> = {}
   for (const key of keys) {

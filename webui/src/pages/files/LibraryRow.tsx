@@ -18,7 +18,7 @@ export function contentUrl(entry: LibraryEntry, version?: number): string {
 }
 
 /** What an entry is, in one line. */
-export function factsOf(t: T, entry: LibraryEntry): string {
+function factsOf(t: T, entry: LibraryEntry): string {
   const { latest } = entry
   const fact = (name: string) => latest.facts[name]
   const seconds = fact('duration_s')

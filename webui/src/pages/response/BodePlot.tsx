@@ -2,6 +2,7 @@ import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import type { PlotName } from '../../live/cursors'
+import { axisLook } from '../../plots/axis'
 import { sharedCursor } from '../../plots/shared-cursor'
 import { figure } from '../../widgets/format'
 import { type Curve, gridOf, hertz, logTicks, onGrid, type Part, partOf, rangeOf } from './bode'
@@ -173,18 +174,8 @@ function options(
   size: { width: number; height: number },
   frame: () => Frame,
 ): uPlot.Options {
-  const style = getComputedStyle(document.documentElement)
-  const text = style.getPropertyValue('--dim')
-  const grid = style.getPropertyValue('--line')
-  const soft = style.getPropertyValue('--accent-soft')
-  const font = `12px ${getComputedStyle(document.body).fontFamily}`
-  const common: uPlot.Axis = {
-    stroke: text,
-    font,
-    labelFont: font,
-    grid: { stroke: grid, width: 1 },
-    ticks: { stroke: grid, width: 1 },
-  }
+  const soft = getComputedStyle(document.documentElement).getPropertyValue('--accent-soft')
+  const common = axisLook()
   const series: uPlot.Series[] = [{}]
   const bands: uPlot.Band[] = []
   for (const curve of curves) {
@@ -232,7 +223,6 @@ function options(
         size: 58,
         // A label on every part, so that their frequency axes stand in line.
         label: unit || ' ',
-        labelSize: 18,
         ...(part === 'phase' ? { incrs: [15, 30, 45, 90, 180, 360] } : {}),
         ...(part === 'coherence' ? { splits: () => [0, 0.5, 1] } : {}),
         values: (_plot, splits) => splits.map((value) => figure(value, 4)),

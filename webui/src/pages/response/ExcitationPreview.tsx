@@ -1,9 +1,10 @@
-import { useEffect, useMemo, useState } from 'react'
-import { api, ask, problemOf } from '../../api/client'
-import type { ExcitationInfo, Problem, SweepRequest } from '../../api/schema'
+import { useMemo } from 'react'
+import { api, ask } from '../../api/client'
+import type { ExcitationInfo, SweepRequest } from '../../api/schema'
 import { useT } from '../../i18n'
 import { figure } from '../../widgets/format'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAnswer } from '../../widgets/useAnswer'
 import { TRACE_COLORS } from '../scope/channels'
 import { fixed, hertz } from './bode'
 import { StepPlot } from './StepPlot'
@@ -22,36 +23,18 @@ export function ExcitationPreview({
   dark: boolean
 }) {
   const t = useT()
-  const [found, setFound] = useState<ExcitationInfo | null>(null)
-  const [problem, setProblem] = useState<Problem | null>(null)
-  const asked = JSON.stringify(request)
-  useEffect(() => {
-    if (!request) return
-    let current = true
-    const timer = setTimeout(() => {
-      ask(
-        api.POST('/api/v1/drives/{drive_id}/tune/excitation', {
-          params: { path: { drive_id: drive } },
-          body: request,
-        }),
-      ).then(
-        (made) => {
-          if (!current) return
-          setFound(made)
-          setProblem(null)
-        },
-        (error: unknown) => {
-          if (!current) return
-          setFound(null)
-          setProblem(problemOf(error))
-        },
-      )
-    }, SETTLE_MS)
-    return () => {
-      current = false
-      clearTimeout(timer)
-    }
-  }, [asked, drive])
+  const { found, problem } = useAnswer<ExcitationInfo>(
+    request &&
+      (() =>
+        ask(
+          api.POST('/api/v1/drives/{drive_id}/tune/excitation', {
+            params: { path: { drive_id: drive } },
+            body: request,
+          }),
+        )),
+    SETTLE_MS,
+    [JSON.stringify(request), drive],
+  )
   const name = t('excite.one')
   const traces = useMemo(
     () =>

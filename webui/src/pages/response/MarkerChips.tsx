@@ -9,7 +9,7 @@ const FINE = 1.001
 const COARSE = 1.1
 
 /** A key's factor on a frequency; null for keys that move nothing. */
-export function factorOf(key: string, fine: boolean): number | null {
+function factorOf(key: string, fine: boolean): number | null {
   const step = fine ? FINE : STEP
   if (key === 'ArrowRight' || key === 'ArrowUp') return step
   if (key === 'ArrowLeft' || key === 'ArrowDown') return 1 / step

@@ -2,6 +2,7 @@ import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import type { PlotName } from '../../live/cursors'
+import { axisLook } from '../../plots/axis'
 import { sharedCursor } from '../../plots/shared-cursor'
 import { figure } from '../../widgets/format'
 
@@ -71,16 +72,8 @@ function options(
   timeLabel: string,
   size: { width: number; height: number },
 ): uPlot.Options {
-  const style = getComputedStyle(document.documentElement)
-  const line = { stroke: style.getPropertyValue('--line'), width: 1 }
-  const font = `12px ${getComputedStyle(document.body).fontFamily}`
   const axis = {
-    stroke: style.getPropertyValue('--dim'),
-    font,
-    labelFont: font,
-    grid: line,
-    ticks: line,
-    labelSize: 18,
+    ...axisLook(),
     values: (_plot: uPlot, splits: number[]) => splits.map((value) => figure(value, 5)),
   }
   return {

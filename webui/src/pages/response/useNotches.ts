@@ -1,6 +1,7 @@
-import { useEffect, useState } from 'react'
-import { api, ask, problemOf } from '../../api/client'
-import type { NotchPreviewInfo, NotchSlotInfo, Problem } from '../../api/schema'
+import { useState } from 'react'
+import { api, ask } from '../../api/client'
+import type { NotchPreviewInfo, NotchSlotInfo } from '../../api/schema'
+import { useAnswer } from '../../widgets/useAnswer'
 import { useFetched } from '../../widgets/useFunctions'
 import type { NotchShape } from './results'
 
@@ -21,8 +22,6 @@ export const legible = (notch: NotchShape): NotchShape => ({
 /** Notches of a drive as they are, as they are wanted, and what the drive would make of that. */
 export function useNotches(drive: string, frequency: number[]) {
   const [wanted, setWanted] = useState<(NotchShape | null)[]>([])
-  const [preview, setPreview] = useState<NotchPreviewInfo | null>(null)
-  const [refused, setRefused] = useState<Problem | null>(null)
   const path = { params: { path: { drive_id: drive } } }
   const slots = useFetched<NotchSlotInfo[]>(async () => {
     const found = await ask(api.GET('/api/v1/drives/{drive_id}/notches', path))
@@ -32,33 +31,18 @@ export function useNotches(drive: string, frequency: number[]) {
   const { problem, read } = slots
   const now = problem ? null : slots.data
   const asked = JSON.stringify(wanted)
-  useEffect(() => {
-    if (!now) return
-    let current = true
-    const timer = setTimeout(() => {
-      ask(
-        api.POST('/api/v1/drives/{drive_id}/notches/preview', {
-          ...path,
-          body: { notches: wanted, frequency_hz: frequency.slice(0, MOST_LINES) },
-        }),
-      ).then(
-        (made) => {
-          if (!current) return
-          setPreview(made)
-          setRefused(null)
-        },
-        (error: unknown) => {
-          if (!current) return
-          setPreview(null)
-          setRefused(problemOf(error))
-        },
-      )
-    }, SETTLE_MS)
-    return () => {
-      current = false
-      clearTimeout(timer)
-    }
-  }, [asked, drive, now, frequency])
+  const { found: preview, problem: refused } = useAnswer<NotchPreviewInfo>(
+    now &&
+      (() =>
+        ask(
+          api.POST('/api/v1/drives/{drive_id}/notches/preview', {
+            ...path,
+            body: { notches: wanted, frequency_hz: frequency.slice(0, MOST_LINES) },
+          }),
+        )),
+    SETTLE_MS,
+    [asked, drive, now, frequency],
+  )
   const set = (slot: number, notch: NotchShape | null) =>
     setWanted((old) => old.map((each, i) => (i === slot ? notch : each)))
   /** A notch in the first free slot; false where all are taken. */

@@ -23,7 +23,7 @@ export function packSnapshot(
 }
 
 /** The traces of a snapshot's file. */
-export function unpackSnapshot(data: ArrayBuffer): { header: SnapshotHeader; samples: Samples[] } {
+function unpackSnapshot(data: ArrayBuffer): { header: SnapshotHeader; samples: Samples[] } {
   const view = new DataView(data)
   const length = view.getUint32(MAGIC.length, true)
   const begin = MAGIC.length + 4
