@@ -229,7 +229,10 @@ function options(
       })),
     ],
     hooks: {
-      draw: [(plot) => drawMarks(plot, frame(), look.stroke), (plot) => drawBeyond(plot, frame(), series)],
+      draw: [
+        (plot) => drawMarks(plot, frame(), look.stroke),
+        (plot) => drawBeyond(plot, frame(), series),
+      ],
       setSelect: [
         (plot) => {
           const now = frame()
