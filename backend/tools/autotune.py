@@ -36,7 +36,7 @@ from backend.tools.tune_candidates import (
 )
 from backend.tools.tune_notches import Learning, learn_notches
 from backend.tools.tune_present import Trials
-from backend.tools.tune_verify import Check, Keep, Verified, otherwise
+from backend.tools.tune_verify import Check, Keep, Verified, otherwise, unseen
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 
@@ -298,7 +298,10 @@ async def apply_and_verify(
             "or choose gains by hand",
         )
     by_step = "" if applied.verified.sweep.margins else _BY_STEP
-    said = (by_step, trials.note(applied), otherwise(applied.verified))
+    said = (
+        by_step, trials.note(applied), otherwise(applied.verified),
+        unseen(applied.candidate.nominal.crossover_hz, applied.verified),
+    )  # fmt: skip
     notes = (*found.notes, *(each for each in said if each))
     return replace(
         found, applied=applied.candidate, verified=applied.verified, step=applied.verified.step,

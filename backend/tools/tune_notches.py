@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
@@ -15,6 +17,9 @@ from backend.tools.probe import PULLED
 from backend.tools.recording import cycle_s
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
+
+#: A resonance that rises by less bounds no gain.
+_RISES_DB = 6.0
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,9 @@ async def learn_notches(
     """
     if not notch_effect.unknown(axis.drive) or meaning_of(axis.drive) is not None:
         return ""
-    if mechanics.model is None or not any(r.kind == "resonance" for r in mechanics.resonances):
+    if not any(r.kind == "resonance" for r in mechanics.resonances):
+        return out_of_sight(mechanics)
+    if mechanics.model is None:
         return ""
     found = outcome.result
     held = abs(found.gravity_nm.value) > PULLED * facts.rated_torque_nm
@@ -55,6 +62,22 @@ async def learn_notches(
         return f"designed without notches: {error.message}"
     remember(axis.drive, meaning)
     return ""
+
+
+def out_of_sight(mechanics: sweep_evaluation.SweepResult) -> str:
+    """That a resonance above the measured lines bounds the gain, in words; else empty."""
+    model, frf = mechanics.model, mechanics.frf
+    highest_hz = float(np.max(frf.frequency_hz[frf.in_band], initial=0.0))
+    above = [m for m in model.modes if m.frequency_hz > highest_hz] if model is not None else []
+    rising = [m for m in above if model is not None and model.height_db(m) > _RISES_DB]
+    if not rising:
+        return ""
+    near_hz = min(mode.frequency_hz for mode in rising)
+    return (
+        f"designed without notches: a resonance near {near_hz:.0f} Hz bounds the gain, and what "
+        "this drive's notches do can be measured only where one shows, which with this cycle "
+        f"time is up to {highest_hz:.0f} Hz: a shorter cycle allows more"
+    )
 
 
 async def _learn_free(

@@ -178,6 +178,23 @@ def otherwise(verified: Verified) -> str:
     )
 
 
+def unseen(last_hz: float | None, verified: Verified) -> str:
+    """That the last crossover predicted lies above what was verified, in words; else empty.
+
+    The motor of a soft axis is alone above its resonances, and lighter: its loop may cross 0 dB
+    for the last time where the samples of this exchange tell nothing.
+    """
+    frf = verified.sweep.frf
+    lines = frf.frequency_hz[frf.in_band & (frf.coherence > _COHERENT)]
+    if not verified.sweep.margins or last_hz is None or last_hz <= np.max(lines, initial=0.0):
+        return ""
+    return (
+        f"the loop crosses 0 dB for the last time at {last_hz:.0f} Hz, above the "
+        f"{np.max(lines):.0f} Hz that were verified with this cycle time: its margins there are "
+        "predicted, and seen by the standstill and the step alone; a shorter cycle shows them"
+    )
+
+
 def hum(step: step_tool.StepResult) -> str:
     """Empty where the torque is quiet before the step, else in words.
 

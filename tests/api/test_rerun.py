@@ -73,8 +73,8 @@ def test_feed_is_what_reruns_own_reader_reads(
         log += words(path)
         for entity, rows in entities(path).items():
             seen[entity] = seen.get(entity, 0) + rows
-    assert {"x/inc", "x/inc_s"} <= set(seen), seen
-    assert seen["x/inc"] > 5
+    assert {"x/rev", "x/rpm"} <= set(seen), seen
+    assert seen["x/rev"] > 5
     assert any("is now 2345" in text for text in log), log
 
 

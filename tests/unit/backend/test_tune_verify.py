@@ -11,7 +11,14 @@ from backend.analysis.frf import Frf
 from backend.analysis.loop_goals import Goals
 from backend.tools.step_response import LEAD_S, StepResult
 from backend.tools.sweep_evaluation import SweepResult
-from backend.tools.tune_verify import Verified, hum, otherwise, sharp_margins, worse_than
+from backend.tools.tune_verify import (
+    Verified,
+    hum,
+    otherwise,
+    sharp_margins,
+    unseen,
+    worse_than,
+)
 
 PROMISED = Goals(gain_margin_db=9.0, phase_margin_deg=48.0, ms=1.8)
 
@@ -93,3 +100,20 @@ def test_a_bandwidth_that_is_not_as_predicted_is_told(
     """The aim is 10 % (tuning.md, section 5)."""
     verified = Verified(loop_swept(1.0), None, PROMISED, predicted_hz, measured_hz, True, "")
     assert bool(otherwise(verified)) is told
+
+
+@pytest.mark.parametrize(
+    ("last_hz", "read", "told"),
+    [(300.0, True, False), (650.0, True, True), (None, True, False), (650.0, False, False)],
+)
+def test_a_crossover_above_the_verified_lines_is_told(
+    last_hz: float | None, read: bool, told: bool
+) -> None:
+    """The lines end at 400 Hz; where no margins were read at all that is said instead."""
+    margins = sharp_margins(loop_swept(1.0)) if read else {}
+    swept = replace(loop_swept(1.0), margins=margins)
+    words = unseen(last_hz, Verified(swept, None, PROMISED, 60.0, 60.0, True, ""))
+    assert bool(words) is told
+    if told:
+        assert "650 Hz" in words
+        assert "400 Hz" in words

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import subprocess
 import sys
+import termios
 import textwrap
 import threading
 import time
@@ -183,6 +185,28 @@ def test_an_adapter_that_does_not_know_flags_is_asked_twice_a_second_at_most() -
     for _ in range(50):
         bus._read(0)
     assert port.sent.count(b"F\r") == 1
+
+
+class _Interrupted(_Refusing):
+    """Its flush is broken off, once by a signal and then for good where `code` says so."""
+
+    def __init__(self, *codes: int) -> None:
+        super().__init__()
+        self._codes = list(codes)
+
+    def flush(self) -> None:
+        if self._codes:
+            raise termios.error(self._codes.pop(0), "broken off")
+
+
+def test_a_signal_while_a_frame_drains_loses_no_adapter() -> None:
+    bus = SlcanBus.__new__(SlcanBus)
+    bus.serialPortOrig = port = _Interrupted(errno.EINTR, errno.EINTR)
+    bus._write("t6050")
+    assert port.sent == [b"t6050\r"]
+    bus.serialPortOrig = _Interrupted(errno.EIO)
+    with pytest.raises(can.CanOperationError, match="the adapter is gone"):
+        bus._write("t6050")
 
 
 async def test_wire_time_is_emulated_on_request(tmp_path: Path) -> None:
