@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from drivers.errors import DriveError, ProtocolError, Rejected
 from drivers.ethercat.mailbox import FOE, Mail, Mailbox
+from drivers.ethercat.registers import GONE_S
 from drivers.ethercat.steps import Pause, Steps
 
 ERASE_S, PACKET_S = 30.0, 10.0
@@ -73,7 +74,8 @@ def write_file(
 def _until_acknowledged(box: Mailbox, mail: bytes, packet: int, timeout_s: float) -> Steps[None]:
     waited = 0.0
     while True:
-        answer = yield from box.request(FOE, mail, _is_foe, timeout_s)
+        # Broken off it leaves a drive without firmware: a computer that stands still is no reason.
+        answer = yield from box.request(FOE, mail, _is_foe, timeout_s, gone_s=GONE_S)
         code = answer[0]
         if code == _ACK:
             told = int.from_bytes(answer[2:6], "little")

@@ -144,10 +144,12 @@ class Mailbox:
         timeout_s: float | None = None,
         *,
         keep: bool = False,
+        gone_s: float = _DEAD_S,
     ) -> Steps[bytes]:
         """Send a mail and wait for the one that ``matches``; others are dropped.
 
-        With ``keep`` others are kept for the transaction that this one has overtaken.
+        With ``keep`` others are kept for the transaction that this one has overtaken. For
+        ``gone_s`` frames may be lost before the station is taken for gone.
 
         Raises:
             LinkLost: the station answers no frame at all.
@@ -159,8 +161,12 @@ class Mailbox:
         epoch = self.epoch
         self._next_counter()
         mail = frame(protocol, self.counter, payload, self.out_size)
-        delivered = yield from self._send(mail, epoch)
-        return (yield from self._wait(mail, delivered, matches, deadline, epoch=epoch, keep=keep))
+        delivered = yield from self._send(mail, epoch, gone_s)
+        return (
+            yield from self._wait(
+                mail, delivered, matches, deadline, epoch=epoch, keep=keep, gone_s=gone_s
+            )
+        )
 
     def overtake(self) -> None:
         """From here on nothing that is under way is sent again (ETG.1000.4 clause 5.6).
@@ -176,7 +182,7 @@ class Mailbox:
         """Send a mail that nobody answers."""
         self._next_counter()
         mail = frame(protocol, self.counter, payload, self.out_size)
-        yield from self._send(mail, self.epoch)
+        yield from self._send(mail, self.epoch, _DEAD_S)
 
     def receive(self, matches: Callable[[Mail], bool], timeout_s: float) -> Steps[bytes]:
         """Wait for one more mail, as within a file transfer."""
@@ -196,13 +202,13 @@ class Mailbox:
     def _next_counter(self) -> None:
         self.counter = self.counter + 1 if self.counter < 7 else 2
 
-    def _send(self, mail: bytes, epoch: int) -> Steps[bool]:
+    def _send(self, mail: bytes, epoch: int, gone_s: float) -> Steps[bool]:
         """True when the slave certainly has the mail.
 
         False where a lost frame or a mailbox that is still full leaves it open: `_wait` sends it
         again. What lies in the other mailbox is left alone, it may already be the answer.
         """
-        tries, deadline = 0, self.clock() + _DEAD_S
+        tries, deadline = 0, self.clock() + gone_s
         while tries < _DEAD_READS or self.clock() < deadline:
             tries += 1
             if (yield Write(self.out_address, mail)) is not None:
@@ -224,6 +230,7 @@ class Mailbox:
         *,
         epoch: int,
         keep: bool = False,
+        gone_s: float = _DEAD_S,
     ) -> Steps[bytes]:
         asked = self.clock()
         resend_at = asked + _RESEND_S
@@ -241,7 +248,7 @@ class Mailbox:
             if self.epoch != epoch:
                 return self._kept(matches, early)
             if dead >= _DEAD_READS:
-                if self.clock() - dead_from > _DEAD_S:
+                if self.clock() - dead_from > gone_s:
                     self.unsettled = True
                     raise _lost()
                 yield Pause(_DEAD_PAUSE_S)

@@ -7,6 +7,18 @@ const SEND_MS = 80
 /** This page's place, as the others are told. */
 const here = () => window.location.hash.replace(/^#/, '')
 
+/**
+ * Where the content of a page lies in the window, px: what a pointer's place is counted in. What is
+ * told above the content is everybody's own, so its height does not count.
+ */
+function content(): { left: number; top: number; width: number; height: number } | null {
+  const main = document.getElementById('main')
+  const room = main?.querySelector(':scope > .room')
+  if (!main || !room) return null
+  const { left, top, width, height } = room.getBoundingClientRect()
+  return { left, top, width, height: Math.max(height, main.clientHeight) }
+}
+
 /** Pointers of others on the same page, and telling them of this one, while a guest is here. */
 export function PointerLayer() {
   const people = usePeople()
@@ -24,8 +36,8 @@ export function PointerLayer() {
     return () => window.removeEventListener('hashchange', tell)
   }, [])
   useEffect(() => (shared ? follow() : undefined), [shared])
-  const main = document.getElementById('main')
-  if (!shared || !main) return null
+  const box = shared ? content() : null
+  if (!box) return null
   return (
     <div className="pointers" aria-hidden="true">
       {[...pointers.values()]
@@ -35,8 +47,8 @@ export function PointerLayer() {
             key={each.connection}
             className="pointer"
             style={{
-              left: (each.x ?? 0) * main.scrollWidth - main.scrollLeft + main.offsetLeft,
-              top: (each.y ?? 0) * main.scrollHeight - main.scrollTop + main.offsetTop,
+              left: box.left + (each.x ?? 0) * box.width,
+              top: box.top + (each.y ?? 0) * box.height,
             }}
           >
             {each.person}
@@ -51,13 +63,12 @@ function follow(): () => void {
   let next: { x: number; y: number } | null = null
   let sent: string | null = null
   const move = (event: PointerEvent) => {
-    const main = document.getElementById('main')
-    if (!main) return
-    const box = main.getBoundingClientRect()
+    const box = content()
+    if (!box) return
     const share = (value: number, whole: number) => Math.min(1, Math.max(0, value / whole))
     next = {
-      x: share(event.clientX - box.left + main.scrollLeft, main.scrollWidth),
-      y: share(event.clientY - box.top + main.scrollTop, main.scrollHeight),
+      x: share(event.clientX - box.left, box.width),
+      y: share(event.clientY - box.top, box.height),
     }
   }
   const gone = () => (next = null)
