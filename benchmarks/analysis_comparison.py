@@ -28,7 +28,7 @@ from scipy.signal import csd, find_peaks, welch  # noqa: E402
 from backend.analysis.arrays import ComplexArray, FloatArray  # noqa: E402
 from backend.analysis.chirp import chirp  # noqa: E402
 from backend.analysis.excitation import scaled  # noqa: E402
-from backend.analysis.frf_aperiodic import estimate_stepped  # noqa: E402
+from backend.analysis.frf_stepped import estimate_stepped  # noqa: E402
 from backend.analysis.identify import Identification, identify_mechanics  # noqa: E402
 from backend.analysis.line_spectra import Record  # noqa: E402
 from backend.analysis.sampling import SignalPath  # noqa: E402

@@ -55,7 +55,6 @@ class InertiaResult:
     gravity_nm: Interval
     load_ratio: float | None
     r2: float
-    samples_used: int
     identifiable: bool
     verdict: str
 
@@ -241,7 +240,7 @@ def estimate_inertia(
     keep[: kernel.size] = keep[-kernel.size :] = False
     samples, saturated_share = int(np.count_nonzero(keep)), float(np.mean(saturated))
     if samples < _FEWEST:
-        return _nothing(samples, saturated_share)
+        return _nothing(saturated_share)
     acceleration = matrix[:, 0]
     swings = find_swings(matrix, torque, acceleration, keep, sample_rate_hz, _SWINGS_TO * cutoff_hz)
     lags = [lag_of_load(acceleration, s, sample_rate_hz) for s in swings]
@@ -279,13 +278,13 @@ def _columns(
     )  # fmt: skip
 
 
-def _nothing(samples: int, saturated_share: float) -> InertiaResult:
+def _nothing(saturated_share: float) -> InertiaResult:
     """The answer where there is next to nothing to regress over."""
     nothing = Interval(float("nan"), float("nan"), float("nan"))
     reason = "too few samples in motion: raise travel or speed"
     if saturated_share > 0.05:
         reason += f"\n{_AT_LIMIT}"
-    return InertiaResult(nothing, nothing, nothing, nothing, None, 0.0, samples, False, reason)
+    return InertiaResult(nothing, nothing, nothing, nothing, None, 0.0, False, reason)
 
 
 def _intervals(
@@ -343,7 +342,7 @@ def _regress(
         if ratio < -0.1:
             reasons.append("the result is below the motor's own inertia: check the motor data")
     return InertiaResult(
-        parts[0], parts[1], parts[2], parts[3], ratio, r2, b.size,
+        parts[0], parts[1], parts[2], parts[3], ratio, r2,
         not reasons, "\n".join(reasons) or "ok",
     )  # fmt: skip
 

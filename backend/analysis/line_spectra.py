@@ -6,7 +6,7 @@ What the torque was between two bus cycles is reconstructed from the sent sequen
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -360,25 +360,6 @@ def instrument_estimate(
     s_yr = np.asarray(sum(y.mean(axis=0) * r.conj() for y, r in pairs))
     s_ur = np.asarray(sum(u.mean(axis=0) * r.conj() for u, r in zip(inputs, r_mean, strict=True)))
     return np.asarray(s_yr / s_ur), s_yr, s_ur
-
-
-def empty_line_levels(record: Record) -> tuple[float, float]:
-    """RMS amplitude on the empty even and the empty odd bins between the excited lines.
-
-    With an odd-only multisine these are even- and odd-order distortion plus noise, in units of
-    the response signal (Pintelon & Schoukens section 4.4). NaN where there are no such bins.
-    """
-    e = record.excitation
-    good, _ = good_periods(record)
-    bins = np.arange(e.lines[0], e.lines[-1] + 1)
-    empty = np.setdiff1d(bins, np.append(e.lines, e.base_line))
-    spectrum = period_spectra(record.response, replace(e, lines=empty), good)
-    level = np.abs(spectrum.mean(axis=0)) * 2.0 / e.period_samples
-
-    def rms(selected: FloatArray) -> float:
-        return float(np.sqrt(np.mean(selected**2))) if selected.size else float("nan")
-
-    return rms(level[empty % 2 == 0]), rms(level[empty % 2 == 1])
 
 
 def mean_spectra(

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.fit import Resonance
 
 TURN = 2.0 * np.pi
 
@@ -176,11 +175,6 @@ def encode_hz_width(notch: Notch, frequency: IntegerRange, width: IntegerRange) 
     return _frequency(notch, frequency), width.nearest(notch.width_hz)
 
 
-def decode_hz_width(frequency_raw: int, width_raw: int, depth_db: float) -> Notch:
-    """Notch of whole Hz values. The manual prints no depth: the caller must state (measure) it."""
-    return Notch(float(frequency_raw), float(width_raw), depth_db)
-
-
 def encode_hz_width_db(
     notch: Notch, frequency: IntegerRange, width: IntegerRange, depth: IntegerRange
 ) -> tuple[int, int, int]:
@@ -273,22 +267,3 @@ def fit_notch(frequency_hz: FloatArray, ratio: ComplexArray) -> Notch:
     fits = [least_squares(error, x0, loss="soft_l1") for x0 in starts]
     best = min(fits, key=lambda fit: float(fit.cost))
     return Notch(float(np.exp(best.x[0])), float(np.exp(best.x[1])), -float(np.exp(best.x[2])))
-
-
-def place_notches(
-    table: tuple[Resonance, ...], slots: int, *, width_factor: float = 1.0, headroom_db: float = 3.0
-) -> tuple[Notch, ...]:
-    """Notches on the highest resonances of a table, at most one per slot, in order of frequency.
-
-    The depth takes the peak down to ``headroom_db`` above its surroundings; the width covers the
-    pair of resonance and its damping, at least a tenth of the centre for robustness against
-    shifts of ±5 %.
-    """
-    peaks = [r for r in table if r.kind == "resonance" and r.height_db > headroom_db]
-    chosen = sorted(peaks, key=lambda r: -r.height_db)[:slots]
-    notches = []
-    for r in sorted(chosen, key=lambda r: r.frequency_hz):
-        depth = -min(max(r.height_db - headroom_db, 3.0), 30.0)
-        ratio = max(0.1, 2 * r.damping * 10 ** (-depth / 20)) * width_factor
-        notches.append(Notch(r.frequency_hz, min(ratio, 1.5) * r.frequency_hz, depth))
-    return tuple(notches)

@@ -10,9 +10,9 @@ from measured_axes import HEAVY, NAMED, ONE, RIGID, STIFF, THREE, TWO, VERTICAL,
 from backend.analysis.chirp import chirp
 from backend.analysis.excitation import choose_lines, multisine, scaled
 from backend.analysis.frf import estimate_periodic, valid_band_hz
-from backend.analysis.frf_aperiodic import estimate_aperiodic, estimate_stepped
+from backend.analysis.frf_stepped import estimate_stepped
 from backend.analysis.identify import identify_mechanics
-from backend.analysis.line_spectra import Record, empty_line_levels
+from backend.analysis.line_spectra import Record
 from backend.analysis.sampling import SignalPath, hold_response, sampled_command
 from backend.analysis.stepped_sine import stepped_sine
 
@@ -234,17 +234,6 @@ def linear_response(excitation, mechanics):
     )
 
 
-def test_chirp_with_welch():
-    e = chirp(sample_rate_hz=4000.0, f_min_hz=8.0, f_max_hz=1200.0, duration_s=8.0, integrations=2)
-    record, path = linear_response(e, STIFF)
-    frf = estimate_aperiodic(
-        (record,), path, "torque_mode", segment_samples=8000, f_min_hz=12.0, f_max_hz=1000.0
-    )
-    found = errors(frf, STIFF, 12.0, 1000.0)
-    assert found.magnitude_db < 0.3
-    assert found.phase_deg < 2.0
-
-
 def test_stepped_sine():
     e = stepped_sine(sample_rate_hz=4000.0, frequency_hz=np.array([30.0, 100.0, 400.0, 440.0]))
     record, path = linear_response(e, STIFF)
@@ -252,15 +241,6 @@ def test_stepped_sine():
     ratio = frf.response / STIFF.response(frf.frequency_hz)
     assert np.all(np.abs(20 * np.log10(np.abs(ratio))) < 0.3)
     assert np.all(np.abs(np.degrees(np.angle(ratio))) < 2.0)
-
-
-def test_empty_lines_tell_even_from_odd_distortion():
-    lines = choose_lines(5.0, 200.0, 1.0, count=60, odd_only=True)
-    e = multisine(sample_rate_hz=1000.0, period_samples=1000, lines=lines)
-    even, odd = empty_line_levels(Record(e, e.samples + 0.1 * e.samples**2))
-    assert even > 100 * odd
-    even, odd = empty_line_levels(Record(e, e.samples + 0.1 * e.samples**3))
-    assert odd > 100 * even
 
 
 def test_noise_level_and_deviation_are_those_of_the_added_noise():

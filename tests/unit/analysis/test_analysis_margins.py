@@ -4,9 +4,8 @@ import control
 import numpy as np
 import pytest
 
-from backend.analysis.fit import fit_rational, resonance_table
 from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
-from backend.analysis.spectrum import amplitude_spectrum, measure, power_density, spectrogram
+from backend.analysis.spectrum import power_density
 from backend.analysis.step import move_metrics, step_metrics
 
 TURN = 2 * np.pi
@@ -78,31 +77,6 @@ def test_bandwidth_is_counted_from_standstill_wherever_the_lowest_line_lies():
     assert np.abs(value / (1 + value)) == pytest.approx(10 ** (-3.0103 / 20), rel=1e-3)
 
 
-def test_rational_fit_recovers_resonances_of_a_known_system():
-    w1, w2, wz = TURN * 57.0, TURN * 210.0, TURN * 40.0
-    system = (
-        control.tf([1.0], [1, 2.0])
-        * control.tf([1, 2 * 0.03 * wz, wz**2], [1, 2 * 0.02 * w1, w1**2])
-        * control.tf([1e6], [1, 2 * 0.04 * w2, w2**2])
-    )
-    f = np.geomspace(2.0, 600.0, 250)
-    rng = np.random.default_rng(0)
-    noise = 1 + 0.01 * (rng.normal(size=f.size) + 1j * rng.normal(size=f.size))
-    fit = fit_rational(f, response(system, f) * noise, 5)
-    table = resonance_table(fit.poles, fit.zeros(), (2.0, 600.0))
-    peaks = [(r.frequency_hz, r.damping) for r in table if r.kind == "resonance"]
-    valleys = [(r.frequency_hz, r.damping) for r in table if r.kind == "antiresonance"]
-    assert peaks[0] == pytest.approx((57.0, 0.02), rel=0.05)
-    assert peaks[1] == pytest.approx((210.0, 0.04), rel=0.05)
-    assert valleys[0] == pytest.approx((40.0, 0.03), rel=0.08)
-    assert peaks[0][0] == pytest.approx(57.0, rel=0.002)
-    grid = np.geomspace(3.0, 500.0, 999)
-    error = np.abs(fit.response(grid) / response(system, grid) - 1)
-    assert np.median(error) < 0.01
-    with pytest.raises(ValueError, match="too few"):
-        fit_rational(f[:6], response(system, f[:6]), 5)
-
-
 def test_step_metrics_of_a_second_order_step():
     zeta, wn = 0.3, TURN * 10.0
     t = np.linspace(0.0, 1.0, 100_001)
@@ -131,36 +105,7 @@ def test_move_metrics_of_a_lagging_axis():
     assert m.overshoot == pytest.approx(0.0, abs=1e-9)
 
 
-def test_amplitude_spectrum_reads_peak_and_mean():
-    t = np.arange(2000) / 1000.0
-    s = amplitude_spectrum(1.5 + 0.7 * np.sin(TURN * 50.0 * t), 1000.0)
-    assert s.value[0] == pytest.approx(1.5)
-    assert s.frequency_hz[np.argmax(s.value[1:]) + 1] == pytest.approx(50.0)
-    assert np.max(s.value[1:]) == pytest.approx(0.7, rel=1e-6)
-
-
 def test_density_of_white_noise_integrates_to_its_power():
     x = np.random.default_rng(1).normal(0, 2.0, 40_000)
     s = power_density(x, 1000.0)
     assert np.mean(s.value[1:-1]) == pytest.approx(4.0 / 500.0, rel=0.03)
-    g = spectrogram(x, 1000.0)
-    assert g.value.shape == (g.frequency_hz.size, g.time_s.size)
-    assert np.mean(g.value[2:-1]) == pytest.approx(4.0 / 500.0, rel=0.03)
-
-
-def test_cursor_read_outs_of_a_noisy_sine():
-    t = np.arange(4000) / 4000.0
-    x = 1.0 + 3.0 * np.sin(TURN * 17.0 * t) + np.random.default_rng(2).normal(0, 0.05, t.size)
-    m = measure(x, 4000.0)
-    assert m.mean == pytest.approx(1.0, abs=0.01)
-    assert m.rms == pytest.approx(np.sqrt(1 + 4.5 + 0.0025), rel=0.01)
-    assert m.peak_to_peak == pytest.approx(6.0, abs=0.4)
-    assert m.frequency_hz == pytest.approx(17.0, rel=2e-3)
-    flat = measure(np.ones(10), 1000.0)
-    assert flat.frequency_hz is None
-    assert flat.rise_s is None
-
-
-def test_cursor_rise_time_of_a_ramp():
-    x = np.concatenate([np.zeros(100), np.linspace(0, 1, 201), np.ones(100)])
-    assert measure(x, 1000.0).rise_s == pytest.approx(0.160, abs=1e-6)

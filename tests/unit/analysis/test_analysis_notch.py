@@ -4,7 +4,6 @@ import control
 import numpy as np
 import pytest
 
-from backend.analysis.fit import Resonance
 from backend.analysis.notch import (
     IntegerRange,
     LevelCalibration,
@@ -19,7 +18,6 @@ from backend.analysis.notch import (
     encode_hz_width,
     encode_hz_width_db,
     fit_notch,
-    place_notches,
     realised,
 )
 
@@ -123,18 +121,6 @@ def test_a_notch_is_found_again_in_a_ratio_of_responses():
     assert found.center_hz == pytest.approx(433.0, rel=0.01)
     assert found.width_hz == pytest.approx(120.0, rel=0.05)
     assert found.depth_db == pytest.approx(-18.0, abs=0.7)
-
-
-def test_placement_takes_the_highest_peaks():
-    table = (
-        Resonance("antiresonance", 90.0, 0.01, 30.0),
-        Resonance("resonance", 120.0, 0.02, 12.0),
-        Resonance("resonance", 300.0, 0.03, 18.0),
-        Resonance("resonance", 600.0, 0.05, 7.0),
-    )
-    placed = place_notches(table, 2)
-    assert [n.center_hz for n in placed] == [120.0, 300.0]
-    assert [n.depth_db for n in placed] == [-9.0, -15.0]
 
 
 @pytest.mark.parametrize("bad", [(0.0, 10.0, -3.0), (10.0, -1.0, -3.0), (10.0, 10.0, 3.0)])

@@ -7,12 +7,12 @@ import pytest
 from drive_sim import TURN, Drive, Mechanics
 from random_axes import ENVELOPE, RATED_NM, Case, errors, facts_of, played
 
-from backend.analysis.fit import Resonance
 from backend.analysis.fit_problem import CHAIN, Problem, View
 from backend.analysis.frf import Frf
 from backend.analysis.line_spectra import Record, collect
 from backend.analysis.mechanical_model import MechanicalModel, Mode
 from backend.analysis.mode_doubt import ModeDoubt, mode_doubts
+from backend.analysis.resonance import Resonance
 from backend.analysis.sampled_model import LoopModel, seen_response
 from backend.analysis.sampling import SignalPath
 from backend.tools.sweep_evaluation import SweepSettings, evaluate, resonance_table

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 from drivers.ethercat.mailbox import Mailbox
-from drivers.ethercat.steps import Gap, Pause, Read, Step, Write
+from drivers.ethercat.steps import Read, Write
+from tests.wire.ethercat_host.by_hand import ByHand
 
-T = TypeVar("T")
 OUT, IN = 0x1000, 0x1100
 
 
@@ -23,7 +22,7 @@ def mail(payload: bytes, protocol: int = 3, counter: int = 1) -> bytes:
 
 
 @dataclass
-class ScriptedSlave:
+class ScriptedSlave(ByHand):
     """``react`` turns a request payload into answer payloads; a clock ticks 50 µs a frame."""
 
     react: Callable[[bytes], list[bytes]]
@@ -57,25 +56,7 @@ class ScriptedSlave:
         counter = self.sent if self.counts else 0
         self.waiting.append((self.now + delay_s, mail(payload, protocol, counter)))
 
-    def run(self, steps: Generator[Step, bytes | None, T]) -> T:
-        reply: bytes | None = None
-        try:
-            step = next(steps)
-            while True:
-                if self.now > 60:
-                    raise AssertionError("the transaction does not end")
-                reply = self._do(step)
-                step = steps.send(reply)
-        except StopIteration as stop:
-            result: T = stop.value
-            return result
-
-    def _do(self, step: Step) -> bytes | None:
-        if isinstance(step, Pause):
-            self.now += step.seconds
-            return b""
-        if isinstance(step, Gap):
-            return b""
+    def frame(self, step: Read | Write) -> bytes | None:
         self.now += 50e-6
         number, self.frames = self.frames, self.frames + 1
         answer = self._access(step) if self.alive else None

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import struct
-from typing import TypeVar
 
 import pytest
 
 from drivers.errors import LinkLost, LinkTimeout
 from drivers.ethercat import sii
-from drivers.ethercat.steps import Gap, Pause, Read, Step, Steps, Write
+from drivers.ethercat.steps import Read, Write
+from tests.wire.ethercat_host.by_hand import ByHand
 
-T = TypeVar("T")
 OWNER, CONTROL, ADDRESS, DATA = 0x500, 0x502, 0x504, 0x508
 BUSY, REFUSED = 0x8000, 0x2000
 
 
-class Eeprom:
+class Eeprom(ByHand):
     """A controller with 64 words. A command takes 1 ms; during it another one is refused."""
 
     def __init__(self) -> None:
@@ -38,21 +37,7 @@ class Eeprom:
     def busy(self, for_s: float) -> None:
         self._busy_until = self.now + for_s
 
-    def run(self, steps: Steps[T]) -> T:
-        reply: bytes | None = None
-        while True:
-            try:
-                step = steps.send(reply)
-            except StopIteration as stop:
-                result: T = stop.value
-                return result
-            assert self.now < 60, "the transaction does not end"
-            reply = self._do(step)
-
-    def _do(self, step: Step) -> bytes | None:
-        if isinstance(step, Pause | Gap):
-            self.now += step.seconds if isinstance(step, Pause) else 0.0
-            return b""
+    def frame(self, step: Read | Write) -> bytes | None:
         number, self.frames = self.frames, self.frames + 1
         self.now += 50e-6
         if number in self.lost_out:

@@ -10,12 +10,13 @@ from drivers.errors import NotAllowed
 from drivers.ethercat.al_status import ERROR_BIT, AlState
 from drivers.ethercat.exchange import Exchange
 from drivers.ethercat.station import AL_CONTROL, AL_STATUS, Station
-from drivers.ethercat.steps import Pause, Read, Step, Steps, Write
+from drivers.ethercat.steps import Read, Write
+from tests.wire.ethercat_host.by_hand import ByHand
 
 WATCHDOG, NO_SYNC0, BAD_OUTPUTS = 0x001B, 0x002D, 0x001D
 
 
-class Slave:
+class Slave(ByHand):
     """In SAFEOP; it refuses OP with ``code`` so many times. Its time passes in pauses."""
 
     def __init__(self, code: int, times: int) -> None:
@@ -24,24 +25,12 @@ class Slave:
         self._code, self._times = code, times
         self._state, self._told = int(AlState.SAFEOP), 0
 
-    def run(self, steps: Steps[None]) -> None:
-        reply: bytes | None = None
-        while True:
-            try:
-                step = steps.send(reply)
-            except StopIteration:
-                return
-            reply = self._do(step)
-
-    def _do(self, step: Step) -> bytes:
-        if isinstance(step, Pause):
-            self.now += step.seconds
-        elif isinstance(step, Read):
+    def frame(self, step: Read | Write) -> bytes:
+        if isinstance(step, Read):
             assert step.register == AL_STATUS
             return bytes([self._state, 0, 0, 0]) + self._told.to_bytes(2, "little")
-        elif isinstance(step, Write):
-            assert step.register == AL_CONTROL
-            self._go(step.data[0])
+        assert step.register == AL_CONTROL
+        self._go(step.data[0])
         return b""
 
     def _go(self, wanted: int) -> None:

@@ -5,23 +5,22 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 import pytest
 
 from drivers.errors import LinkLost
 from drivers.ethercat.registers import read_again
 from drivers.ethercat.station import Station, identify
-from drivers.ethercat.steps import Gap, Pause, Read, Step, Steps, Write
+from drivers.ethercat.steps import Pause, Read, Write
+from tests.wire.ethercat_host.by_hand import ByHand
 from tests.wire.ethercat_host.plain_slaves import Servo
 
-T = TypeVar("T")
 #: ESC features supported: bit 2 is the distributed clock (ETG.1000.4 table 31).
 FEATURES, WITH_CLOCK = 0x08, 0x0004
 
 
 @dataclass
-class Line:
+class Line(ByHand):
     """``answers`` gives what comes back of a read at a time; a frame takes 1 ms."""
 
     answers: Callable[[float, Read], bytes | None]
@@ -33,21 +32,7 @@ class Line:
     def clock(self) -> float:
         return self.now
 
-    def run(self, steps: Steps[T]) -> T:
-        reply: bytes | None = None
-        while True:
-            try:
-                step = steps.send(reply)
-            except StopIteration as stop:
-                result: T = stop.value
-                return result
-            assert self.now < 60, "the transaction does not end"
-            reply = self._do(step)
-
-    def _do(self, step: Step) -> bytes | None:
-        if isinstance(step, Pause | Gap):
-            self.now += step.seconds if isinstance(step, Pause) else 0.0
-            return b""
+    def frame(self, step: Read | Write) -> bytes | None:
         assert isinstance(step, Read)
         self.asked.append(self.now)
         answer = self.answers(self.now, step)

@@ -46,7 +46,7 @@ class OneSlave:
         if isinstance(access, Write) and access.register == OUT:
             length = int.from_bytes(access.data[:2], "little")
             self.sent.append((self.slave.now, access.data[6 : 6 + length]))
-        return self.slave._do(access)
+        return self.slave.frame(access)
 
     def submit(self, name: str, steps: Any, urgency: Urgency = Urgency.NORMAL) -> None:
         def done(result: Any, error: DriveError | None) -> None:

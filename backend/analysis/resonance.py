@@ -1,0 +1,22 @@
+"""A row of the resonance table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """A row of the resonance table; ``height_db`` is how far it rises (or falls) locally.
+
+    ``frequency_ci95_hz`` and ``damping_ci95`` hold the true values in 95 of 100 cases; None where
+    nothing was said of that.
+    """
+
+    kind: Literal["resonance", "antiresonance"]
+    frequency_hz: float
+    damping: float
+    height_db: float
+    frequency_ci95_hz: tuple[float, float] | None = None
+    damping_ci95: tuple[float, float] | None = None
