@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from backend.analysis import excitation as signals
 from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.fit import Resonance
 from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
 from backend.analysis.identify import Identification, identify_with_path
 from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
 from backend.analysis.mechanical_model import MechanicalModel
 from backend.analysis.mode_doubt import ModeDoubt
 from backend.analysis.reported import charged, commanded, current_doubt, mean_cycles
+from backend.analysis.resonance import Resonance
 from backend.analysis.sampling import STEP_LEAD_S, Hold, SignalPath, sampled_command
 from backend.axis import Envelope
 from backend.tools import excite
