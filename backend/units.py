@@ -9,16 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from backend.drive import Drive
-from drivers.errors import NotAllowed, OutOfRange, Rejected
+from backend.optional import existing
+from drivers.errors import NotAllowed, OutOfRange
 from profiles.schema import Parameter, UnitSpec
 
 #: Raw units per rpm for families that count speed in turns; inc/s depends on the gearing.
 _RAW_PER_RPM = {"rpm": 1.0, "0.1 rpm": 10.0}
 #: Raw units per 1 % of rated torque.
 _RAW_PER_PERCENT = {"‰ rated": 10.0, "0.1 %": 10.0, "% rated": 1.0, "0.01 %": 100.0}
-
-#: Abort codes of an object or subindex that the drive does not have (CiA 301 table 22).
-ABSENT = frozenset({0x06020000, 0x06090011})
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,13 +144,8 @@ async def read_units(drive: Drive) -> AxisUnits:
         if key is not None and not drive.unreachable_why(drive.parameter(key))
     ]
     raw: dict[str, float] = {}
-    for key in keys:
-        try:
-            value = (await drive.read(key)).raw
-        except Rejected as refusal:
-            if refusal.code not in ABSENT:
-                raise
-            continue
+    for key, reading in (await existing(drive, keys)).items():
+        value = reading.raw
         if isinstance(value, (int, float)) and (value > 0 or key == spec.feed):
             raw[key] = float(value)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from backend.axis import Axis
 from backend.drive import Drive
+from backend.optional import existing
 from drivers.errors import NotAllowed
 from profiles.schema import Parameter
 
@@ -70,7 +71,8 @@ async def si(drive: Drive, key: str | None) -> float | None:
     parameter = drive.parameter(key)
     if drive.unreachable_why(parameter) or parameter.access == "wo":
         return None
-    value = (await drive.read(key)).value
+    reading = (await existing(drive, (key,))).get(key)
+    value = None if reading is None else reading.value
     return None if not isinstance(value, (int, float)) else si_value(parameter, value)
 
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
+from backend.optional import torque_limits
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.inertia_evaluation import InertiaSettings
 from backend.tools.inertia_moves import speed_move
@@ -43,11 +44,8 @@ async def find_ends(
             value=settings.search_torque_percent, limit=f"at least {percent:.3g} %",
             remedy="raise the torque of the search, or teach the ends by jog",
         )  # fmt: skip
-    limits: dict[str, int] = {}
-    for role in ("torque_limit_positive", "torque_limit_negative", "max_torque"):
-        if (key := drive.key(role)) is not None:
-            wanted = units.torque_raw(settings.search_torque_percent)
-            limits[key] = limited(await drive.raw(key), wanted)
+    wanted = units.torque_raw(settings.search_torque_percent)
+    limits = {key: limited(await drive.raw(key), wanted) for key in await torque_limits(drive)}
     if not limits:
         raise NotAllowed(
             f"{drive.name}: this family has no torque limit that could protect the ends",

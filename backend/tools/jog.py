@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
+from backend.optional import ramp_keys
 from backend.travel_units import REVOLUTIONS, TravelUnit
 from backend.units import AxisUnits, ramp_raw
 from drivers import cia402
@@ -86,8 +87,7 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
     require_scale(axis, units, settings)
     envelope = Envelope(settings.travel_rev, settings.speed_rpm, settings.torque_percent, 3600.0)
     ramps = {drive.require("profile_velocity"): units.velocity_raw(settings.speed_rpm)}
-    for role in ("profile_acceleration", "profile_deceleration"):
-        key = drive.require(role)
+    for key in await ramp_keys(drive):
         ramps[key] = ramp_raw(units, drive, key, settings.acceleration_rpm_s)
     for key, raw in ramps.items():
         drive.check(drive.parameter(key), raw)

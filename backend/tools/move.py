@@ -9,6 +9,7 @@ from typing import Literal
 
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
+from backend.optional import ramp_keys
 from backend.units import AxisUnits, ramp_raw
 from drivers import cia402
 from drivers.cia402 import Mode, State
@@ -149,12 +150,21 @@ async def _ramps(axis: Axis, settings: MoveSettings) -> dict[str, int]:
             )
         if settings.mode == "PP":
             values[drive.require("profile_velocity")] = units.velocity_raw(settings.speed_rpm)
-    if settings.acceleration_rpm_s is not None:
-        key = drive.require("profile_acceleration")
-        values[key] = ramp_raw(units, drive, key, settings.acceleration_rpm_s)
-    if settings.deceleration_rpm_s is not None:
-        key = drive.require("profile_deceleration")
-        values[key] = ramp_raw(units, drive, key, settings.deceleration_rpm_s)
+    ramps = (settings.acceleration_rpm_s, settings.deceleration_rpm_s)
+    if any(ramp is not None for ramp in ramps):
+        keys = await ramp_keys(drive)
+        if keys[0] == keys[1] and ramps[0] != ramps[1]:
+            raise OutOfRange(
+                f"{drive.name}: this drive brakes by its acceleration {keys[0]}, it has no "
+                "deceleration of its own",
+                drive=drive.name,
+                parameter=keys[0],
+                value=ramps[1],
+                remedy="give the same acceleration and deceleration",
+            )
+        for key, ramp in zip(keys, ramps, strict=True):
+            if ramp is not None:
+                values[key] = ramp_raw(units, drive, key, ramp)
     for key, raw in values.items():
         drive.check(drive.parameter(key), raw)
     return values

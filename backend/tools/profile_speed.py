@@ -19,6 +19,7 @@ from backend.cyclic import CyclicSession
 from backend.cyclic_mode import keeping_mode, modes_of_the_loop
 from backend.drive import Drive
 from backend.io_functions import read_terminals
+from backend.optional import existing
 from backend.tools.recording import Play, bus_limits, cycle_s, enabled, play, quiet
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed
@@ -124,7 +125,7 @@ async def prepared(
             f"{drive.name} is enabled", drive=drive.name, remedy="disable it before the measurement"
         )
     ramps = [drive.require("profile_acceleration"), drive.require("profile_deceleration")]
-    limits = [key for key in [drive.key("max_torque")] if key is not None]
+    limits = list(await existing(drive, [drive.key("max_torque")]))
     modes = await axis.restorable_mode()
     async with axis.restoring(*ramps, *limits, *modes):
         for key in modes:

@@ -10,6 +10,7 @@ import numpy as np
 
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
+from backend.optional import existing
 from backend.tools import excite, speed_injection
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.gains import read_gains
@@ -134,12 +135,10 @@ async def setup_of(
 async def drive_limit_percent(axis: Axis) -> float:
     """The drive's own torque limit: what is asked beyond it does not come."""
     drive, units = axis.drive, await axis.units()
-    limits = [np.inf]
-    for role in ("torque_limit_positive", "torque_limit_negative", "max_torque"):
-        key = drive.key(role)
-        if key is not None and not drive.unreachable_why(drive.parameter(key)):
-            limits.append(abs(units.torque(await drive.raw(key))))
-    return float(min(limits))
+    roles = ("torque_limit_positive", "torque_limit_negative", "max_torque")
+    found = await existing(drive, [drive.key(role) for role in roles])
+    raws = [reading.raw for reading in found.values() if isinstance(reading.raw, (int, float))]
+    return float(min([np.inf, *(abs(units.torque(raw)) for raw in raws)]))
 
 
 def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence, ...]:

@@ -1,0 +1,85 @@
+"""Which objects of a profile a drive really has, where CiA 402-2 leaves them to the maker.
+
+A profile of the standard names them all; a drive that lacks one refuses to be asked for it. That
+is asked anew where it matters, as a drive that is still starting may deny what it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from backend.drive import Drive
+from backend.readings import Reading
+from drivers.errors import NotAllowed, Rejected
+
+#: Abort codes of an object or subindex that the drive does not have (CiA 301 table 22).
+ABSENT = frozenset({0x06020000, 0x06090011})
+
+_TORQUE_LIMITS = ("torque_limit_positive", "torque_limit_negative", "max_torque")
+
+
+async def existing(drive: Drive, keys: Iterable[str | None]) -> dict[str, Reading]:
+    """What was read of those of ``keys`` that the drive has, in their order; None is no key.
+
+    Raises:
+        DriveError: one cannot be read for any other reason.
+    """
+    found: dict[str, Reading] = {}
+    for key in keys:
+        if key is None:
+            continue
+        try:
+            found[key] = await drive.read(key)
+        except Rejected as refusal:
+            if refusal.code not in ABSENT:
+                raise
+    return found
+
+
+async def torque_limits(drive: Drive) -> list[str]:
+    """Keys of the drive's torque limits that together hold both directions.
+
+    A family whose profile names no limit at all has none. 6072h, 60E0h and 60E1h are optional in
+    CiA 402-2: the first holds both directions, the others one each.
+
+    Raises:
+        NotAllowed: the drive lacks those that its profile names, so that one direction is free.
+        DriveError: a limit cannot be read.
+    """
+    named = [key for role in _TORQUE_LIMITS if (key := drive.key(role)) is not None]
+    found = await existing(drive, named)
+    positive, negative, both = (drive.key(role) in found for role in _TORQUE_LIMITS)
+    if not named or both or (positive and negative):
+        return list(found)
+    missing = [drive.parameter(key) for key in named if key not in found]
+    names = ", ".join(f"{parameter.key} {parameter.name}" for parameter in missing)
+    raise NotAllowed(
+        f"{drive.name}: this drive does not have {names}, so its torque cannot be limited "
+        "for this motion",
+        drive=drive.name,
+        parameter=missing[0].key,
+        remedy="use CSP, CSV or CST in a cyclic exchange, which watches the torque itself; or "
+        "import the drive's own description if it has a torque limit elsewhere",
+    )
+
+
+async def ramp_keys(drive: Drive) -> tuple[str, str]:
+    """Keys of the profile's acceleration and deceleration.
+
+    Without 6084h the drive brakes by 6083h too (CiA 402-2, object 6084h), so both are the same.
+
+    Raises:
+        NotAllowed: the drive has no profile acceleration, so where it would stop is not known.
+        DriveError: a ramp cannot be read.
+    """
+    up, down = drive.require("profile_acceleration"), drive.require("profile_deceleration")
+    found = await existing(drive, (up, down))
+    if up not in found:
+        raise NotAllowed(
+            f"{drive.name}: this drive does not have {up} {drive.parameter(up).name}, so it is "
+            "not known how far it goes on when it is to stop",
+            drive=drive.name,
+            parameter=up,
+            remedy="move it by CSP or CSV in a cyclic exchange",
+        )
+    return up, down if down in found else up
