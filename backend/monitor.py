@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import logging
 import math
 import time
@@ -47,6 +48,11 @@ _SHOWN_ROLES = (*_VALUE_ROLES.values(), "mode_display")
 _TELLING_ROLES = ("status_word", "error_code")
 #: Target reached, internal limit and the bits of the mode come and go with every motion.
 _MODE_SPECIFIC = 0x3C00
+#: Monitors that run, counted: times the golden ratio they are spread evenly, however many.
+_COUNT = itertools.count()
+_GOLDEN = 0.6180339887498949
+#: A place nearer than this part of the period is left for the next one: the bus has a rest.
+_SOON = 0.5
 _FAULTY = (State.FAULT, State.FAULT_REACTION, State.UNKNOWN)
 
 #: Meaning of status bits 12 and 13 in each mode (CiA 402-2 clauses 10 to 16).
@@ -102,6 +108,8 @@ class Monitor:
         self._last_causes: list[str] = []
         self._waiting: list[str] = []
         self._asked_s = -math.inf
+        # All axes at the same instant would keep everybody else waiting for their sum.
+        self._phase = next(_COUNT) * _GOLDEN % 1
 
     def start(self) -> None:
         """Begin to poll."""
@@ -130,7 +138,12 @@ class Monitor:
             self._wake.clear()
             period = WATCHED_S if self.watchers else IDLE_S
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._wake.wait(), period)
+                await asyncio.wait_for(self._wake.wait(), self._until_due(period))
+
+    def _until_due(self, period_s: float) -> float:
+        """Seconds to this monitor's own place in the period."""
+        left = (self._phase - time.monotonic() / period_s) % 1
+        return (left if left > _SOON else left + 1) * period_s
 
     async def refresh(self) -> Snapshot:
         """Read the state now. A failure becomes a snapshot that says so, with the old values.

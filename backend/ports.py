@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import cast
 
 from drivers.link import Address, Link, TellsUnreachable
 from profiles.schema import LinkKind, LinkSpec, Parameter
@@ -43,9 +45,16 @@ class Port:
 
     def why_not(self, parameter: Parameter) -> str:
         """What the link itself has against a parameter that its kind could carry; else empty."""
-        if isinstance(self.link, TellsUnreachable):
-            return self.link.unreachable(self.station, address_of(parameter))
+        if _tells_unreachable(type(self.link)):
+            link = cast("TellsUnreachable", self.link)
+            return link.unreachable(self.station, address_of(parameter))
         return ""
+
+
+@cache
+def _tells_unreachable(link: type) -> bool:
+    # Asking an object for a protocol is slow, and this is asked for every parameter.
+    return issubclass(link, TellsUnreachable)
 
 
 def _whole_objects(parameters: Sequence[Parameter]) -> list[list[Parameter]]:

@@ -1,4 +1,8 @@
-"""What every route gets: the bench, who asks, and the permission to change an axis."""
+"""What every route gets: the bench, who asks, and the permission to change an axis.
+
+All are coroutines although none waits: FastAPI runs plain functions in a thread each, and every
+answer would wait for its turn twice more.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ from drivers.errors import NotAllowed
 CONNECTION_HEADER = "X-Servodeck-Connection"
 
 
-def bench_of(request: Request) -> Bench:
+async def bench_of(request: Request) -> Bench:
     """The bench of this server."""
     bench = request.app.state.bench
     if not isinstance(bench, Bench):
@@ -30,7 +34,7 @@ Connection = Annotated[str | None, Header(alias=CONNECTION_HEADER)]
 TheBench = Annotated[Bench, Depends(bench_of)]
 
 
-def people_of(request: Request) -> People:
+async def people_of(request: Request) -> People:
     """The people of this server."""
     people = request.app.state.people
     if not isinstance(people, People):
@@ -38,7 +42,7 @@ def people_of(request: Request) -> People:
     return people
 
 
-def identity_now() -> Identity:
+async def identity_now() -> Identity:
     """Who asks.
 
     Raises:
@@ -54,7 +58,7 @@ ThePeople = Annotated[People, Depends(people_of)]
 Me = Annotated[Identity, Depends(identity_now)]
 
 
-def member_of(drive_id: str, bench: TheBench) -> Member:
+async def member_of(drive_id: str, bench: TheBench) -> Member:
     """The drive that a path names.
 
     Raises:

@@ -42,7 +42,7 @@ class PeopleRecord:
         self._bench.audit.add(fact)
 
 
-def _record_of(bench: TheBench) -> PeopleRecord:
+async def _record_of(bench: TheBench) -> PeopleRecord:
     return PeopleRecord(bench)
 
 

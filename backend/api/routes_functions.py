@@ -45,7 +45,7 @@ _DRIVE = "/drives/{drive_id}"
 _ANY_RPM = 20_000.0
 
 
-def store_of(request: Request) -> AxisStore:
+async def store_of(request: Request) -> AxisStore:
     """What this bench keeps of its axes."""
     store = request.app.state.axis_store
     if not isinstance(store, AxisStore):

@@ -31,7 +31,7 @@ router = APIRouter(prefix="/drives/{drive_id}/io")
 Kind = Literal["outputs", "simulation"]
 
 
-def sessions_of(request: Request) -> ForcingSessions:
+async def sessions_of(request: Request) -> ForcingSessions:
     """The sessions that overrule terminals on this bench."""
     sessions = request.app.state.forcing
     if not isinstance(sessions, ForcingSessions):

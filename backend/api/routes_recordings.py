@@ -50,7 +50,7 @@ _TYPES = {
 }
 
 
-def recordings_of(request: Request) -> Recordings:
+async def recordings_of(request: Request) -> Recordings:
     """The recordings of this server."""
     recordings = request.app.state.recordings
     if not isinstance(recordings, Recordings):
@@ -61,7 +61,7 @@ def recordings_of(request: Request) -> Recordings:
 TheRecordings = Annotated[Recordings, Depends(recordings_of)]
 
 
-def _capture(recordings: TheRecordings) -> FaultCapture:
+async def _capture(recordings: TheRecordings) -> FaultCapture:
     if recordings.capture is None:
         raise NotAllowed("the server is starting or ending", remedy="try again")
     return recordings.capture

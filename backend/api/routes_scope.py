@@ -24,7 +24,7 @@ from drivers.errors import NotAllowed, OutOfRange
 router = APIRouter()
 
 
-def _store(bench: TheBench) -> ScopeStore:
+async def _store(bench: TheBench) -> ScopeStore:
     return ScopeStore(bench.state_folder / "scope")
 
 

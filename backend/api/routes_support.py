@@ -27,7 +27,7 @@ from backend.people.errors import Forbidden, NotLoggedIn
 router = APIRouter()
 
 
-def _live_of(request: Request) -> LiveHub:
+async def _live_of(request: Request) -> LiveHub:
     live = request.app.state.live
     if not isinstance(live, LiveHub):
         raise TypeError("the application was made without a live hub")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 import ssl
 import webbrowser
@@ -18,7 +19,10 @@ from backend.journal import Entry
 from backend.people.station import People
 from backend.people.tls import Certificate, machine_names, own_certificate, station_certificate
 from backend.store.database import FILE
+from drivers import scheduling
 from drivers.errors import NotAllowed
+from profiles import load_all
+from profiles.loader import ProfileError
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
 #: Messages of the page are small; what is larger is an attack or a defect.
@@ -72,7 +76,16 @@ async def serve(bench: Bench, serving: Serving) -> None:
         _tell_problems(bench)
         if serving.open_page:
             webbrowser.open(shown)
+        await settle()
     await running
+
+
+async def settle() -> None:
+    """What a first request would wait for otherwise, and every later one again and again."""
+    # One that cannot be read is told where it is asked for.
+    with contextlib.suppress(ProfileError):
+        await asyncio.to_thread(load_all)
+    scheduling.spare_collector()
 
 
 async def accounts_needed(folder: Path, serving: Serving) -> bool:

@@ -49,8 +49,7 @@ def claim(*, wanted: bool = True) -> RealTime:
             " memlock limit does"
         )
     # A pause of the garbage collector is a late cycle; the loop creates no reference cycles.
-    gc.collect()
-    gc.freeze()
+    scheduling.spare_collector()
     gc.disable()
     sys.setswitchinterval(1e-4)
     return RealTime(priority, locked, tuple(notes))

@@ -6,7 +6,6 @@ Standard input and output are the control channel (see `control`); closing the i
 from __future__ import annotations
 
 import argparse
-import gc
 import sys
 from pathlib import Path
 
@@ -106,9 +105,7 @@ def main(argv: list[str] | None = None) -> int:
         sys.stderr.write(f"{error}\n")
         return 1
     _go_realtime(arguments.realtime)
-    # What is alive now stays alive: the collector need not walk it between two frames.
-    gc.collect()
-    gc.freeze()
+    scheduling.spare_collector()
     try:
         server.run()
     except KeyboardInterrupt:
