@@ -26,7 +26,6 @@ from backend.api.models import (
     AxisState,
     DriveSummary,
     JobInfo,
-    Lease,
     LogEntry,
     Message,
     ParameterValue,
@@ -184,14 +183,6 @@ class JobChanged(Message):
 
     type: Literal["job"] = "job"
     job: JobInfo
-
-
-class LeaseChanged(Message):
-    """Control of an axis changed hands."""
-
-    type: Literal["lease_changed"] = "lease_changed"
-    drive: str
-    lease: Lease
 
 
 class JogEnded(Message):

@@ -4857,21 +4857,6 @@ export interface components {
             type: "lease_ask";
         };
         /**
-         * LeaseChanged
-         * @description Control of an axis changed hands.
-         */
-        LeaseChanged: {
-            /** Drive */
-            drive: string;
-            lease: components["schemas"]["Lease"];
-            /**
-             * Type
-             * @default lease_changed
-             * @constant
-             */
-            type: "lease_changed";
-        };
-        /**
          * LeaseHand
          * @description Hand control to another connection, for good or for a time, after which it comes back.
          */
@@ -7833,7 +7818,6 @@ export type LateBin = components['schemas']['LateBin'];
 export type Lease = components['schemas']['Lease'];
 export type LeaseAnswer = components['schemas']['LeaseAnswer'];
 export type LeaseAsk = components['schemas']['LeaseAsk'];
-export type LeaseChanged = components['schemas']['LeaseChanged'];
 export type LeaseHand = components['schemas']['LeaseHand'];
 export type LeaseNotice = components['schemas']['LeaseNotice'];
 export type LeaseOverride = components['schemas']['LeaseOverride'];

@@ -90,13 +90,6 @@ function receive(message: ToPage): void {
     case 'job':
       store.setJob(message.job)
       break
-    case 'lease_changed':
-      store.setDrives(
-        (store.contents.drives ?? []).map((drive) =>
-          drive.id === message.drive ? { ...drive, lease: message.lease } : drive,
-        ),
-      )
-      break
     case 'jog_ended':
       store.contents.jogEnded = message
       store.publish('jogEnded')

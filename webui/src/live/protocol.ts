@@ -23,7 +23,6 @@ import type {
   JogRenew,
   JogStart,
   JogStop,
-  LeaseChanged,
   LeaseTake,
   Logged,
   Ping,
@@ -68,7 +67,6 @@ export type ToPage =
   | DrivesChanged
   | ValuesChanged
   | JobChanged
-  | LeaseChanged
   | JogEnded
   | ScopeInfo
   | Logged
