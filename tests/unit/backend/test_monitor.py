@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import cast
 
@@ -11,6 +12,7 @@ from backend import monitor as watching
 from backend.bench import Member
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
+from backend.journal import Journal
 from drivers.cia402 import State
 from tests.support.servo import STATUS, Servo
 
@@ -120,3 +122,18 @@ async def test_process_data_that_end_are_no_values(
     servo.mute = True
     clock.now_s += 0.1
     assert not (await polled(x)).fresh
+
+
+def test_axes_are_asked_one_after_the_other(x: Member, clock: Clock) -> None:
+    period_s = watching.WATCHED_S
+    monitors = [watching.Monitor(x.axis, Journal(), lambda _: None, lambda: None) for _ in range(5)]
+    due_s = []
+    for moment in range(10):
+        clock.now_s = 1000.0 + 0.37 * moment
+        waits = [monitor._until_due(period_s) for monitor in monitors]
+        assert all(0.5 * period_s <= wait <= 1.5 * period_s for wait in waits)
+        due_s.append(sorted((clock.now_s + wait) % period_s for wait in waits))
+    for places in due_s:
+        # Five evenly spread ones would be 0.2 apart; by the golden ratio the nearest are 0.14.
+        around = [*places, places[0] + period_s]
+        assert min(b - a for a, b in itertools.pairwise(around)) > 0.1 * period_s
