@@ -9,7 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from backend.drive import Drive
+from backend.optional import existing
+from backend.units import AxisUnits
 from profiles.schema import Parameter, Raw
+
+#: From any permitted speed to standstill, as `drivers.ethercat.playback` ramps set-points down.
+STOP_S = 0.1
 
 
 def quick_stop_keys(drive: Drive) -> tuple[str, ...]:
@@ -26,10 +31,34 @@ async def raise_quick_stop(drive: Drive, before: Mapping[str, Raw]) -> None:
     pair = _pair(drive)
     if pair is None:
         return
-    quick, profile = before.get(pair[0].key), (await drive.read(pair[1].key)).raw
+    quick = before.get(pair[0].key)
+    # Without 6084h a drive brakes by 6083h (CiA 402-2, object 6084h).
+    ramps = await existing(drive, (pair[1].key, drive.key("profile_acceleration")))
+    profile = next((reading.raw for reading in ramps.values()), None)
     if isinstance(quick, int) and isinstance(profile, int) and quick < profile:
-        highest = pair[0].raw_limits[1]
-        await drive.write(pair[0].key, profile if highest is None else int(min(profile, highest)))
+        await _write(drive, pair[0], profile)
+
+
+async def raise_quick_stop_from(
+    drive: Drive, units: AxisUnits, speed_rpm: float, before: Mapping[str, Raw]
+) -> None:
+    """Let a quick stop end a motion of this speed within `STOP_S`; lower nothing.
+
+    It is the only brake of an axis without a loop: one that leaves its envelope at 1500 rpm would
+    go on for 25 s and 310 revolutions with the 60 rpm/s that an R6L is shipped with.
+    The caller puts back what `quick_stop_keys` names, to the values in ``before``.
+    """
+    pair = _pair(drive)
+    if pair is None or pair[0].unit != units.spec.acceleration:
+        return
+    quick, needed = before.get(pair[0].key), units.acceleration_raw(speed_rpm / STOP_S)
+    if isinstance(quick, int) and quick < needed:
+        await _write(drive, pair[0], needed)
+
+
+async def _write(drive: Drive, quick: Parameter, raw: int) -> None:
+    highest = quick.raw_limits[1]
+    await drive.write(quick.key, raw if highest is None else int(min(raw, highest)))
 
 
 def _pair(drive: Drive) -> tuple[Parameter, Parameter] | None:

@@ -25,7 +25,7 @@ from backend.tools import sweep as sweep_tool
 from backend.tools.axis_facts import AxisFacts, read_facts
 from backend.tools.probe import holding_torque
 from backend.tools.recording import cycle_s
-from backend.tools.temporary import temporary
+from backend.tools.temporary import stopping_hard, temporary
 from backend.tools.tune_apply import part
 from backend.tools.tune_candidates import (
     Design,
@@ -110,6 +110,15 @@ async def autotune(
     """
     progress(0.0, "1 of 6: pre-checks")
     facts = await _pre_checks(axis, settings)
+    async with stopping_hard(axis, settings.envelope.speed_rpm):
+        return await _tuned(axis, session, settings, facts, progress, keep)
+
+
+async def _tuned(
+    axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
+    progress: Progress, keep: Keep | None,
+) -> AutotuneResult:  # fmt: skip
+    """Everything that moves."""
     gains = await _steady_gains(axis, session, facts)
     try:
         found = await _measured(axis, session, settings, facts, gains, progress, keep)

@@ -39,7 +39,7 @@ from backend.tools.recording import (
     require_signals,
     share,
 )
-from backend.tools.temporary import temporary
+from backend.tools.temporary import stopping_hard, temporary
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
 from profiles.schema import NotchSlot
@@ -138,20 +138,21 @@ async def tried_with(
     off = await plan_notches(drive, [])
     count = len(_trials(drive, slot, 1))
     part = 1.0 / (count + 1)
-    async with temporary(axis, off):
-        lowest = await player.plain(share(progress, 0.0, part, "trying without a notch"))
-    await go_back(axis, session, home, envelope, facts)
-    centre = round(min(max(_PLACE / cycle_s(session), _LOWEST_HZ, lowest), _HIGHEST_HZ))
-    effects: list[tuple[_Trial, NotchEffect | None]] = []
-    for number, trial in enumerate(_trials(drive, slot, centre), 1):
-        low = number * part
-        told = share(progress, low, low + part, f"trying notch {number} of {count}")
-        async with temporary(axis, off | _raw(slot, centre, trial)):
-            try:
-                effects.append((trial, await player.notched(told)))
-            except ValueError:
-                effects.append((trial, None))
+    async with stopping_hard(axis, envelope.speed_rpm):
+        async with temporary(axis, off):
+            lowest = await player.plain(share(progress, 0.0, part, "trying without a notch"))
         await go_back(axis, session, home, envelope, facts)
+        centre = round(min(max(_PLACE / cycle_s(session), _LOWEST_HZ, lowest), _HIGHEST_HZ))
+        effects: list[tuple[_Trial, NotchEffect | None]] = []
+        for number, trial in enumerate(_trials(drive, slot, centre), 1):
+            low = number * part
+            told = share(progress, low, low + part, f"trying notch {number} of {count}")
+            async with temporary(axis, off | _raw(slot, centre, trial)):
+                try:
+                    effects.append((trial, await player.notched(told)))
+                except ValueError:
+                    effects.append((trial, None))
+            await go_back(axis, session, home, envelope, facts)
     return _meaning(drive, centre, effects)
 
 

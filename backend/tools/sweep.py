@@ -32,7 +32,7 @@ from backend.tools.sweep_plan import (
     setup_of,
 )
 from backend.tools.sweep_play import MODE_OF, Records, play_fitting, scaled_by_speed
-from backend.tools.temporary import temporary
+from backend.tools.temporary import stopping_hard, temporary
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
 
@@ -60,7 +60,7 @@ async def sweep(
     facts = await read_facts(axis, settings.rated_torque_nm)
     home = await axis.position_raw()
     filters = await filters_off(axis, settings)
-    async with temporary(axis, filters):
+    async with temporary(axis, filters), stopping_hard(axis, settings.envelope.speed_rpm):
         probed: Probed | None = None
         if loop in ("auto", "none"):
             require_signals(axis, session, Mode.CST, False)

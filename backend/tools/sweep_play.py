@@ -1,7 +1,8 @@
-"""Playing the sequences of a sweep on an axis, made weaker where its loop takes too much torque."""
+"""Playing the sequences of a sweep on an axis, made weaker where it comes to its envelope."""
 
 from __future__ import annotations
 
+import asyncio
 from dataclasses import replace
 
 import numpy as np
@@ -14,13 +15,13 @@ from backend.tools import excite, speed_injection
 from backend.tools.go_back import go_back
 from backend.tools.recording import Play, Recording, bus_limits, enabled, play, quiet, share
 from backend.tools.sweep_evaluation import SweepSettings
-from backend.tools.sweep_plan import Setup
+from backend.tools.sweep_plan import Setup, sequences_of
 from drivers.cia402 import Mode
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, OutOfRange
 
 _TURN = 2 * np.pi
 MODE_OF = {"none": Mode.CST, "speed": Mode.CSV, "position": Mode.CSP}
-#: What took too much torque is played again, this much smaller and with so much less base motion.
+#: What came to the envelope is played again, this much smaller and with so much less base motion.
 _ATTEMPTS, _WEAKER, _SLOWER = 4, 0.4, 0.7
 
 Records = tuple[tuple[excite.Sequence, Recording], ...]
@@ -74,27 +75,62 @@ async def play_fitting(
     axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
     sequences: tuple[excite.Sequence, ...], home_raw: int, progress: Progress,
 ) -> Records:  # fmt: skip
-    """As `_play_all`; where a loop answers with too much torque the excitation becomes smaller.
+    """As `_play_all`; where the axis comes to its envelope the excitation becomes smaller.
 
-    How much torque that takes depends on the loop's gains, which are what is measured.
+    How much torque a closed loop takes depends on its gains, and how fast an axis without a loop
+    becomes on how its load swings: both are what is measured.
+
+    Raises:
+        NotAllowed: something else ended it, or even the smallest excitation is too much.
     """
-    attempts = _ATTEMPTS if setup.loop != "none" else 1
-    for attempt in range(attempts):
+    for attempt in range(1, _ATTEMPTS + 1):
         try:
             return await _play_all(axis, session, settings, setup, sequences, home_raw, progress)
         except NotAllowed as error:
-            if attempt == attempts - 1 or "torque" not in error.message:
+            if attempt == _ATTEMPTS or not _too_much(error, setup):
+                raise
+            smaller = await asyncio.to_thread(_smaller, sequences, setup, settings, attempt)
+            if not smaller:
                 raise
         await quiet(axis)
         await go_back(axis, session, home_raw, settings.envelope, setup.facts)
-        sequences = tuple(
+        sequences = smaller
+    raise AssertionError
+
+
+def _too_much(error: NotAllowed, setup: Setup) -> bool:
+    """Whether less excitation may mend it.
+
+    Torque is a loop's own answer; without a loop it is what was asked for. An axis that leaves its
+    travel is one that a load pulls, or whose place is too narrow.
+    """
+    if setup.loop != "none":
+        return "torque" in error.message
+    return "speed" in error.message and "is beyond the limit" in error.message
+
+
+def _smaller(
+    sequences: tuple[excite.Sequence, ...], setup: Setup, settings: SweepSettings, attempt: int
+) -> tuple[excite.Sequence, ...]:
+    """What is played after so many attempts were too much; nothing where too little is left.
+
+    Without a loop one torque makes excitation and base motion, which must still overcome friction:
+    both are designed again, for less speed.
+    """
+    if setup.loop != "none":
+        return tuple(
             replace(
                 s, excitation=scaled(s.excitation, _WEAKER),
                 base=None if s.base is None else s.base * _SLOWER,
             )
             for s in sequences
         )  # fmt: skip
-    raise AssertionError
+    share = _SLOWER**attempt
+    slower = replace(setup, room=replace(setup.room, speed_rad_s=share * setup.room.speed_rad_s))
+    try:
+        return sequences_of(slower, replace(settings, share=share * settings.share))
+    except OutOfRange:
+        return ()
 
 
 async def _to_raw(

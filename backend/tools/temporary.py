@@ -7,6 +7,8 @@ from contextlib import asynccontextmanager
 
 from backend.axis import Axis
 from backend.jobs import Progress
+from backend.optional import existing
+from backend.quick_stop import quick_stop_keys, raise_quick_stop_from
 from backend.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
 from backend.tools.procedures import run_procedure
 from drivers.cia402 import State
@@ -111,3 +113,16 @@ async def temporary(axis: Axis, values: Mapping[str, int]) -> AsyncIterator[dict
             yield before
         finally:
             await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, drive.name)
+
+
+@asynccontextmanager
+async def stopping_hard(axis: Axis, speed_rpm: float) -> AsyncIterator[None]:
+    """Inside the block a quick stop brakes from this speed as fast as set-points are ramped down.
+
+    Raises:
+        RestoreFailed: on leaving, where the drive's own deceleration could not be put back.
+    """
+    drive = axis.drive
+    async with axis.restoring(*await existing(drive, quick_stop_keys(drive))) as before:
+        await raise_quick_stop_from(drive, await axis.units(), speed_rpm, before)
+        yield
