@@ -252,8 +252,8 @@ class Axis(PowerState):
         """Operation enabled through the loop; braked and disabled on every way out.
 
         Raises:
-            NotAllowed: it cannot be enabled, or the loop ended the motion. Where the drive has a
-                fault, the message names it.
+            NotAllowed: it cannot be enabled, the loop ended the motion, or the drive has a fault
+                at its end. Where the drive has a fault, the message names it.
         """
         try:
             await self.go_to_cyclic(session, State.OPERATION_ENABLED, mode, timeout_s)
@@ -263,6 +263,17 @@ class Axis(PowerState):
             raise
         finally:
             await self.leave_cyclic(session, timeout_s)
+        await self._require_sound()
+
+    async def _require_sound(self) -> None:
+        """A fault after the last look at the motion must not pass for a motion that went well."""
+        if await self.state() in (State.FAULT, State.FAULT_REACTION):
+            error = NotAllowed(
+                f"{self.drive.name} has a fault at the end of its motion", drive=self.drive.name,
+                remedy="remove the cause, reset the fault, and try again",
+            )  # fmt: skip
+            await self._name_fault(error)
+            raise error
 
     async def _name_fault(self, error: NotAllowed) -> None:
         """The loop knows only that the drive left Operation enabled; the drive knows why."""

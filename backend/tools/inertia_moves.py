@@ -16,7 +16,16 @@ from backend.tools.axis_facts import AxisFacts
 from backend.tools.go_back import go_back
 from backend.tools.inertia_evaluation import InertiaSettings
 from backend.tools.probe import RoughFit, require_right_sign, rough_fit
-from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play, quiet
+from backend.tools.recording import (
+    Interrupted,
+    Play,
+    Recording,
+    bus_limits,
+    cycle_s,
+    enabled,
+    play,
+    quiet,
+)
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 
@@ -153,7 +162,7 @@ async def _first_move(
     try:
         return await speed_move(axis, session, speed_rpm, envelope, facts, lambda _fraction: None)
     except NotAllowed as error:
-        if "torque" not in error.message:
+        if isinstance(error, Interrupted) or "torque" not in error.message:
             raise
         raise NotAllowed(
             f"{axis.drive.name}: a short move takes more torque than is permitted: {error.message}",
@@ -189,7 +198,8 @@ async def identification_moves(
                 torque_nm=torque if ahead else None,
             )  # fmt: skip
         except NotAllowed as error:
-            if attempt == _ATTEMPTS - 1 or "torque" not in error.message:
+            last = attempt == _ATTEMPTS - 1
+            if last or isinstance(error, Interrupted) or "torque" not in error.message:
                 raise
         await quiet(axis)
         await go_back(axis, session, start, room, facts)

@@ -17,7 +17,15 @@ from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
-from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play
+from backend.tools.recording import (
+    Play,
+    Recording,
+    bus_limits,
+    cycle_s,
+    enabled,
+    play,
+    require_enabled,
+)
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
 
@@ -54,12 +62,15 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
 
     Raises:
         NotAllowed: the axis does not stand still under its speed loop.
+        Interrupted: it is not held by it.
     """
     units, drive = await axis.units(), axis.drive
     key, speed = drive.require("torque_actual"), drive.require("velocity_actual")
     async with enabled(axis, session, Mode.CSV):
         await asyncio.sleep(_SETTLE_S)
         readings = [await drive.read_many([key, speed]) for _ in range(_READINGS)]
+        # A disabled drive has no torque: a load that it held would seem to pull nothing, and fall.
+        await require_enabled(axis)
     raws = [(_integer(r[key].raw), _integer(r[speed].raw)) for r in readings]
     torque = np.array([units.torque(t) for t, _ in raws])
     turning = np.array([units.velocity(v) for _, v in raws])

@@ -21,17 +21,28 @@ from backend.jobs import Progress
 from backend.ports import address_of
 from backend.tools.alignment import BoolArray, FloatArray, Run, aligned
 from drivers import link as bus
-from drivers.cia402 import Mode
-from drivers.errors import LinkLost, LinkTimeout, NotAllowed
+from drivers.cia402 import Mode, State
+from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
 
 _RENEW_S = 0.03
 _STATE_TIMEOUT_S = 5.0
 #: Samples arrive in bunches; this long after the last set-point all of them have come.
 _TAIL_S = 1.0
+#: Ends that the loop makes by itself for what a tool has asked of the axis. A smaller motion or
+#: other gains may mend them; nothing mends any other end but a person.
+_OF_THE_MOTION = ("is beyond the limit", "were not renewed in time")
 _ROLES = ("position_actual", "velocity_actual", "torque_actual", "status_word")
 _TARGET_OF = {
     Mode.CSP: "position_target", Mode.CSV: "velocity_target", Mode.CST: "torque_target",
 }  # fmt: skip
+
+
+class Interrupted(NotAllowed):
+    """The drive, a switch or a person ended the motion, or did not let it begin.
+
+    No work in progress tries anything else then: an emergency stop that was pressed and is
+    released again must not let an axis move by itself (ISO 13850, 4.1.4).
+    """
 
 
 @dataclass(frozen=True)
@@ -153,10 +164,50 @@ async def enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterat
     """Operation enabled through the loop, for the length of the block; yields the position.
 
     On every way out the axis is braked and disabled.
+
+    Raises:
+        Interrupted: it cannot be enabled, or the drive has a fault at the end.
     """
-    async with axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S):
-        await _forgotten(axis, session)
-        yield await axis.position_raw()
+    inside = False
+    try:
+        async with axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S):
+            await _forgotten(axis, session)
+            inside = True
+            yield await axis.position_raw()
+            inside = False
+    except NotAllowed as error:
+        if inside:
+            raise
+        raise _interrupted(error) from error
+
+
+def _interrupted(error: NotAllowed) -> Interrupted:
+    return Interrupted(
+        error.message, drive=error.drive, parameter=error.parameter, value=error.value,
+        limit=error.limit, remedy=error.remedy,
+    )  # fmt: skip
+
+
+async def require_enabled(axis: Axis) -> None:
+    """What is read of a standing axis counts only if its loop has held it all the time.
+
+    Raises:
+        Interrupted: it is disabled meanwhile.
+    """
+    state = await axis.state()
+    if state is not State.OPERATION_ENABLED:
+        raise Interrupted(
+            f"{axis.drive.name}: the drive left Operation enabled: {state.value}",
+            drive=axis.drive.name,
+            remedy="look at the Alarms page, the emergency stop and the drive's supply",
+        )
+
+
+async def ends_all(axis: Axis, error: DriveError) -> bool:
+    """Whether work must end with this error, whatever else it could try."""
+    if isinstance(error, Interrupted | LinkLost):
+        return True
+    return await axis.state() in (State.FAULT, State.FAULT_REACTION)
 
 
 async def _forgotten(axis: Axis, session: CyclicSession) -> None:
@@ -197,7 +248,8 @@ async def play(
     torque that came since, and ends the motion early, by braking, when it returns True.
 
     Raises:
-        NotAllowed: the envelope or a fault ended the motion; the reason is in words.
+        NotAllowed: the envelope ended the motion; the reason is in words.
+        Interrupted: so did anything else, such as a fault.
         LinkLost: samples did not come.
     """
     drive = axis.drive
@@ -242,7 +294,10 @@ async def _drive_through(
     """Renew until every sample of the sequence has come back; True when ended by ``until``."""
     count = len(trajectory.values)
     station = trajectory.station
-    await session.cyclic.play([trajectory])
+    try:
+        await session.cyclic.play([trajectory])
+    except NotAllowed as error:
+        raise _interrupted(error) from error
     begun = catch.rows
     heard, deadline, judged = 0, time.monotonic() + _TAIL_S, len(catch.blocks)
     while True:
@@ -252,6 +307,8 @@ async def _drive_through(
             heard, deadline = arrived, time.monotonic() + _TAIL_S
         # Some bunches beyond the end: the first samples may be older than the first set-point.
         if arrived * period_s > count * period_s + 0.15:
+            # What happened since the last look, in the tail, is no better than before it.
+            raise_if_ended(session, station)
             return False
         if time.monotonic() > deadline:
             raise LinkLost(
@@ -270,10 +327,17 @@ async def _drive_through(
 
 
 def raise_if_ended(session: CyclicSession, station: int) -> None:
-    """Raise NotAllowed with the reason when the loop has ended the motion by force."""
+    """Raise with the reason when the loop has ended the motion by force.
+
+    Raises:
+        NotAllowed: by what was asked of the axis.
+        Interrupted: by something else.
+        LinkLost: nothing is exchanged any more.
+    """
     power = session.power()
     if power is not None and (reason := power.axis_state(station)[2]):
-        raise NotAllowed(
+        ours = any(words in reason for words in _OF_THE_MOTION)
+        raise (NotAllowed if ours else Interrupted)(
             f"station {station}: {reason}",
             remedy="see the Alarms page; check load, limits and gains, then widen the envelope "
             "only if the machine allows it",

@@ -11,10 +11,10 @@ from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.tools.recording import ends_all
 from backend.tools.temporary import put_back, write_settings
 from backend.tools.tune_candidates import plan
 from backend.tools.tune_verify import HUM_PERCENT, Check, Keep, Verified, verify
-from drivers.cia402 import State
 from drivers.errors import DriveError
 
 #: A candidate with this share of its gain; None where that keeps no margins.
@@ -44,7 +44,8 @@ async def first_kept(
     again with less gain, as ``softer`` makes it, before a slower one is.
 
     Raises:
-        DriveError: the drive has a fault, or the link is lost; nothing stays written.
+        DriveError: the drive has a fault or was disabled by others, or the link is lost; nothing
+            stays written.
     """
     told = stages(progress)
     waiting, softened = list(candidates), 0
@@ -60,7 +61,7 @@ async def first_kept(
                 verified = await verify(axis, session, check, candidate, promised, told, keep)
             except DriveError as error:
                 await take_back(axis, before)
-                if await axis.state() in (State.FAULT, State.FAULT_REACTION):
+                if await ends_all(axis, error):
                     raise
                 tried.append(f"{candidate.gains.speed_bandwidth_hz:.0f} Hz: {error.message}")
                 continue

@@ -14,8 +14,7 @@ from backend.tools.axis_facts import AxisFacts
 from backend.tools.notch_in_loop import measure_meaning_in_loop
 from backend.tools.notch_meaning import NotchMeaning, meaning_of, remember
 from backend.tools.probe import PULLED
-from backend.tools.recording import cycle_s
-from drivers.cia402 import State
+from backend.tools.recording import cycle_s, ends_all
 from drivers.errors import NotAllowed
 
 #: A resonance that rises by less bounds no gain.
@@ -57,7 +56,7 @@ async def learn_notches(
         else:
             meaning = await _learn_free(axis, session, how, facts, outcome, mechanics, progress)
     except NotAllowed as error:
-        if await axis.state() in (State.FAULT, State.FAULT_REACTION):
+        if await ends_all(axis, error):
             raise
         return f"designed without notches: {error.message}"
     remember(axis.drive, meaning)

@@ -26,10 +26,10 @@ from backend.tools import notch as notch_tool
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.notch_effect import unknown
 from backend.tools.notch_meaning import meaning_of
+from backend.tools.recording import ends_all
 from backend.tools.temporary import write_settings
 from backend.tools.tune_apply import Applied, first_kept, stages, take_back
 from backend.tools.tune_verify import Check, Keep, otherwise, verify
-from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
 
 _TURN = 2.0 * np.pi
@@ -205,7 +205,7 @@ class Trials:
                 stages(self.progress), self.keep,
             )  # fmt: skip
         except DriveError as error:
-            if await self.axis.state() in (State.FAULT, State.FAULT_REACTION):
+            if await ends_all(self.axis, error):
                 raise
             self.tried.append(f"as it was: {error.message}")
         else:

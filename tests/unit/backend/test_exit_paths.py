@@ -325,6 +325,22 @@ async def test_a_motion_that_a_fault_ended_names_the_fault(x: Member, servo: Ser
         await motion()
 
 
+async def test_a_motion_that_went_well_until_a_fault_at_its_end_did_not_go_well(
+    x: Member, servo: Servo
+) -> None:
+    """No set-point was to come any more, so that nobody looked: it ended as if nothing was."""
+    servo.enable()
+
+    async def motion() -> None:
+        async with x.axis.enabled_cyclic(Loop(x), Mode.CSP, 1.0):  # type: ignore[arg-type]
+            servo.trip()
+            servo.set((0x603F, 0), 0x3230)
+
+    with pytest.raises(NotAllowed, match=r"end of its motion \(0x3230 Overload\)"):
+        await motion()
+    assert not owes_stop(x)
+
+
 # --- clocks that are set ------------------------------------------------------------------
 
 
