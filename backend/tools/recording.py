@@ -31,6 +31,10 @@ _TAIL_S = 1.0
 #: Ends that the loop makes by itself for what a tool has asked of the axis. A smaller motion or
 #: other gains may mend them; nothing mends any other end but a person.
 _OF_THE_MOTION = ("is beyond the limit", "were not renewed in time")
+_LOOK = (
+    "see the Alarms page; without an alarm look at the emergency stop, the drive's supply and "
+    "whoever else may disable it, then measure again"
+)
 _ROLES = ("position_actual", "velocity_actual", "torque_actual", "status_word")
 _TARGET_OF = {
     Mode.CSP: "position_target", Mode.CSV: "velocity_target", Mode.CST: "torque_target",
@@ -199,7 +203,7 @@ async def require_enabled(axis: Axis) -> None:
         raise Interrupted(
             f"{axis.drive.name}: the drive left Operation enabled: {state.value}",
             drive=axis.drive.name,
-            remedy="look at the Alarms page, the emergency stop and the drive's supply",
+            remedy=_LOOK,
         )
 
 
@@ -271,7 +275,9 @@ async def play(
     )
     unsubscribe = session.cyclic.blocks(catch.take)
     try:
-        ended_early = await _drive_through(session, trajectory, period_s, catch, progress, until)
+        ended_early = await _drive_through(
+            axis, session, trajectory, period_s, catch, progress, until
+        )
     finally:
         unsubscribe()
     whole = np.column_stack(
@@ -284,6 +290,7 @@ async def play(
 
 
 async def _drive_through(
+    axis: Axis,
     session: CyclicSession,
     trajectory: bus.Trajectory,
     period_s: float,
@@ -308,7 +315,7 @@ async def _drive_through(
         # Some bunches beyond the end: the first samples may be older than the first set-point.
         if arrived * period_s > count * period_s + 0.15:
             # What happened since the last look, in the tail, is no better than before it.
-            raise_if_ended(session, station)
+            raise_if_ended(axis, session)
             return False
         if time.monotonic() > deadline:
             raise LinkLost(
@@ -316,7 +323,7 @@ async def _drive_through(
                 remedy="look at the link quality; the computer or the bus is overloaded",
             )
         await asyncio.sleep(_RENEW_S)
-        raise_if_ended(session, station)
+        raise_if_ended(axis, session)
         await session.cyclic.renew(station)
         progress(min(1.0, arrived / count))
         if until is not None:
@@ -326,7 +333,7 @@ async def _drive_through(
                 return True
 
 
-def raise_if_ended(session: CyclicSession, station: int) -> None:
+def raise_if_ended(axis: Axis, session: CyclicSession) -> None:
     """Raise with the reason when the loop has ended the motion by force.
 
     Raises:
@@ -334,14 +341,15 @@ def raise_if_ended(session: CyclicSession, station: int) -> None:
         Interrupted: by something else.
         LinkLost: nothing is exchanged any more.
     """
-    power = session.power()
-    if power is not None and (reason := power.axis_state(station)[2]):
-        ours = any(words in reason for words in _OF_THE_MOTION)
-        raise (NotAllowed if ours else Interrupted)(
-            f"station {station}: {reason}",
-            remedy="see the Alarms page; check load, limits and gains, then widen the envelope "
-            "only if the machine allows it",
-        )
+    power, name = session.power(), axis.drive.name
+    if power is not None and (reason := power.axis_state(session.station(axis.drive))[2]):
+        if any(words in reason for words in _OF_THE_MOTION):
+            raise NotAllowed(
+                f"{name}: {reason}", drive=name,
+                remedy="check load, limits and gains, then widen the envelope only if the machine "
+                "allows it",
+            )  # fmt: skip
+        raise Interrupted(f"{name}: {reason}", drive=name, remedy=_LOOK)
     if not session.running:
         raise LinkLost("the cyclic exchange ended during the measurement")
 

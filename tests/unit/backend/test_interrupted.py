@@ -155,7 +155,8 @@ def test_only_what_was_asked_of_the_axis_may_be_asked_in_another_way(
     reason: str, by_others: bool
 ) -> None:
     power = SimpleNamespace(axis_state=lambda _station: ("", "idle", reason))
-    session: Any = SimpleNamespace(power=lambda: power, running=True)
+    session: Any = SimpleNamespace(power=lambda: power, running=True, station=lambda _drive: 1)
+    axis: Any = Axis()
     with pytest.raises(NotAllowed) as told:
-        raise_if_ended(session, 1)
+        raise_if_ended(axis, session)
     assert isinstance(told.value, Interrupted) is by_others

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 
 import pytest
 
 from backend.jobs import Progress
 from backend.tools.inertia import inertia
 from backend.tools.inertia_evaluation import InertiaSettings
+from backend.tools.recording import Interrupted
 from backend.tools.step_response import StepSettings, step_response
+from backend.tools.sweep import sweep
+from backend.tools.sweep_evaluation import SweepSettings
 from drivers.cia402 import State
-from drivers.errors import NotAllowed
+from drivers.errors import DriveError, NotAllowed
+from drivers.link import Address, Trajectory
+from drivers.virtual.firmware.states import State as FirmwareState
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, mechanics, settings_of
 
@@ -48,3 +53,31 @@ async def test_a_fault_after_the_last_sample_is_told(drive: str, tool: str) -> N
         assert struck
         assert await b.axis.state() is State.FAULT
         assert await settings_of(b.axis.drive) == before
+
+
+async def test_a_load_whose_drive_was_stopped_does_not_seem_to_pull_nothing() -> None:
+    """Disabled it reports no torque: the sweep would open the loop that has to hold the load."""
+    # A brake holds the load while the drive is disabled (2108h:01).
+    loaded = mechanics((1e-4, 200.0, 0.005), gravity=0.15)
+    async with direct(loaded, settings={"2108:01": 1}) as b:
+        control = b.link.device.control  # type: ignore[attr-defined]
+        opened: list[int] = []
+        play = b.link.play
+
+        async def played(trajectories: Sequence[Trajectory]) -> int:
+            opened.append(len(trajectories))
+            return await play(trajectories)
+
+        async def stopped(station: int, addresses: Sequence[Address]) -> list[bytes | DriveError]:
+            # What an open safe-torque-off input does: no fault, and no power.
+            if control.state is FirmwareState.OPERATION_ENABLED:
+                control._switch_off(at_once=True)
+                control.state = FirmwareState.SWITCH_ON_DISABLED
+            return await read_many(station, addresses)
+
+        read_many = b.link.read_many
+        b.link.play = played  # type: ignore[method-assign]
+        b.link.read_many = stopped  # type: ignore[method-assign]
+        with pytest.raises(Interrupted, match="Switch on disabled"):
+            await sweep(b.axis, b.session, SweepSettings(WIDE), Progress(lambda: None))
+        assert not opened
