@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from backend import restoring
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
+from backend.optional import existing, torque_limits
 from backend.people.identity import acting
 from backend.power import PowerState
 from backend.quick_stop import quick_stop_keys, raise_quick_stop
@@ -213,13 +214,9 @@ class Axis(PowerState):
                 drive=drive.name,
                 remedy="stop it first",
             )
-        limits = [
-            key
-            for role in ("torque_limit_positive", "torque_limit_negative", "max_torque")
-            if (key := drive.key(role)) is not None
-        ]
+        limits = await torque_limits(drive)
         mode_keys = await self.restorable_mode()
-        stop_keys = quick_stop_keys(drive)
+        stop_keys = await existing(drive, quick_stop_keys(drive))
         async with self.restoring(*limits, *stop_keys, *mode_keys) as earlier:
             shown = next((earlier[key] for key in mode_keys if key in earlier), None)
             previous = Mode(int(shown)) if shown in set(Mode) else mode

@@ -8,18 +8,30 @@ counts is the value that came back.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from backend.owed import Owed
 from backend.ports import Port, address_of, carries
 from backend.readings import CommandRecord, Reading, WriteRecord
 from backend.rest import Rest, Resting
+from backend.value_check import checked, named
 from drivers import cia402
 from drivers.codec import decode, encode
-from drivers.errors import DriveError, LinkTimeout, NotAllowed, NotInUse, OutOfRange, Rejected
+from drivers.errors import (
+    DriveError,
+    LinkTimeout,
+    NotAllowed,
+    NotAsked,
+    NotInUse,
+    OutOfRange,
+    Rejected,
+)
 from drivers.link import Address, Found, LinkQuality
 from profiles.schema import Parameter, Profile, Raw
+
+#: After so many batches in a row without an answer a drive is asked for nothing more of a list.
+_SILENT_BATCHES = 4
 
 #: Roles that command motion; they are never "changed but not saved".
 _COMMAND_ROLES = frozenset({
@@ -227,6 +239,7 @@ class Drive:
                 f"{self.name}: {parameter.key} {parameter.name} can only be written",
                 drive=self.name,
                 parameter=parameter.key,
+                remedy="it has no value to read; writing to it runs what it is for",
             )
         port = self.port_for(parameter)
         try:
@@ -234,7 +247,7 @@ class Drive:
                 data = await port.link.read(port.station, address_of(parameter))
             reading = self._reading(parameter, data)
         except DriveError as error:
-            raise self._named(error, parameter) from error
+            raise named(self.name, error, parameter) from error
         self._store([reading])
         return reading
 
@@ -242,7 +255,12 @@ class Drive:
         """Integer raw value of one parameter, read now."""
         value = (await self.read(key)).raw
         if isinstance(value, str) or value is None:
-            raise OutOfRange(f"{self.name}: {key} is text", drive=self.name, parameter=key)
+            raise OutOfRange(
+                f"{self.name}: {key} is text",
+                drive=self.name,
+                parameter=key,
+                remedy="choose a parameter that is a number",
+            )
         return int(value)
 
     async def read_many(
@@ -251,6 +269,9 @@ class Drive:
         progress: Callable[[float, str], None] | None = None,
     ) -> dict[str, Reading]:
         """Read several parameters; one that fails comes back with ``error`` set.
+
+        A drive that leaves several batches in a row without an answer is not asked for the rest.
+        What a link left out because the drive was slow is asked once more at the end.
 
         Raises:
             LinkLost: the bus is gone; readings made before stay.
@@ -269,22 +290,42 @@ class Drive:
                 groups.setdefault(position, []).append(parameter)
         done = len(result)
         for position, group in groups.items():
-            port = self.ports[position]
-            for chunk in port.batches(group):
-                readings = await self._read_chunk(port, chunk)
+            async for readings in self._batches_of(self.ports[position], group):
                 result.update({reading.key: reading for reading in readings})
-                done += len(chunk)
+                done += len(readings)
                 if progress:
-                    progress(done / len(parameters), f"{done} of {len(parameters)} parameters")
+                    share = min(1.0, done / len(parameters))
+                    progress(share, f"{len(result)} of {len(parameters)} parameters")
         return result
 
-    async def _read_chunk(self, port: Port, chunk: Sequence[Parameter]) -> list[Reading]:
-        answers: Sequence[bytes | DriveError]
+    async def _batches_of(
+        self, port: Port, group: Sequence[Parameter]
+    ) -> AsyncIterator[list[Reading]]:
+        """Readings in batches; those left out while the drive was silent come once more."""
+        silent: list[LinkTimeout] = []
+        left_out: list[Parameter] = []
+        for chunk in port.batches(group):
+            if len(silent) < _SILENT_BATCHES:
+                answers = await self._ask(port, chunk)
+                silent = [*silent, late] if (late := _silence(answers)) else []
+            else:
+                answers = silent[-1:] * len(chunk)
+            pairs = zip(chunk, answers, strict=True)
+            left_out += [parameter for parameter, answer in pairs if isinstance(answer, NotAsked)]
+            yield self._taken(chunk, answers)
+        for chunk in port.batches(left_out) if not silent else []:
+            yield self._taken(chunk, await self._ask(port, chunk))
+
+    async def _ask(self, port: Port, chunk: Sequence[Parameter]) -> Sequence[bytes | DriveError]:
         try:
             async with self.rest.asking():
-                answers = await port.link.read_many(port.station, [address_of(p) for p in chunk])
+                return await port.link.read_many(port.station, [address_of(p) for p in chunk])
         except Resting as error:
-            answers = [error] * len(chunk)
+            return [error] * len(chunk)
+
+    def _taken(
+        self, chunk: Sequence[Parameter], answers: Sequence[bytes | DriveError]
+    ) -> list[Reading]:
         readings: list[Reading] = []
         for parameter, answer in zip(chunk, answers, strict=True):
             if isinstance(answer, DriveError):
@@ -327,54 +368,9 @@ class Drive:
         """A raw value as it will be written.
 
         Raises:
-            NotAllowed: read-only.
-            OutOfRange: wrong type, outside the limits, or not one of the enumerated values.
+            NotAllowed, OutOfRange: as `backend.value_check.checked`.
         """
-        label = f"{self.name}: {parameter.key} {parameter.name}"
-        if parameter.access == "ro":
-            raise NotAllowed(
-                f"{label} is read-only", drive=self.name, parameter=parameter.key, value=raw
-            )
-        if isinstance(raw, str) != (parameter.type in ("STRING", "OCTETS")):
-            raise OutOfRange(
-                f"{label}: {raw!r} is not a {parameter.type}",
-                drive=self.name,
-                parameter=parameter.key,
-                value=raw,
-                remedy=f"give a value of type {parameter.type}",
-            )
-        if isinstance(raw, str):
-            self._encodes(parameter, raw)
-            return raw
-        low, high = parameter.raw_limits
-        if (low is not None and raw < low) or (high is not None and raw > high):
-            limits = f"{_shown(parameter, low)} to {_shown(parameter, high)}"
-            raise OutOfRange(
-                f"{label}: {_shown(parameter, raw)} is outside {limits}",
-                drive=self.name,
-                parameter=parameter.key,
-                value=raw,
-                limit=limits,
-                remedy=f"choose a value from {limits}",
-            )
-        self._encodes(parameter, raw)
-        if parameter.enum and not parameter.bits and int(raw) not in parameter.enum:
-            choices = ", ".join(f"{code} ({text})" for code, text in parameter.enum.items())
-            raise OutOfRange(
-                f"{label}: {raw} is none of its values: {choices}",
-                drive=self.name,
-                parameter=parameter.key,
-                value=raw,
-                limit=choices,
-                remedy="choose one of the listed values",
-            )
-        return raw
-
-    def _encodes(self, parameter: Parameter, raw: Raw) -> None:
-        try:
-            encode(parameter.type, raw)
-        except OutOfRange as error:
-            raise self._named(error, parameter) from error
+        return checked(self.name, parameter, raw)
 
     async def write(self, key: str, value: Raw, *, raw: bool = True) -> Reading:
         """Write one parameter and return what was read back.
@@ -392,7 +388,11 @@ class Drive:
             try:
                 value = parameter.to_raw(value)
             except OverflowError as error:
-                raise self._named(OutOfRange(f"{value:g} is no number"), parameter) from error
+                raise named(
+                    self.name,
+                    OutOfRange(f"{value:g} is no number", remedy="give a number that is finite"),
+                    parameter,
+                ) from error
         value = self.check(parameter, value)
         port = self.port_for(parameter)
         if parameter.settable == "stopped":
@@ -418,7 +418,7 @@ class Drive:
         try:
             await self._send(port, parameter, value)
         except DriveError as error:
-            raise self._named(error, parameter, value) from error
+            raise named(self.name, error, parameter, value) from error
         if parameter.access == "wo":
             reading = Reading(parameter.key, value, parameter.to_value(value), time.time())
             self._store([reading])
@@ -501,7 +501,7 @@ class Drive:
             problem = error.message if isinstance(error, DriveError) else "interrupted"
             self._tell_command(parameter, raw, problem)
             if isinstance(error, DriveError):
-                raise self._named(error, parameter, raw) from error
+                raise named(self.name, error, parameter, raw) from error
             raise
         self._tell_command(parameter, raw)
 
@@ -558,28 +558,8 @@ class Drive:
             return None
         return cia402.fault_bit(echoes_control=self._own_status)
 
-    def _named(
-        self, error: DriveError, parameter: Parameter, value: Raw | None = None
-    ) -> DriveError:
-        """The same error, naming drive and parameter in its text."""
-        # A link names the node; the person knows the drive by the name on the bench.
-        error.drive = self.name
-        error.at(parameter=parameter.key)
-        if value is not None and error.value is None:
-            error.value = value
-        prefix = f"{self.name}: {parameter.key} {parameter.name}: "
-        if not error.message.startswith(self.name):
-            error.message = prefix + error.message
-            error.args = (error.message,)
-        return error
 
-
-def _shown(parameter: Parameter, raw: Raw | None) -> str:
-    if raw is None:
-        return "no limit"
-    try:
-        value = parameter.to_value(raw)
-    except OverflowError:
-        return "a number beyond all measure"
-    unit = f" {parameter.unit}" if parameter.unit else ""
-    return f"{value}{unit}" if value == raw else f"{value}{unit} (raw {raw})"
+def _silence(answers: Sequence[bytes | DriveError]) -> LinkTimeout | None:
+    """The last time-out of a batch without any answer; one object alone tells nothing."""
+    timeouts = [answer for answer in answers if isinstance(answer, LinkTimeout)]
+    return timeouts[-1] if 1 < len(answers) == len(timeouts) else None

@@ -27,6 +27,19 @@ def fault_keys(drive: Drive) -> list[str]:
     return sorted(reachable)
 
 
+async def read_active_faults(drive: Drive) -> list[Fault]:
+    """Faults and warnings that the drive reports, read now.
+
+    Raises:
+        DriveError: it does not answer, so it is not known.
+    """
+    readings = await drive.read_many(fault_keys(drive))
+    if all(reading.raw is None for reading in readings.values()):
+        # Nothing was told: by a drive that lacks these objects, or by none at all.
+        await drive.read(drive.require("status_word"))
+    return active_faults(drive, readings)
+
+
 def active_faults(drive: Drive, readings: Mapping[str, Reading]) -> list[Fault]:
     """Faults and warnings in these readings; an unknown code makes a record of its own."""
     code = integer(readings.get(drive.key("error_code") or "")) or 0

@@ -8,7 +8,7 @@ import time
 from backend.causes import hints
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
-from backend.faults import active_faults, fault_keys
+from backend.faults import read_active_faults
 from backend.ports import address_of
 from backend.restoring import shielded
 from drivers import cia402
@@ -204,8 +204,12 @@ class PowerState:
         return causes
 
     async def active_faults(self) -> list[Fault]:
-        """What the drive reports now, read now."""
-        return active_faults(self.drive, await self.drive.read_many(fault_keys(self.drive)))
+        """What the drive reports now, read now.
+
+        Raises:
+            DriveError: it does not answer, so it is not known.
+        """
+        return await read_active_faults(self.drive)
 
     async def reset_fault(self) -> State:
         """Rising edge of the fault-reset bit, then Switch on disabled.

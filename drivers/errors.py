@@ -4,6 +4,7 @@
 
     DriveError
     ├── LinkTimeout      no answer in time; the outcome of a write is unknown
+    │   └── NotAsked     not sent at all: the drive had left what came before unanswered
     ├── LinkLost         the wire or adapter is gone; nothing reaches the drive
     ├── ProtocolError    an answer came that the protocol does not allow
     ├── Rejected         the drive understood and refused (abort or exception code)
@@ -56,6 +57,10 @@ class LinkTimeout(DriveError):
     """No answer in time. A timed-out write has an unknown outcome and must be read back."""
 
     kind = "link-timeout"
+
+
+class NotAsked(LinkTimeout):
+    """Nothing was asked, as the drive has not answered since an earlier time-out."""
 
 
 class LinkLost(DriveError):

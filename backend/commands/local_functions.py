@@ -9,7 +9,7 @@ from backend.commands.function_answers import Faults, Gear, Past, Terminal, of_p
 from backend.commands.options import Place
 from backend.commands.session import drive_at
 from backend.fault_history import history_of, read_history
-from backend.faults import active_faults, fault_keys
+from backend.faults import read_active_faults
 from backend.io_functions import read_terminals
 from backend.mechanics_calc import Mechanics
 
@@ -30,7 +30,7 @@ async def terminals(place: Place) -> list[Terminal]:
 async def faults(place: Place) -> Faults:
     """Active faults and the drive's own record, read now."""
     async with drive_at(place.url, place.station, place.profile) as drive:
-        active = active_faults(drive, await drive.read_many(fault_keys(drive)))
+        active = await read_active_faults(drive)
         history = history_of(drive)
         readable = history is not None and history.kind != "unreadable"
         past = await read_history(Axis(drive)) if readable else []

@@ -16,7 +16,7 @@ from queue import Empty, SimpleQueue
 from typing import NoReturn, TypeVar
 
 from drivers.canopen import sdo
-from drivers.errors import DriveError, LinkTimeout, Rejected
+from drivers.errors import DriveError, LinkTimeout, NotAsked, Rejected
 
 T = TypeVar("T")
 
@@ -79,6 +79,7 @@ class SdoChannel:
 
         Raises:
             LinkTimeout: no answer within ``timeout_s`` of a request; the server was sent an abort.
+                NotAsked where it had not answered before either; then nothing was asked.
             LinkLost: the bus went down meanwhile.
             Rejected, ProtocolError: see `drivers.canopen.sdo`.
         """
@@ -172,7 +173,7 @@ class SdoChannel:
     def _still_silent(self, mux: bytes, timeout_s: float) -> NoReturn:
         self.timeouts += 1
         self._send(sdo.abort_frame(mux, sdo.ABORT_TIMED_OUT))
-        raise LinkTimeout(
+        raise NotAsked(
             f"node {self.node} has not answered since an earlier time-out; nothing was asked",
             limit=f"{timeout_s:g} s",
             remedy=_SILENT_REMEDY,

@@ -28,7 +28,7 @@ from drivers.canopen.url import CanUrl, parse_canopen_url
 from drivers.cia402 import is_stop
 from drivers.codec import size_of
 from drivers.dialect import dialect_of
-from drivers.errors import DriveError, LinkLost, NotAllowed
+from drivers.errors import DriveError, LinkLost, NotAllowed, NotAsked
 from drivers.link import (
     Address,
     Cyclic,
@@ -45,7 +45,8 @@ T = TypeVar("T")
 _WRITE_TIMEOUT_S = 1.0
 _STORE_TIMEOUT_S = 10.0
 _STORE_INDICES = (0x1010, 0x1011)
-_WORKERS = 8
+#: One for every node and one for the exchange: a silent node keeps nobody waiting but itself.
+_WORKERS = 128
 
 
 class CanopenLink:
@@ -162,7 +163,7 @@ class CanopenLink:
     async def read_many(
         self, station: int, addresses: Sequence[Address]
     ) -> list[bytes | DriveError]:
-        """Read several one after the other; a time-out or loss ends the batch for the rest too."""
+        """Read several one after the other; a silent node or a loss ends it for the rest too."""
         cancelled = threading.Event()
 
         def batch(addresses: Sequence[Address]) -> list[bytes | DriveError]:
@@ -172,8 +173,8 @@ class CanopenLink:
                     break
                 try:
                     results.append(self._read_now(station, address))
-                except LinkLost as lost:
-                    results += [lost] * (len(addresses) - len(results))
+                except (LinkLost, NotAsked) as gone:
+                    results += [gone] * (len(addresses) - len(results))
                     break
                 except DriveError as error:
                     results.append(error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import chain, pairwise
 
 import pytest
@@ -12,7 +13,16 @@ from backend.api.models import ParameterWrite
 from backend.drive import Drive
 from backend.ports import OBJECT_BATCH, Port
 from backend.tools.parameters import read_all
-from drivers.errors import LinkTimeout, NotAllowed, NotInUse, OutOfRange, Rejected
+from drivers.errors import (
+    DriveError,
+    LinkTimeout,
+    NotAllowed,
+    NotAsked,
+    NotInUse,
+    OutOfRange,
+    Rejected,
+)
+from drivers.link import Address
 from profiles.loader import load_profile
 from tests.support.memory_link import MemoryLink
 
@@ -158,3 +168,49 @@ def test_true_is_not_taken_for_one(field: str) -> None:
     assert ParameterWrite.model_validate({field: 1}).model_dump()[field] == 1
     with pytest.raises(ValidationError, match="give the number"):
         ParameterWrite.model_validate({field: True})
+
+
+class Slow(MemoryLink):
+    """Answers nothing while ``silent`` batches are left, and asks nothing after the first."""
+
+    def __init__(self, objects: dict[tuple[int, int], bytes], silent: int) -> None:
+        super().__init__(objects)
+        self.silent = silent
+        self.batches = 0
+
+    async def read_many(
+        self, station: int, addresses: Sequence[Address]
+    ) -> list[bytes | DriveError]:
+        self.batches += 1
+        if self.silent:
+            self.silent -= 1
+            left = [NotAsked("nothing was asked")] * (len(addresses) - 1)
+            return [LinkTimeout("no answer"), *left]
+        return await super().read_many(station, addresses)
+
+
+def slow(silent: int) -> tuple[Drive, Slow, list[str]]:
+    """An MMS7 and its list of many batches."""
+    profile = load_profile("mms7")
+    numbers = [p for p in profile.parameters if p.type == "UINT16" and p.access != "wo"]
+    link = Slow({(p.index or 0, p.subindex or 0): b"\1\0" for p in numbers}, silent)
+    drive = Drive("x", "X axis", profile, [Port(link, 1, profile.link("mlink"))])
+    return drive, link, [p.key for p in numbers]
+
+
+async def test_a_drive_that_answers_nothing_is_not_asked_for_a_whole_list() -> None:
+    drive, link, keys = slow(silent=1000)
+    readings = await drive.read_many(keys)
+    assert len(readings) == len(keys) > 100
+    assert all(reading.error for reading in readings.values())
+    assert link.batches == 4
+
+
+async def test_what_was_left_out_while_a_drive_was_slow_is_read_in_the_end() -> None:
+    drive, _, keys = slow(silent=2)
+    told: list[float] = []
+    readings = await drive.read_many(keys, lambda share, _: told.append(share))
+    late = [key for key, reading in readings.items() if reading.error]
+    assert late == [keys[0], keys[16]], "only those that the drive was asked for and did not answer"
+    assert told == sorted(told)
+    assert told[-1] == 1.0

@@ -10,7 +10,7 @@ from canopen_small_device import SmallDevice
 from conftest import Bench, until
 
 from drivers.canopen.link import CanopenLink
-from drivers.errors import LinkLost, LinkTimeout, NotAllowed, Rejected
+from drivers.errors import LinkLost, LinkTimeout, NotAllowed, NotAsked, Rejected
 from drivers.link import Address, LinkEvent
 from drivers.virtual.wires.canopen import CanopenNode
 
@@ -302,3 +302,20 @@ async def test_reading_from_a_closed_link_says_so() -> None:
     link = CanopenLink("canopen://virtual/nowhere")
     with pytest.raises(LinkLost, match="not open"):
         await link.read(1, STATUS)
+
+
+async def test_a_node_that_is_not_there_is_not_asked_for_everything(link: CanopenLink) -> None:
+    """Once what every node has (1000h) is not answered either, the rest of a list fails at once."""
+    answers = await link.read_many(77, [STATUS, SMALL, LIMITED, NAME] * 4)
+    assert isinstance(answers[0], LinkTimeout)
+    assert all(isinstance(answer, NotAsked) for answer in answers[1:])
+    assert link.quality(77).timeouts == 2
+
+
+async def test_many_absent_nodes_keep_no_other_waiting(link: CanopenLink) -> None:
+    absent = [asyncio.create_task(link.read(number, STATUS)) for number in range(60, 100)]
+    await asyncio.sleep(0)
+    assert await link.read(5, STATUS) == b"\x50\x02"
+    assert not any(task.done() for task in absent)
+    ends = await asyncio.gather(*absent, return_exceptions=True)
+    assert all(isinstance(end, LinkTimeout) for end in ends)
