@@ -10,6 +10,7 @@ import pytest
 
 from backend.axis import Envelope
 from backend.bench import Bench, Member
+from backend.jobs import Progress
 from backend.tools.axis_facts import read_facts
 from backend.tools.jog import Hold, JogSettings, jog
 from backend.tools.move import MoveSettings, move
@@ -109,7 +110,9 @@ async def test_a_drive_without_a_deceleration_is_jogged_by_its_acceleration(
     plain.without(DECELERATION, QUICK_STOP)
     hold = Hold()
     asyncio.get_running_loop().call_later(0.1, hold.release, "let go")
-    told = await jog(member.axis, JogSettings(1, 60.0, 600.0, 1.0, 50.0), hold, lambda *_: None)
+    told = await jog(
+        member.axis, JogSettings(1, 60.0, 600.0, 1.0, 50.0), hold, Progress(lambda: None)
+    )
     assert told["reason"] == "let go"
     # 600 rpm/s are 10 rev/s², 100000 inc/s².
     assert (ACCELERATION, (100000).to_bytes(4, "little")) in plain.written
@@ -122,7 +125,7 @@ async def test_without_an_acceleration_the_way_to_rest_is_not_known(
     plain.without(ACCELERATION)
     with pytest.raises(NotAllowed, match="6083:00 Profile acceleration"):
         await jog(
-            member.axis, JogSettings(1, 60.0, 600.0, 1.0, 50.0), Hold(), lambda *_: None
+            member.axis, JogSettings(1, 60.0, 600.0, 1.0, 50.0), Hold(), Progress(lambda: None)
         )  # fmt: skip
     assert plain.words() == []
 
@@ -135,7 +138,7 @@ async def test_two_ramps_are_not_given_to_a_drive_that_has_one(
         "PP", 0.1, HALF, acceleration_rpm_s=600.0, deceleration_rpm_s=300.0
     )  # fmt: skip
     with pytest.raises(OutOfRange, match="no deceleration of its own"):
-        await move(member.axis, settings, lambda *_: None)
+        await move(member.axis, settings, Progress(lambda: None))
     assert plain.written == []
 
 
