@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from backend.axis import Axis
 from backend.jobs import JobResult
-from backend.restoring import CLEANUP_TIMEOUT_S, shielded
-from backend.tools.temporary import put_back
+from backend.tools.temporary import put_back_in_time
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from profiles.schema import Raw
@@ -41,5 +40,5 @@ async def settle(axis: Axis, *, asked: bool) -> JobResult:
             back[debt.key] = debt.raw
         else:
             left[debt.key] = f"{now} now, which no measurement left there"
-    await shielded(lambda: put_back(axis, back), CLEANUP_TIMEOUT_S, drive.name)
+    await put_back_in_time(axis, back)
     return {"back": dict(back), "left": dict(left)}

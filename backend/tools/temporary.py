@@ -12,7 +12,7 @@ from backend.quick_stop import quick_stop_keys, raise_quick_stop_from
 from backend.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
 from backend.tools.procedures import run_procedure
 from drivers.cia402 import State
-from drivers.errors import DriveError, NotAllowed
+from drivers.errors import DriveError, LinkTimeout, NotAllowed
 from profiles.schema import Raw
 
 
@@ -57,7 +57,7 @@ async def write_settings(axis: Axis, values: Mapping[str, int]) -> dict[str, int
             await make_effective(axis)
     except BaseException:
         earlier = {key: before[key] for key in written}
-        await shielded(lambda: put_back(axis, earlier), CLEANUP_TIMEOUT_S, drive.name)
+        await put_back_in_time(axis, earlier)
         raise
     return before
 
@@ -103,6 +103,25 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
         )
 
 
+async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
+    """`put_back` to its end whatever happens meanwhile, but no longer than a cleanup may take.
+
+    Raises:
+        RestoreFailed: naming what could not be put back, also where a slow line left no time.
+    """
+    drive = axis.drive
+    try:
+        await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, drive.name)
+    except LinkTimeout as error:
+        owed = {debt.key for debt in drive.owed.debts}
+        left = ", ".join(f"{key} (was {raw})" for key, raw in before.items() if key in owed)
+        raise RestoreFailed(
+            f"{error.message}; not restored: {left}",
+            drive=drive.name,
+            remedy="; ".join(said for said in (error.remedy, PUT_BACK_LATER) if said),
+        ) from error
+
+
 @asynccontextmanager
 async def temporary(axis: Axis, values: Mapping[str, int]) -> AsyncIterator[dict[str, int]]:
     """These raw values act inside the block; yields what is put back afterwards."""
@@ -112,7 +131,7 @@ async def temporary(axis: Axis, values: Mapping[str, int]) -> AsyncIterator[dict
         try:
             yield before
         finally:
-            await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, drive.name)
+            await put_back_in_time(axis, before)
 
 
 @asynccontextmanager

@@ -57,6 +57,23 @@ async def lost_in_the_middle(x: Member, servo: Servo) -> RestoreFailed:
     return told.value
 
 
+async def test_a_line_too_slow_for_putting_back_names_what_is_left(
+    x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a dead serial line or CAN bus each try takes its time-out: no time is left for the rest."""
+    monkeypatch.setattr("backend.tools.temporary.CLEANUP_TIMEOUT_S", 0.02)
+
+    async def motion() -> None:
+        async with temporary(x.axis, {SPEED: 200}):
+            servo.gate.clear()
+            raise LinkLost("samples did not come")
+
+    with pytest.raises(RestoreFailed, match=f"^samples did not come; .*{SPEED} .was 400") as told:
+        await motion()
+    assert "running server puts them back" in (told.value.remedy or "")
+    assert [debt.key for debt in x.drive.owed.debts] == [SPEED]
+
+
 async def back(bench: Bench, servo: Servo) -> None:
     """The drive answers again, and everything that this brings about is over."""
     servo.mute = False
