@@ -3,7 +3,6 @@ import { Component, type ReactNode, Suspense, useEffect } from 'react'
 import { useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useDrives, useLink } from '../live/store'
-import { OwedNote } from '../widgets/OwedNote'
 import { Arriving } from './Arriving'
 import { Frame } from './Frame'
 import { AXIS, BENCH, fetchAhead } from './pages'
@@ -66,7 +65,6 @@ function Page() {
   return (
     <Guard key={`${page} ${drive}`}>
       <Arriving page={page} drive={drive}>
-        <OwedNote drive={drive} />
         <Shown drive={drive} />
       </Arriving>
     </Guard>

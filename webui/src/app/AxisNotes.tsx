@@ -4,6 +4,7 @@ import { useT } from '../i18n'
 import { useAxisState } from '../live/store'
 import { Icon } from '../widgets/Icon'
 import { href, type Page } from './router'
+import { listsFaults } from './states'
 
 /** What went wrong with an axis while its page is open: no answer, a fault. */
 export function AxisNotes({ drive, page }: { drive: string; page: Page }) {
@@ -19,7 +20,7 @@ export function AxisNotes({ drive, page }: { drive: string; page: Page }) {
     )
   }
   const faults = state.faults.filter((each) => each.kind === 'fault')
-  if (told || page === 'alarms' || faults.length === 0) return null
+  if (listsFaults(page, told) || faults.length === 0) return null
   return (
     <p className="note fault" role="alert">
       <Icon name="alarms" />

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest'
 import type { Quality } from '../api/schema'
-import { linkLook } from './states'
+import { listsFaults, linkLook } from './states'
 
 const quality = (part: Partial<Quality>): Quality => ({
   connected: true,
@@ -32,5 +32,16 @@ describe('link quality in a word', () => {
       details: { cyclic_cycles: 100_000 },
     })
     expect(linkLook(cyclic).word).toBe('good')
+  })
+})
+
+describe('a fault', () => {
+  it('is told above every page that does not list it itself, also when it was there before', () => {
+    for (const page of ['response', 'tune', 'motion', 'gains', 'parameters'] as const) {
+      expect(listsFaults(page, true)).toBe(false)
+    }
+    expect(listsFaults('alarms', false)).toBe(true)
+    expect(listsFaults('overview', true)).toBe(true)
+    expect(listsFaults('overview', false)).toBe(false)
   })
 })

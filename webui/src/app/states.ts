@@ -1,5 +1,6 @@
 import type { AxisState, Quality } from '../api/schema'
 import type { IconName } from '../widgets/Icon'
+import type { Page } from './router'
 
 /** How an axis state looks: a colour class and an icon; the words are always beside them. */
 export function stateLook(state: AxisState | null): { tone: string; icon: IconName } {
@@ -45,3 +46,7 @@ export function linkLook(quality: Quality | null): {
   if (share > 0.001) return { word: 'fair', tone: 'warn' }
   return { word: 'good', tone: 'live' }
 }
+
+/** Whether a page has the faults first on it itself; `told`: there were some when it was opened. */
+export const listsFaults = (page: Page, told: boolean): boolean =>
+  page === 'alarms' || (page === 'overview' && told)

@@ -8,6 +8,7 @@ import { notListed } from './texts/notlisted'
 import { parameters } from './texts/parameters'
 import { people } from './texts/people'
 import { recordings } from './texts/recordings'
+import { saidTexts } from './texts/said'
 import { scene } from './texts/scene'
 import { scope } from './texts/scope'
 import { segment } from './texts/segment'
@@ -26,6 +27,7 @@ export const catalogue = {
   ...recordings,
   ...library,
   ...notListed,
+  ...saidTexts,
   ...scene,
   ...scope,
   ...segment,

@@ -41,7 +41,8 @@ function sources(folder: string, wanted: RegExp): string[] {
   )
 }
 
-/** Which keys a file can ask for: written in full, put together, or by `known(t, prefix, …)`. */
+/** Which keys a file can ask for: written in full, put together, by `known(t, prefix, …)`, or by
+ * `under(prefix)`. */
 function asked(code: string): { whole: Set<string>; made: RegExp[] } {
   const tree = ts.createSourceFile('x.tsx', code, ts.ScriptTarget.ES2022, true, ts.ScriptKind.TSX)
   const whole = new Set<string>()
@@ -55,6 +56,10 @@ function asked(code: string): { whole: Set<string>; made: RegExp[] } {
     }
     if (ts.isCallExpression(node) && node.expression.getText() === 'known') {
       const prefix = node.arguments[1]
+      if (prefix && ts.isStringLiteral(prefix)) made.push(new RegExp(`^${quoted(prefix.text)}\\.`))
+    }
+    if (ts.isCallExpression(node) && node.expression.getText() === 'under') {
+      const prefix = node.arguments[0]
       if (prefix && ts.isStringLiteral(prefix)) made.push(new RegExp(`^${quoted(prefix.text)}\\.`))
     }
     ts.forEachChild(node, visit)

@@ -3,8 +3,9 @@ import { useEffect, useState } from 'react'
 import { api, ask } from '../api/client'
 import type { JobInfo } from '../api/schema'
 import { useT } from '../i18n'
+import { said } from '../i18n/said'
 import { setJob, useJob } from '../live/store'
-import { duration } from './format'
+import { clock, duration } from './format'
 import { ProblemNote } from './ProblemNote'
 import { useAction } from './useAction'
 
@@ -27,15 +28,19 @@ export function JobNote({ id, onClose }: { id: string | null; onClose?: () => vo
   if (!job) return null
   if (job.state === 'failed') {
     return job.problem ? (
-      <ProblemNote problem={job.problem} {...(onClose ? { onClose } : {})} />
+      <ProblemNote
+        problem={job.problem}
+        about={`${said(t, job.title)} · ${clock(job.ended)}`}
+        {...(onClose ? { onClose } : {})}
+      />
     ) : (
-      <p className="note fault">{t('job.failed', { title: job.title })}</p>
+      <p className="note fault">{t('job.failed', { title: said(t, job.title) })}</p>
     )
   }
   if (job.state !== 'running') {
     return (
       <p className={`note ${job.state === 'done' ? 'good' : 'warn'}`} role="status">
-        {t(job.state === 'done' ? 'job.done' : 'job.cancelled', { title: job.title })}{' '}
+        {t(job.state === 'done' ? 'job.done' : 'job.cancelled', { title: said(t, job.title) })}{' '}
         <span className="num">{duration(seconds(job, now))}</span>
         {onClose && (
           <button type="button" className="plain" onClick={onClose}>
@@ -49,8 +54,8 @@ export function JobNote({ id, onClose }: { id: string | null; onClose?: () => vo
   return (
     <div className="job" role="status">
       <div className="job-line">
-        <strong>{job.title}</strong>
-        <span className="grow">{job.step}</span>
+        <strong>{said(t, job.title)}</strong>
+        <span className="grow">{said(t, job.step)}</span>
         <span className="num">{t('job.elapsed', { time: duration(elapsed) })}</span>
         {job.progress > 0.02 && elapsed > 1 && (
           <span className="num">
@@ -77,7 +82,7 @@ export function JobNote({ id, onClose }: { id: string | null; onClose?: () => vo
       <progress
         max={1}
         value={job.progress > 0 ? job.progress : undefined}
-        aria-label={job.title}
+        aria-label={said(t, job.title)}
       />
       <ProblemNote problem={cancel.problem} onClose={cancel.clear} />
     </div>

@@ -6,9 +6,12 @@ import { FORGOTTEN } from '../live/store'
 /** What happened, to which drive and parameter, the limit, and what to try. */
 export function ProblemNote({
   problem,
+  about,
   onClose,
 }: {
   problem: Problem | null
+  /** What went wrong and when, where it may be read long afterwards. */
+  about?: string
   onClose?: () => void
 }) {
   const t = useT()
@@ -17,6 +20,7 @@ export function ProblemNote({
   const forgotten = problem.type === FORGOTTEN
   return (
     <div className="note fault" role="alert">
+      {about && <p className="dim">{about}</p>}
       <p>
         <strong>
           {unreachable

@@ -3,6 +3,7 @@ import { useCallback, useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { Interfaces } from '../../api/schema'
 import { useT } from '../../i18n'
+import { said } from '../../i18n/said'
 import { useDrives, useLink } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -88,7 +89,7 @@ export function ConnectPage() {
                     {each.label}
                     <small>
                       {t(`connect.kind.${each.kind}`)}
-                      {!each.usable && ` · ${each.problem || t('connect.unusable')}`}
+                      {!each.usable && ` · ${said(t, each.problem) || t('connect.unusable')}`}
                     </small>
                   </span>
                 </button>

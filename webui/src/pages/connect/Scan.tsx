@@ -41,30 +41,43 @@ export function Scan({ url, onUrl }: { url: string; onUrl: (url: string) => void
     })
   return (
     <>
-      <div className="row">
-        <TextInput
-          className="grow"
-          label={t('connect.stations')}
-          placeholder={t('connect.stationsAll')}
-          value={stations}
-          error={bad ? t('connect.stationsBad') : null}
-          onChange={(event) => setStations(event.currentTarget.value)}
-          onKeyDown={(event) => {
-            if (event.key === 'Enter' && ready) void start()
-          }}
+      {/* While it searches, word of that stands where it was asked for, and pushes nothing away. */}
+      {running && (
+        <div className="scan-place">
+          <JobNote id={id} />
+        </div>
+      )}
+      <div className={running ? 'gone' : 'scan-place'}>
+        <div className="row">
+          <TextInput
+            className="grow"
+            label={t('connect.stations')}
+            placeholder={t('connect.stationsAll')}
+            value={stations}
+            error={bad ? t('connect.stationsBad') : null}
+            onChange={(event) => setStations(event.currentTarget.value)}
+            onKeyDown={(event) => {
+              if (event.key === 'Enter' && ready) void start()
+            }}
+          />
+          <Button
+            variant="filled"
+            disabled={!ready}
+            loading={scan.busy}
+            onClick={() => void start()}
+          >
+            {t('connect.scan')}
+          </Button>
+        </div>
+        <Checkbox
+          label={t('connect.early')}
+          checked={early}
+          onChange={(event) => setEarly(event.currentTarget.checked)}
         />
-        <Button variant="filled" disabled={!ready} loading={scan.busy} onClick={() => void start()}>
-          {t('connect.scan')}
-        </Button>
       </div>
-      <Checkbox
-        label={t('connect.early')}
-        checked={early}
-        onChange={(event) => setEarly(event.currentTarget.checked)}
-      />
       <ProblemNote problem={scan.problem} onClose={scan.clear} />
       {/* Without onClose: what was found stays until the next scan. */}
-      <JobNote id={id} />
+      {!running && <JobNote id={id} />}
       {isSerial(url) && <LineSearch url={url} stations={list} onFound={onUrl} />}
       {job?.state === 'done' && (
         <section aria-label={t('connect.results')} ref={reveal}>

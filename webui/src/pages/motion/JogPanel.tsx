@@ -1,6 +1,7 @@
 import { type KeyboardEvent, type PointerEvent, useRef } from 'react'
 import type { AxisState } from '../../api/schema'
 import { known, useT } from '../../i18n'
+import { said } from '../../i18n/said'
 import { useJob, useLink } from '../../live/store'
 import { quantity } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
@@ -79,12 +80,17 @@ export function JogPanel({
           pad={pad}
         />
         <div className="jog-live">
-          <span className="big num">
-            {quantity(shown(state?.position, unit.travel), units.position ?? '')}
+          <span className="jog-figure">
+            <span className="big num">
+              {quantity(shown(state?.position, unit.travel), units.position ?? '')}
+            </span>
+            <span className="unit">{units.position}</span>
           </span>
-          <span className="unit">{units.position}</span>
-          <span className="num">
-            {quantity(shown(state?.velocity, unit.speed), units.velocity ?? '')} {units.velocity}
+          <span className="jog-figure">
+            <span className="num">
+              {quantity(shown(state?.velocity, unit.speed), units.velocity ?? '')}
+            </span>
+            <span className="unit">{units.velocity}</span>
           </span>
           <strong aria-live="polite">
             {direction === null ? t('jog.idle') : t(direction > 0 ? 'jog.plus' : 'jog.minus')}
@@ -103,7 +109,7 @@ export function JogPanel({
       {taken && (
         // A jog that was let go needs a moment to brake and tidy up, on a slow bus a long one.
         <p className={ending ? 'dim' : 'warn-text'} role="status">
-          {ending ? t('jog.ending') : t('jog.taken', { title: job?.title ?? '…' })}
+          {ending ? t('jog.ending') : t('jog.taken', { title: said(t, job?.title ?? '…') })}
         </p>
       )}
       {!settings && <p className="warn-text">{t('jog.invalid')}</p>}

@@ -137,7 +137,7 @@ export function InertiaResult({ result }: { result: Inertia }) {
     <>
       <p className={`note ${result.identifiable ? 'good' : 'warn'}`}>
         <strong>{t(result.identifiable ? 'inertia.sure' : 'inertia.unsure')}</strong>{' '}
-        {result.verdict}
+        {result.verdict !== 'ok' && result.verdict}
       </p>
       <div className="scroll-table">
         <table aria-label={t('inertia.title')}>
