@@ -60,7 +60,7 @@ async def lost_in_the_middle(x: Member, servo: Servo) -> RestoreFailed:
 async def test_a_line_too_slow_for_putting_back_names_what_is_left(
     x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """On a dead serial line or CAN bus each try takes its time-out: no time is left for the rest."""
+    """On a dead serial line or CAN bus each try takes its time-out: none is left for the rest."""
     monkeypatch.setattr("backend.tools.temporary.CLEANUP_TIMEOUT_S", 0.02)
 
     async def motion() -> None:
