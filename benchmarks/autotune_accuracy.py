@@ -23,7 +23,9 @@ from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.rig import WIDE
 
 
-async def tuned(axis: Axis, session: CyclicSession, spec: MechanicsSpec, scheme: Scheme) -> str:
+async def tuned(
+    axis: Axis, session: CyclicSession, spec: MechanicsSpec, scheme: Scheme, budget_s: float
+) -> str:
     """Tune an axis and tell the figures; the axis is as before in the end.
 
     ``×a/×b`` compares with the same design without notches and with the filters as they were: of
@@ -33,7 +35,7 @@ async def tuned(axis: Axis, session: CyclicSession, spec: MechanicsSpec, scheme:
     began = time.monotonic()
     # Counted in multiples of the motor by families that do not tell the motor's inertia.
     rotor = None if axis.drive.profile.drive == "mms7" else spec.motor.inertia_kgm2
-    settings = AutotuneSettings(WIDE, scheme=scheme, motor_inertia_kgm2=rotor)
+    settings = AutotuneSettings(WIDE, scheme=scheme, motor_inertia_kgm2=rotor, budget_s=budget_s)
     found = await autotune(axis, session, settings, Progress(lambda: None))
     took_s = time.monotonic() - began
     plain = await _without_notches(axis, session, found)

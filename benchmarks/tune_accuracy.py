@@ -17,6 +17,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import math
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -241,7 +242,10 @@ def _moved(outcome: InertiaOutcome, spec: MechanicsSpec) -> str:
 async def _tuned(rig: Rig, spec: MechanicsSpec) -> str:
     async with rig.axis(spec) as (axis, session):
         await _ready(axis)
-        return await tuned(axis, session, spec, "limited" if _limited(spec) else "free")
+        # Where nothing runs in real time a busy computer must not take designs out.
+        budget_s = 60.0 if rig.wire == "real-time" else math.inf
+        scheme: Scheme = "limited" if _limited(spec) else "free"
+        return await tuned(axis, session, spec, scheme, budget_s)
 
 
 def _silent() -> Progress:

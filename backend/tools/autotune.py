@@ -36,6 +36,7 @@ from backend.tools.tune_candidates import (
 )
 from backend.tools.tune_notches import Learning, learn_notches
 from backend.tools.tune_present import Trials
+from backend.tools.tune_time import TimeLeft
 from backend.tools.tune_verify import Check, Keep, Verified, otherwise, unseen
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
@@ -58,7 +59,8 @@ _SOFT_HZ, _SOFT_ALONE_HZ = 5.0, 20.0
 class AutotuneSettings:
     """``mark`` is the candidate to apply; ``load`` None is judged from the measurement.
 
-    ``apply`` False ends with the table of candidates and changes nothing.
+    ``apply`` False ends with the table of candidates and changes nothing. After ``budget_s``
+    nothing more is verified, and what is not verified is not applied.
     """
 
     envelope: Envelope
@@ -70,6 +72,7 @@ class AutotuneSettings:
     apply: bool = True
     rated_torque_nm: float | None = None
     motor_inertia_kgm2: float | None = None
+    budget_s: float = 60.0
 
 
 @dataclass(frozen=True)
@@ -108,15 +111,16 @@ async def autotune(
         NotAllowed: a step cannot be done or its answer cannot be trusted; says which and why.
         DriveError: as the single tools.
     """
+    time_left = TimeLeft.of(settings.budget_s)
     progress(0.0, "1 of 6: pre-checks")
     facts = await _pre_checks(axis, settings)
     async with stopping_hard(axis, settings.envelope.speed_rpm):
-        return await _tuned(axis, session, settings, facts, progress, keep)
+        return await _tuned(axis, session, settings, facts, progress, keep, time_left)
 
 
 async def _tuned(
     axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
-    progress: Progress, keep: Keep | None,
+    progress: Progress, keep: Keep | None, time_left: TimeLeft,
 ) -> AutotuneResult:  # fmt: skip
     """Everything that moves."""
     gains = await _steady_gains(axis, session, facts)
@@ -134,7 +138,7 @@ async def _tuned(
     found = _with(found, await _design(axis, session, settings, facts, found))
     if not settings.apply:
         return found
-    return await apply_and_verify(axis, session, settings, facts, found, progress, keep)
+    return await apply_and_verify(axis, session, settings, facts, found, progress, keep, time_left)
 
 
 async def _measured(
@@ -270,6 +274,7 @@ async def _design(
 async def apply_and_verify(
     axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
     found: AutotuneResult, progress: Progress, keep: Keep | None,
+    time_left: TimeLeft | None = None,
 ) -> AutotuneResult:  # fmt: skip
     """The wanted candidate, then more careful ones, until one keeps its promise.
 
@@ -285,13 +290,14 @@ async def apply_and_verify(
         settings.motor_inertia_kgm2, found.inertia.result.coulomb_nm.value,
     )  # fmt: skip
     promised = goals_for(found.load, settings.mark)
-    trials = Trials(axis, session, check, promised, progress, keep)
+    clock = time_left or TimeLeft()
+    trials = Trials(axis, session, check, promised, progress, keep, time_left=clock)
 
     def plant() -> MeasuredPlant:
         return plant_of(found.mechanics, inertia, facts, cautious=found.cautious)
 
     applied = await trials.first(_order(found, settings.mark), plant())
-    if applied is None and not found.cautious:
+    if applied is None and not found.cautious and clock.verifications() >= 1:
         made = await asyncio.to_thread(
             cautious_design, axis.drive, facts, found.mechanics, inertia,
             1.0 / cycle_s(session), "no design on the model keeps its promise",
@@ -301,14 +307,14 @@ async def apply_and_verify(
     if applied is None:
         raise NotAllowed(
             f"{axis.drive.name}: no candidate kept its promise when it was verified: "
-            + "; ".join(trials.tried),
+            + "; ".join(each for each in (*trials.tried, clock.told()) if each),
             drive=axis.drive.name,
             remedy="all parameters are as before; look for play and loose parts, measure again, "
             "or choose gains by hand",
         )
     by_step = "" if applied.verified.sweep.margins else _BY_STEP
     said = (
-        by_step, trials.note(applied), otherwise(applied.verified),
+        by_step, trials.note(applied), clock.told(), otherwise(applied.verified),
         unseen(applied.candidate.nominal.crossover_hz, applied.verified),
     )  # fmt: skip
     notes = (*found.notes, *(each for each in said if each))

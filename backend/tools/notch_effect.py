@@ -50,6 +50,8 @@ _PLACE, _LOWEST_HZ, _HIGHEST_HZ = 0.12, 55.0, 400.0
 #: Widths in shares of the centre (Hz), or level pairs (width, depth).
 _WIDTHS = (0.5, 0.2)
 _SHARE_OF_TORQUE = 0.35
+#: Share of the travel within which the next trial may begin.
+_NEAR = 0.4
 #: An axis that only trembles: its lines begin here, and it may go so far and so fast. Nothing
 #: holds it, so that rounded torques let it drift by some hundredths of a revolution.
 _STILL_FROM_HZ, _STILL_REV, _STILL_RPM = 30.0, 0.3, 150.0
@@ -96,7 +98,8 @@ async def measure_meaning(
         _sequence, 1.0 / cycle_s(session), envelope, facts, rigid, still
     )
     free = _Free(axis, session, envelope, facts, path, sequence, await axis.position_raw())
-    return await tried_with(free, axis, session, envelope, facts, progress)
+    near_rev = 0.0 if still else _NEAR * envelope.travel_rev
+    return await tried_with(free, axis, session, envelope, facts, progress, near_rev)
 
 
 class Player(Protocol):
@@ -121,9 +124,11 @@ class Player(Protocol):
 
 async def tried_with(
     player: Player, axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts,
-    progress: Progress,
+    progress: Progress, near_rev: float = 0.0,
 ) -> NotchMeaning:  # fmt: skip
     """Try values of the first notch; all are put back, and the axis where it was.
+
+    Nearer to there than ``near_rev`` the next trial begins where the one before has ended.
 
     Raises:
         NotAllowed: the axis cannot be measured so, or the notch does nothing that can be seen.
@@ -134,25 +139,27 @@ async def tried_with(
         raise NotAllowed(f"{drive.name}: what its notches do is printed in the manual",
                          drive=drive.name)  # fmt: skip
     slot = spec.slots[0]
-    home = await axis.position_raw()
+    units, home = await axis.units(), await axis.position_raw()
     off = await plan_notches(drive, [])
     count = len(_trials(drive, slot, 1))
     part = 1.0 / (count + 1)
     async with stopping_hard(axis, envelope.speed_rpm):
         async with temporary(axis, off):
             lowest = await player.plain(share(progress, 0.0, part, "trying without a notch"))
-        await go_back(axis, session, home, envelope, facts)
         centre = round(min(max(_PLACE / cycle_s(session), _LOWEST_HZ, lowest), _HIGHEST_HZ))
         effects: list[tuple[_Trial, NotchEffect | None]] = []
         for number, trial in enumerate(_trials(drive, slot, centre), 1):
             low = number * part
             told = share(progress, low, low + part, f"trying notch {number} of {count}")
+            away_rev = units.position(await axis.position_raw() - home)
+            if abs(away_rev) > near_rev:
+                await go_back(axis, session, home, envelope, facts)
             async with temporary(axis, off | _raw(slot, centre, trial)):
                 try:
                     effects.append((trial, await player.notched(told)))
                 except ValueError:
                     effects.append((trial, None))
-            await go_back(axis, session, home, envelope, facts)
+        await go_back(axis, session, home, envelope, facts)
     return _meaning(drive, centre, effects)
 
 
@@ -212,12 +219,27 @@ def _sequence(
             f"the envelope does not allow to measure the notches: {error}",
             remedy="widen travel, speed or torque of the envelope",
         ) from error
-    return made[0]
+    # What turns has far more torque than one that trembles: one period tells as much.
+    return made[0] if still else _one_period(made[0])
+
+
+def _one_period(sequence: excite.Sequence) -> excite.Sequence:
+    """With one period after the settling; a whole one moves a free axis nowhere."""
+    e = sequence.excitation
+    kept = e.transient_periods + 1
+    cut = slice(
+        e.first_sample + kept * e.period_samples, e.first_sample + e.periods * e.period_samples
+    )
+    return replace(sequence, excitation=replace(e, samples=np.delete(e.samples, cut), periods=kept))
 
 
 @dataclass
 class _Free:
-    """No loop: the ratio of the torques is the notch."""
+    """No loop: the ratio of the torques is the notch.
+
+    Friction leaves the axis a turn from where it began, so each trial is the one before with its
+    sign turned: that brings it back.
+    """
 
     axis: Axis
     session: CyclicSession
@@ -227,6 +249,7 @@ class _Free:
     sequence: excite.Sequence
     home: int
     _plain: ComplexArray | None = None
+    _sign: int = 1
 
     async def plain(self, told: Callable[[float], None]) -> float:
         self._plain = await self._torque(told)
@@ -242,13 +265,14 @@ class _Free:
         axis, facts = self.axis, self.facts
         units = await axis.units()
         step = units.torque(1.0) / 100.0 * facts.rated_torque_nm
-        raw = np.round(self.sequence.excitation.samples / step).astype(np.int64)
+        sign, self._sign = self._sign, -self._sign
+        raw = sign * np.round(self.sequence.excitation.samples / step).astype(np.int64)
         async with enabled(axis, self.session, Mode.CST):
             recording = await play(
                 axis, self.session, Play(Mode.CST, raw),
                 await bus_limits(axis, self.envelope, self.home), facts.rated_torque_nm, told,
             )  # fmt: skip
-        return np.asarray(np.mean(periods_of(axis, self.sequence, recording)[0], axis=0))
+        return np.asarray(sign * np.mean(periods_of(axis, self.sequence, recording)[0], axis=0))
 
 
 def periods_of(

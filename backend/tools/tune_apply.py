@@ -14,6 +14,7 @@ from backend.restoring import CLEANUP_TIMEOUT_S, shielded
 from backend.tools.recording import ends_all
 from backend.tools.temporary import put_back, write_settings
 from backend.tools.tune_candidates import plan
+from backend.tools.tune_time import TimeLeft
 from backend.tools.tune_verify import HUM_PERCENT, Check, Keep, Verified, verify
 from drivers.errors import DriveError
 
@@ -35,21 +36,29 @@ class Applied:
 async def first_kept(
     axis: Axis, session: CyclicSession, check: Check, candidates: Sequence[Candidate],
     promised: Goals, tried: list[str], progress: Progress, keep: Keep | None,
-    softer: Softer | None = None,
+    softer: Softer | None = None, time_left: TimeLeft | None = None,
 ) -> Applied | None:  # fmt: skip
     """The first candidate that keeps its promise stays written; ``tried`` says why others do not.
 
     ``candidates`` are tried in their order; what is ``promised`` is what was asked for, which a
     more careful one may keep where it does not reach its own goals. One that only hums is tried
-    again with less gain, as ``softer`` makes it, before a slower one is.
+    again with less gain, as ``softer`` makes it, before a slower one is. The last one that
+    ``time_left`` allows is the most careful of all.
 
     Raises:
         DriveError: the drive has a fault or was disabled by others, or the link is lost; nothing
             stays written.
     """
     told = stages(progress)
+    clock = time_left or TimeLeft()
     waiting, softened = list(candidates), 0
     while waiting:
+        allowed = clock.verifications()
+        if allowed < 2:
+            clock.left_out += len(waiting) - int(allowed)
+            waiting = waiting[-1:] if allowed else []
+            if not waiting:
+                break
         candidate = waiting.pop(0)
         progress(0.65, "5 of 6: applying")
         raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
@@ -58,7 +67,10 @@ async def first_kept(
         with axis.drive.owed.lent(earlier):
             before = await write_settings(axis, raw)
             try:
-                verified = await verify(axis, session, check, candidate, promised, told, keep)
+                with clock.verifying():
+                    verified = await verify(
+                        axis, session, check, candidate, promised, told, keep, clock
+                    )
             except DriveError as error:
                 await take_back(axis, before)
                 if await ends_all(axis, error):

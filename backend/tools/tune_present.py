@@ -29,6 +29,7 @@ from backend.tools.notch_meaning import meaning_of
 from backend.tools.recording import ends_all
 from backend.tools.temporary import write_settings
 from backend.tools.tune_apply import Applied, first_kept, stages, take_back
+from backend.tools.tune_time import TimeLeft
 from backend.tools.tune_verify import Check, Keep, otherwise, verify
 from drivers.errors import DriveError, NotAllowed
 
@@ -140,6 +141,7 @@ class Trials:
     tried: list[str] = field(default_factory=list)
     had: Present = field(default_factory=lambda: Present(None))
     had_failed: bool = False
+    time_left: TimeLeft = field(default_factory=TimeLeft)
 
     async def first(self, order: Sequence[Candidate], plant: MeasuredPlant) -> Applied | None:
         """The first of these, or what the axis has where all that is left is slower.
@@ -153,7 +155,7 @@ class Trials:
         self.had = await present(self.axis, check.facts, plant, check.inertia_kgm2, self.promised)
         slower = [c for c in order if self.had.slower(c)]
         applied = await self._designs([c for c in order if c not in slower], plant)
-        if applied is None and slower and self.had.sound and not self.had_failed:
+        if applied is None and slower and self.had.sound and self._may_stay():
             applied = await self._as_it_was()
         if applied is None:
             applied = await self._designs(slower, plant)
@@ -161,12 +163,16 @@ class Trials:
                 applied = await self._as_it_was_or(applied)
         return applied
 
+    def _may_stay(self) -> bool:
+        """Whether what it had can be verified: it did not fail before, and there is time."""
+        return not self.had_failed and self.time_left.verifications() >= 1
+
     async def _as_it_was_or(self, slower: Applied) -> Applied:
         """The prediction was wrong for a slower design, so it is no reason against what it had.
 
         That is measured in turn, and stays where it keeps the promise; else the design is back.
         """
-        if self.had_failed:
+        if not self._may_stay():
             return slower
         raw = {key: await self.axis.drive.raw(key) for key in slower.before}
         await take_back(self.axis, slower.before)
@@ -191,7 +197,7 @@ class Trials:
 
         return await first_kept(
             self.axis, self.session, self.check, rows, self.promised, self.tried, self.progress,
-            self.keep, softer,
+            self.keep, softer, self.time_left,
         )  # fmt: skip
 
     async def _as_it_was(self) -> Applied | None:
@@ -200,10 +206,11 @@ class Trials:
         assert candidate is not None
         self.progress(0.65, "5 of 6: what it had is faster than the designs that are left")
         try:
-            verified = await verify(
-                self.axis, self.session, self.check, candidate, self.promised,
-                stages(self.progress), self.keep,
-            )  # fmt: skip
+            with self.time_left.verifying():
+                verified = await verify(
+                    self.axis, self.session, self.check, candidate, self.promised,
+                    stages(self.progress), self.keep, self.time_left,
+                )  # fmt: skip
         except DriveError as error:
             if await ends_all(self.axis, error):
                 raise

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
@@ -16,6 +16,7 @@ from backend.analysis.loop_structure import Gains, LoopFilters
 from backend.analysis.margins import Margins
 from backend.jobs import Progress
 from backend.tools import tune_apply
+from backend.tools.tune_time import TimeLeft
 
 GOALS = Goals(9.0, 48.0, 1.8)
 #: More gain than this makes the torque hum with more than 4 % of the rated.
@@ -31,7 +32,12 @@ def design(speed_nms: float, speed_filter_hz: float = 1000.0) -> Candidate:
 
 
 async def kept_of(
-    monkeypatch: pytest.MonkeyPatch, rows: list[Candidate], *, soft: bool = True
+    monkeypatch: pytest.MonkeyPatch,
+    rows: list[Candidate],
+    *,
+    soft: bool = True,
+    time_left: TimeLeft | None = None,
+    meanwhile: Callable[[], None] = lambda: None,
 ) -> tuple[list[float], float | None]:
     """The speed gains that were verified, in turn, and the one that stayed."""
     seen: list[float] = []
@@ -39,6 +45,7 @@ async def kept_of(
     async def verify(_axis: Any, _session: Any, _check: Any, candidate: Candidate, *_: Any) -> Any:
         gain = candidate.gains.speed_nms
         seen.append(gain)
+        meanwhile()
         kept = gain <= QUIET_NMS
         hum = None if kept else 4.0 * gain / QUIET_NMS
         return SimpleNamespace(kept=kept, why="" if kept else "hums", hum_percent=hum)
@@ -62,7 +69,7 @@ async def kept_of(
     tried: list[str] = []
     session: Any = None
     applied = await tune_apply.first_kept(
-        axis, session, check, rows, GOALS, tried, Progress(lambda: None), None, softer
+        axis, session, check, rows, GOALS, tried, Progress(lambda: None), None, softer, time_left
     )
     assert tried == ["hums"] * (len(seen) - (applied is not None))
     return seen, None if applied is None else applied.candidate.gains.speed_nms
