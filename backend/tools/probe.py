@@ -18,6 +18,7 @@ from backend.cyclic import CyclicSession
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.recording import (
+    Interrupted,
     Play,
     Recording,
     bus_limits,
@@ -41,6 +42,9 @@ _SETTLE_S = 0.3
 _READINGS = 12
 _RESTLESS_PERCENT = 5.0
 _RESTLESS_RPM = 3.0
+#: A load that sinks on the softest loop is slower than this long before it is looked at; one that
+#: nothing holds is faster within some hundredths of a second.
+_FALLING_RPM = 30.0
 #: Share of the energy moved to and fro that noise alone does not make.
 _GAINED = 0.1
 
@@ -81,6 +85,14 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
             drive=drive.name,
             remedy="lower the gains of the speed loop and try again",
         )
+    if abs(float(np.mean(turning))) > _FALLING_RPM:
+        raise Interrupted(
+            f"{drive.name} turns with {float(np.mean(turning)):.3g} rpm and "
+            f"{float(np.mean(torque)):.3g} % of its rated torque while its speed loop is to hold "
+            "it", drive=drive.name,
+            remedy="the drive cannot hold it: look at the supply of its power stage, its torque "
+            "limits, its gains and the load",
+        )  # fmt: skip
     return float(np.mean(torque)) / 100.0 * facts.rated_torque_nm
 
 
@@ -89,9 +101,13 @@ def _integer(raw: object) -> int:
 
 
 async def probe_axis(
-    axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts, home_raw: int
-) -> Probed:
+    axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts, home_raw: int,
+    inertia_kgm2: float | None = None,
+) -> Probed:  # fmt: skip
     """Feel the axis in CST, from 2 % of rated torque upwards.
+
+    Where its inertia is known, from half of the torque that moves it well without any friction,
+    but of a quarter of the permitted one at most.
 
     Raises:
         NotAllowed: it does not move with the permitted torque, or it moves the wrong way, or it
@@ -103,7 +119,12 @@ async def probe_axis(
     highest = 0.9 * envelope.torque_percent / 100.0 * rated
     limits = await bus_limits(axis, envelope, home_raw)
     enough = min(_ENOUGH_RAD_S, 0.4 * envelope.speed_rpm * _TURN / 60.0)
-    peak = min(_FIRST_SHARE * rated, highest)
+    first = _FIRST_SHARE * rated
+    if inertia_kgm2 is not None:
+        # A quarter of the doublet is half a sine: its torque lasts 2/π of its time.
+        needed = enough * inertia_kgm2 / (2.0 / np.pi * _DURATION_S / 4.0)
+        first = max(first, min(0.5 * needed, 0.25 * highest))
+    peak = min(first, highest)
     async with enabled(axis, session, Mode.CST):
         while True:
             values = excite.probe(rate, peak, _DURATION_S, step)

@@ -81,3 +81,20 @@ async def test_a_load_whose_drive_was_stopped_does_not_seem_to_pull_nothing() ->
         with pytest.raises(Interrupted, match="Switch on disabled"):
             await sweep(b.axis, b.session, SweepSettings(WIDE), Progress(lambda: None))
         assert not opened
+
+
+async def test_a_load_that_the_drive_cannot_hold_is_not_measured() -> None:
+    """Its torque is limited to a twentieth of the rated, which says nothing of what pulls it."""
+    async with direct(ONE, drive="m6l", settings={"6072:00": 50}) as b:
+        read_many = b.link.read_many
+
+        async def pulled(station: int, addresses: Sequence[Address]) -> list[bytes | DriveError]:
+            if b.link.axis_state(station)[0] == State.OPERATION_ENABLED.value:
+                b.link.device.inject("load_nm", 0.15)
+            return await read_many(station, addresses)
+
+        b.link.read_many = pulled  # type: ignore[method-assign]
+        with pytest.raises(Interrupted, match=r"turns with .* to hold it") as told:
+            await sweep(b.axis, b.session, SweepSettings(WIDE), Progress(lambda: None))
+        assert "torque limits" in (told.value.remedy or "")
+        assert await b.axis.state() is not State.OPERATION_ENABLED
