@@ -15,6 +15,9 @@ import can
 import serial
 from can.interfaces.slcan import slcanBus
 
+BLOCKED = "the adapter takes no more frames"
+"""Said where its own buffer is full: it is there, but what it has cannot be sent."""
+
 _ASK_AGAIN_S = 0.5
 _BUS_ERROR = 0x80
 _ERROR_PASSIVE = 0x20
@@ -50,6 +53,8 @@ class SlcanBus(slcanBus):
             self.serialPortOrig.write(string.encode("ascii") + self.LINE_TERMINATOR)
             while not self._drained():
                 pass
+        except serial.SerialTimeoutException as error:
+            raise can.CanOperationError(BLOCKED) from error
         except (OSError, serial.SerialException, termios.error, TypeError) as error:
             raise can.CanOperationError(f"the adapter is gone: {error}") from error
 

@@ -8,6 +8,7 @@ read back) and the one in use.
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol, cast
@@ -159,8 +160,11 @@ class ObjectDictionary:
         for code in self.entries:
             highest[code >> 8] = max(highest.get(code >> 8, 0), code & 0xFF)
         for index, last in highest.items():
-            if code_of(index, 0) not in self.entries:
+            told = self.entries.get(code_of(index, 0))
+            if told is None:
                 self._add(_constant(index, 0, "Highest subindex", "UINT8", last))
+            elif last and told.parameter.access == "ro" and told.parameter.default_raw is None:
+                self._add(told.parameter.model_copy(update={"default_raw": last}))
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self.numbered.values())
@@ -292,6 +296,18 @@ def _constant(index: int, subindex: int, name: str, kind: str, value: Raw) -> Pa
     )  # fmt: skip
 
 
+def _revision(profile: Profile) -> int:
+    """The printed revision; where a manual prints no identity, a number of the family's own.
+
+    Masters take slaves of one vendor, product and revision for alike: SOEM reads the EEPROM of the
+    first only, and would ask an M6-L for the complete access that an MMS7 before it offers.
+    """
+    identity = profile.identity
+    if identity.revision is not None or identity.product_code is not None:
+        return identity.revision or 0
+    return zlib.crc32(profile.drive.encode()) & 0xFFFF
+
+
 def _standard_objects(profile: Profile, station: int) -> list[Parameter]:
     """Objects of CiA 301 and ETG.1000.6 that a master expects of every drive."""
     identity = profile.identity
@@ -304,7 +320,7 @@ def _standard_objects(profile: Profile, station: int) -> list[Parameter]:
         _constant(0x1018, 0, "Identity", "UINT8", 4),
         _constant(0x1018, 1, "Vendor", "UINT32", identity.vendor_id or 0),
         _constant(0x1018, 2, "Product", "UINT32", identity.product_code or 0),
-        _constant(0x1018, 3, "Revision", "UINT32", identity.revision or 0),
+        _constant(0x1018, 3, "Revision", "UINT32", _revision(profile)),
         _constant(0x1018, 4, "Serial number", "UINT32", 0x56000000 | station),
         _constant(0x1C00, 0, "Sync manager types", "UINT8", 4),
         *(_constant(0x1C00, i + 1, f"Sync manager {i}", "UINT8", i + 1) for i in range(4)),

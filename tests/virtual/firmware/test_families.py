@@ -472,3 +472,17 @@ def test_gains_without_a_printed_default_read_what_the_loops_use(family) -> None
     assert b.get("2005:00") == 40
     assert b.get("2006:00") == 200  # 20.0 ms
     assert b.servo.axis.p[k.P_KP_POSITION_1] == pytest.approx(TURN * b.get("2009:00"))
+
+
+def test_no_two_families_have_the_identity_of_one_another() -> None:
+    """SOEM copies the EEPROM of an earlier slave of equal vendor, product and revision."""
+    words = [
+        tuple(make_device(name).read(0x1018, n) for n in (1, 2, 3))
+        for name in ("mms7", "m6l", "r6l", "ep3e")
+    ]
+    assert len(set(words)) == len(words)
+
+
+def test_a_count_of_entries_that_no_manual_prints_is_the_number_of_entries() -> None:
+    """CiA 301 clause 7.4.1: subindex 0 tells the highest. EP3E prints no value of 607Dh:00."""
+    assert make_device("ep3e").read(0x607D, 0) == b"\2"

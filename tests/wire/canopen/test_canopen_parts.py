@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import errno
+from pathlib import Path
 from typing import Any
 
 import can
 import pytest
+import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -21,6 +23,8 @@ from drivers.canopen.scanning import readable
 from drivers.canopen.url import INTERFACES, parse_canopen_url
 from drivers.errors import LinkLost, OutOfRange
 from drivers.link import Address, CyclicSignal
+from drivers.virtual.wires.can_wire import CanWire
+from drivers.virtual.wires.slcan import SlcanSide
 
 
 def test_urls_of_the_documentation() -> None:
@@ -74,6 +78,37 @@ def test_the_adapters_errors_are_translated(code: int, says: str) -> None:
     error = translate(url, wrapped)
     assert says in error.message
     assert error.remedy
+
+
+@pytest.mark.parametrize(
+    ("failure", "says", "remedy"),
+    [
+        (serial.SerialTimeoutException("Write timeout"), "nobody acknowledges", "termination"),
+        (serial.SerialException("device disconnected"), "adapter is gone", "USB cable"),
+    ],
+)
+def test_an_adapter_that_is_full_is_told_from_one_that_is_unplugged(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, failure: OSError, says: str, remedy: str
+) -> None:
+    """An slcan adapter on a bus where nobody acknowledges keeps its frames until it is full."""
+    path = tmp_path / "ttyCAN"
+
+    def fails(_data: bytes) -> None:
+        raise failure
+
+    with CanWire(SlcanSide(path), []):
+        url = parse_canopen_url(f"canopen://slcan/{path}")
+        bus = open_bus(url)
+        try:
+            with monkeypatch.context() as patch:
+                patch.setattr(bus.serialPortOrig, "write", fails)  # type: ignore[attr-defined]
+                with pytest.raises(can.CanOperationError) as caught:
+                    bus.send(can.Message(arbitration_id=0x605, is_extended_id=False))
+        finally:
+            bus.shutdown()
+    error = translate(url, caught.value)
+    assert says in error.message
+    assert remedy in (error.remedy or "")
 
 
 def test_a_silent_node_is_told_once_and_its_return_too() -> None:
