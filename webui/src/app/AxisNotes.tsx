@@ -1,6 +1,7 @@
 import { useRef } from 'react'
 import type { AxisState } from '../api/schema'
 import { useT } from '../i18n'
+import { said } from '../i18n/said'
 import { useAxisState } from '../live/store'
 import { Icon } from '../widgets/Icon'
 import { href, type Page } from './router'
@@ -15,7 +16,7 @@ export function AxisNotes({ drive, page }: { drive: string; page: Page }) {
   if (!state.fresh) {
     return (
       <p className="note warn" role="status">
-        <strong>{t('state.noAnswer')}</strong> {state.problem}
+        <strong>{t('state.noAnswer')}</strong> {said(t, state.problem)}
       </p>
     )
   }

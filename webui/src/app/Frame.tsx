@@ -1,6 +1,7 @@
 import { ActionIcon, Drawer, NativeSelect } from '@mantine/core'
 import { type ReactNode, useEffect, useRef, useState } from 'react'
 import { known, useT } from '../i18n'
+import { said } from '../i18n/said'
 import * as live from '../live/live'
 import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '../live/store'
 import { clock } from '../widgets/format'
@@ -326,11 +327,12 @@ function Refused() {
   return (
     <div className="note fault" role="alert">
       <p>
-        <strong>{known(t, 'problemTitle', refused.problem.title)}</strong> {refused.problem.detail}
+        <strong>{known(t, 'problemTitle', refused.problem.title)}</strong>{' '}
+        {said(t, refused.problem.detail)}
       </p>
       {refused.problem.remedy && (
         <p>
-          {t('problem.try')} {refused.problem.remedy}
+          {t('problem.try')} {said(t, refused.problem.remedy)}
         </p>
       )}
       <button type="button" className="plain" onClick={() => setSeen(refused.at)}>

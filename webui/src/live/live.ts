@@ -24,7 +24,10 @@ export function start(): void {
 export const send = (message: FromPage) => post({ kind: 'send', message })
 export const stand = (name: string, message: FromPage | null) =>
   post({ kind: 'stand', name, message })
-export const jogStart = (message: JogStart) => post({ kind: 'jogStart', message })
+export function jogStart(message: JogStart): void {
+  store.askedAnew('jog_start')
+  post({ kind: 'jogStart', message })
+}
 export const jogBeat = (drive: string) => post({ kind: 'jogBeat', drive })
 export const jogStop = (reason: string) => post({ kind: 'jogStop', reason })
 export const enablePress = (invitation: string) => post({ kind: 'enablePress', invitation })

@@ -1,6 +1,16 @@
 import { describe, expect, it } from 'vitest'
 import type { AxisState, JobInfo, ParameterValue } from '../api/schema'
-import { contents, endForgotten, FORGOTTEN, setJob, setLink, setReadings, setState } from './store'
+import {
+  askedAnew,
+  contents,
+  endForgotten,
+  FORGOTTEN,
+  setJob,
+  setLink,
+  setReadings,
+  setState,
+  subscribe,
+} from './store'
 
 const job = (state: JobInfo['state']): JobInfo => ({
   id: 'j1',
@@ -72,5 +82,19 @@ describe('the store', () => {
     })
     expect(contents.jobs.get('kept')?.state).toBe('running')
     expect(contents.jobs.get('begun since')?.state).toBe('running')
+  })
+})
+
+describe('a refusal', () => {
+  it('is over when the same is asked for again, and only then', () => {
+    const problem = { type: 'urn:servodeck:forbidden', title: 'Forbidden', status: 403, detail: '' }
+    contents.refused = { request: 'jog_start', problem, at: 0 }
+    askedAnew('watch')
+    expect(contents.refused).not.toBeNull()
+    let told = 0
+    const end = subscribe('refused', () => told++)
+    askedAnew('jog_start')
+    end()
+    expect([contents.refused, told]).toEqual([null, 1])
   })
 })

@@ -124,6 +124,13 @@ export function setState(state: AxisState): void {
   publish(`state ${state.drive}`)
 }
 
+/** What was refused is asked for again: the refusal must not stand above what it now does. */
+export function askedAnew(request: string): void {
+  if (contents.refused?.request !== request) return
+  contents.refused = null
+  publish('refused')
+}
+
 /** A job that has ended stays ended: the answer to its start may come after word of its end. */
 export function setJob(job: JobInfo): void {
   const known = contents.jobs.get(job.id)

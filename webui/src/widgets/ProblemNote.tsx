@@ -1,6 +1,7 @@
 import { UNREACHABLE } from '../api/client'
 import type { Problem } from '../api/schema'
 import { known, useT } from '../i18n'
+import { said } from '../i18n/said'
 import { FORGOTTEN } from '../live/store'
 
 /** What happened, to which drive and parameter, the limit, and what to try. */
@@ -27,7 +28,7 @@ export function ProblemNote({
             ? t('problem.unreachable')
             : known(t, 'problemTitle', problem.title) || t('problem.title')}
         </strong>{' '}
-        {forgotten ? t('problem.forgotten') : problem.detail}
+        {forgotten ? t('problem.forgotten') : said(t, problem.detail)}
       </p>
       {problem.limit && (
         <p>
@@ -41,7 +42,7 @@ export function ProblemNote({
             ? t('problem.unreachableTry')
             : forgotten
               ? t('problem.forgottenTry')
-              : problem.remedy}
+              : said(t, problem.remedy ?? '')}
         </p>
       )}
       {onClose && (

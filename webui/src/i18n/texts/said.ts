@@ -1,7 +1,8 @@
 import type { Texts } from '../types'
 
 /**
- * Words of the server that a person follows while something runs: titles and steps of jobs. The
+ * Words of the server that a person follows while something runs, and what is told most often when
+ * something goes wrong. The
  * English is the server's own, with names for what it puts in; tests/unit/test_said.py holds both
  * together.
  */
@@ -65,5 +66,34 @@ export const saidTexts = {
   'said.looking': ['looking for {place}', '正在查找 {place}'],
   'said.profile': ['making the profile', '正在生成配置文件'],
   'said.bytes': ['{n} of {count} bytes: do not switch off', '{n} / {count} 字节：请勿断电'],
+  // What is refused or goes wrong most often, and what to do.
+  'said.login': ['name or password is wrong', '姓名或密码错误'],
+  'said.again': ['try again', '请重试'],
+  'said.notHeld': [
+    'the person on site does not hold the enabling button',
+    '现场人员未按住使能按钮',
+  ],
+  'said.askToHold': ['ask them to hold it, then try again', '请现场人员按住后重试'],
+  'said.stillMoves': [
+    '{axis} still moves {s} s after quick stop',
+    '{axis} 在快速停止 {s} s 后仍在运动',
+  ],
+  'said.jogStillMoves': [
+    '{axis} still moves 2 s after the jog was released',
+    '{axis} 在松开点动 2 s 后仍在运动',
+  ],
+  'said.emergency': ["use the machine's emergency stop", '请使用机器的急停'],
+  'said.cause': ['remove the cause named and try again', '排除所述原因后重试'],
+  'said.alarms': ['see the Alarms page', '请查看“报警”页面'],
+  'said.late': ['the drive did not answer in time', '驱动器未及时应答'],
+  'said.mute': [
+    'read again; if it stays mute, switch the drive off and on',
+    '请重新读取；若仍无应答，请将驱动器断电后再上电',
+  ],
+  'said.silent': ['the station no longer answers', '站点不再应答'],
+  'said.supply': [
+    'check supply and cable; it is taken up again by itself',
+    '请检查电源和电缆；恢复后将自动重新连接',
+  ],
   'said.cable': ['no cable, or the interface is down', '未接电缆，或接口未启用'],
 } as const satisfies Texts

@@ -44,10 +44,10 @@ export function Bundles() {
               download={bundle.name}
             >
               <Icon name="download" /> {bundle.name}
-            </a>{' '}
-            <span className="dim num">
+            </a>
+            <p className="dim num">
               {dateTime(bundle.created)} · {size(bundle.bytes)}
-            </span>
+            </p>
           </li>
         ))}
       </ul>

@@ -80,12 +80,10 @@ export function JogPanel({
           pad={pad}
         />
         <div className="jog-live">
-          <span className="jog-figure">
-            <span className="big num">
-              {quantity(shown(state?.position, unit.travel), units.position ?? '')}
-            </span>
-            <span className="unit">{units.position}</span>
+          <span className="big num">
+            {quantity(shown(state?.position, unit.travel), units.position ?? '')}
           </span>
+          <span className="unit">{units.position}</span>
           <span className="jog-figure">
             <span className="num">
               {quantity(shown(state?.velocity, unit.speed), units.velocity ?? '')}
