@@ -10,9 +10,8 @@ from backend.analysis.loop_goals import Goals
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
-from backend.restoring import CLEANUP_TIMEOUT_S, shielded
 from backend.tools.recording import ends_all
-from backend.tools.temporary import put_back, write_settings
+from backend.tools.temporary import put_back_in_time, write_settings
 from backend.tools.tune_candidates import plan
 from backend.tools.tune_time import TimeLeft
 from backend.tools.tune_verify import HUM_PERCENT, Check, Keep, Verified, verify
@@ -111,7 +110,7 @@ def stages(progress: Progress) -> tuple[Progress, Progress, Progress]:
 
 async def take_back(axis: Axis, before: dict[str, int]) -> None:
     """Put these raw values back, whatever happens meanwhile."""
-    await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, axis.drive.name)
+    await put_back_in_time(axis, before)
 
 
 def part(progress: Progress, low: float, high: float, step: str) -> Progress:

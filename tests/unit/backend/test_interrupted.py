@@ -67,7 +67,7 @@ async def tried_on(
 
     monkeypatch.setattr(tune_apply, "plan", plan)
     monkeypatch.setattr(tune_apply, "write_settings", write)
-    monkeypatch.setattr(tune_apply, "put_back", write)
+    monkeypatch.setattr(tune_apply, "put_back_in_time", write)
     monkeypatch.setattr(tune_apply, "verify", verify)
     check: Any = SimpleNamespace(inertia_kgm2=1e-4, motor_inertia_kgm2=None)
     session: Any = None

@@ -61,7 +61,7 @@ async def kept_of(
     def lent(_earlier: dict[str, int]) -> Iterator[None]:
         yield
 
-    for name in ("plan", "write_settings", "put_back"):
+    for name in ("plan", "write_settings", "put_back_in_time"):
         monkeypatch.setattr(tune_apply, name, nothing)
     monkeypatch.setattr(tune_apply, "verify", verify)
     axis: Any = SimpleNamespace(drive=SimpleNamespace(name="X", owed=SimpleNamespace(lent=lent)))
