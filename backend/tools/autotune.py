@@ -23,8 +23,9 @@ from backend.tools import inertia_evaluation, sweep_evaluation
 from backend.tools import step_response as step_tool
 from backend.tools import sweep as sweep_tool
 from backend.tools.axis_facts import AxisFacts, read_facts
+from backend.tools.interrupted import ends_all
 from backend.tools.probe import holding_torque
-from backend.tools.recording import cycle_s, ends_all
+from backend.tools.recording import cycle_s
 from backend.tools.temporary import stopping_hard, temporary
 from backend.tools.tune_apply import part
 from backend.tools.tune_candidates import (

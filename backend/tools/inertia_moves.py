@@ -15,17 +15,9 @@ from backend.tools import profile_speed
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.go_back import go_back
 from backend.tools.inertia_evaluation import InertiaSettings
+from backend.tools.interrupted import Interrupted
 from backend.tools.probe import RoughFit, require_right_sign, rough_fit
-from backend.tools.recording import (
-    Interrupted,
-    Play,
-    Recording,
-    bus_limits,
-    cycle_s,
-    enabled,
-    play,
-    quiet,
-)
+from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play, quiet
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 

@@ -17,16 +17,8 @@ from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
-from backend.tools.recording import (
-    Interrupted,
-    Play,
-    Recording,
-    bus_limits,
-    cycle_s,
-    enabled,
-    play,
-    require_enabled,
-)
+from backend.tools.interrupted import Interrupted, require_enabled
+from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
 

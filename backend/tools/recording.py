@@ -20,33 +20,19 @@ from backend.cyclic import CyclicSession, channel
 from backend.jobs import Progress
 from backend.ports import address_of
 from backend.tools.alignment import BoolArray, FloatArray, Run, aligned
+from backend.tools.interrupted import interrupted, raise_if_ended, require_held
 from drivers import link as bus
-from drivers.cia402 import Mode, State
-from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
+from drivers.cia402 import Mode
+from drivers.errors import LinkLost, LinkTimeout, NotAllowed
 
 _RENEW_S = 0.03
 _STATE_TIMEOUT_S = 5.0
 #: Samples arrive in bunches; this long after the last set-point all of them have come.
 _TAIL_S = 1.0
-#: Ends that the loop makes by itself for what a tool has asked of the axis. A smaller motion or
-#: other gains may mend them; nothing mends any other end but a person.
-_OF_THE_MOTION = ("is beyond the limit", "were not renewed in time")
-_LOOK = (
-    "see the Alarms page; without an alarm look at the emergency stop, the drive's supply and "
-    "whoever else may disable it, then measure again"
-)
 _ROLES = ("position_actual", "velocity_actual", "torque_actual", "status_word")
 _TARGET_OF = {
     Mode.CSP: "position_target", Mode.CSV: "velocity_target", Mode.CST: "torque_target",
 }  # fmt: skip
-
-
-class Interrupted(NotAllowed):
-    """The drive, a switch or a person ended the motion, or did not let it begin.
-
-    No work in progress tries anything else then: an emergency stop that was pressed and is
-    released again must not let an axis move by itself (ISO 13850, 4.1.4).
-    """
 
 
 @dataclass(frozen=True)
@@ -179,39 +165,11 @@ async def enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterat
             inside = True
             yield await axis.position_raw()
             inside = False
+            require_held(axis, session)
     except NotAllowed as error:
         if inside:
             raise
-        raise _interrupted(error) from error
-
-
-def _interrupted(error: NotAllowed) -> Interrupted:
-    return Interrupted(
-        error.message, drive=error.drive, parameter=error.parameter, value=error.value,
-        limit=error.limit, remedy=error.remedy,
-    )  # fmt: skip
-
-
-async def require_enabled(axis: Axis) -> None:
-    """What is read of a standing axis counts only if its loop has held it all the time.
-
-    Raises:
-        Interrupted: it is disabled meanwhile.
-    """
-    state = await axis.state()
-    if state is not State.OPERATION_ENABLED:
-        raise Interrupted(
-            f"{axis.drive.name}: the drive left Operation enabled: {state.value}",
-            drive=axis.drive.name,
-            remedy=_LOOK,
-        )
-
-
-async def ends_all(axis: Axis, error: DriveError) -> bool:
-    """Whether work must end with this error, whatever else it could try."""
-    if isinstance(error, Interrupted | LinkLost):
-        return True
-    return await axis.state() in (State.FAULT, State.FAULT_REACTION)
+        raise interrupted(error) from error
 
 
 async def _forgotten(axis: Axis, session: CyclicSession) -> None:
@@ -304,7 +262,7 @@ async def _drive_through(
     try:
         await session.cyclic.play([trajectory])
     except NotAllowed as error:
-        raise _interrupted(error) from error
+        raise interrupted(error) from error
     begun = catch.rows
     heard, deadline, judged = 0, time.monotonic() + _TAIL_S, len(catch.blocks)
     while True:
@@ -331,27 +289,6 @@ async def _drive_through(
             if len(rows) and until(rows):
                 await session.cyclic.halt(station)
                 return True
-
-
-def raise_if_ended(axis: Axis, session: CyclicSession) -> None:
-    """Raise with the reason when the loop has ended the motion by force.
-
-    Raises:
-        NotAllowed: by what was asked of the axis.
-        Interrupted: by something else.
-        LinkLost: nothing is exchanged any more.
-    """
-    power, name = session.power(), axis.drive.name
-    if power is not None and (reason := power.axis_state(session.station(axis.drive))[2]):
-        if any(words in reason for words in _OF_THE_MOTION):
-            raise NotAllowed(
-                f"{name}: {reason}", drive=name,
-                remedy="check load, limits and gains, then widen the envelope only if the machine "
-                "allows it",
-            )  # fmt: skip
-        raise Interrupted(f"{name}: {reason}", drive=name, remedy=_LOOK)
-    if not session.running:
-        raise LinkLost("the cyclic exchange ended during the measurement")
 
 
 async def _in_si(

@@ -10,7 +10,7 @@ from backend.analysis.loop_goals import Goals
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
-from backend.tools.recording import ends_all
+from backend.tools.interrupted import ends_all
 from backend.tools.temporary import put_back_in_time, write_settings
 from backend.tools.tune_candidates import plan
 from backend.tools.tune_time import TimeLeft

@@ -11,10 +11,11 @@ from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.tools import excite, inertia_evaluation, notch_effect, sweep_evaluation
 from backend.tools.axis_facts import AxisFacts
+from backend.tools.interrupted import ends_all
 from backend.tools.notch_in_loop import measure_meaning_in_loop
 from backend.tools.notch_meaning import NotchMeaning, meaning_of, remember
 from backend.tools.probe import PULLED
-from backend.tools.recording import cycle_s, ends_all
+from backend.tools.recording import cycle_s
 from drivers.errors import NotAllowed
 
 #: A resonance that rises by less bounds no gain.

@@ -24,9 +24,9 @@ from backend.jobs import Progress
 from backend.tools import gains as gain_tool
 from backend.tools import notch as notch_tool
 from backend.tools.axis_facts import AxisFacts
+from backend.tools.interrupted import ends_all
 from backend.tools.notch_effect import unknown
 from backend.tools.notch_meaning import meaning_of
-from backend.tools.recording import ends_all
 from backend.tools.temporary import write_settings
 from backend.tools.tune_apply import Applied, first_kept, stages, take_back
 from backend.tools.tune_time import TimeLeft

@@ -15,7 +15,7 @@ import pytest
 from backend.analysis.design import Candidate
 from backend.jobs import Progress
 from backend.tools import tune_apply, tune_notches, tune_present
-from backend.tools.recording import Interrupted, raise_if_ended
+from backend.tools.interrupted import Interrupted, raise_if_ended
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, NotAllowed
 from tests.unit.backend.test_tune_hum import GOALS, design

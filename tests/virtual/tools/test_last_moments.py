@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
+from typing import Any
 
 import pytest
 
 from backend.jobs import Progress
+from backend.tools.alignment import aligned
 from backend.tools.inertia import inertia
 from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.recording import Interrupted
+from backend.tools.interrupted import Interrupted
 from backend.tools.step_response import StepSettings, step_response
 from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import SweepSettings
 from drivers.cia402 import State
-from drivers.errors import DriveError, NotAllowed
+from drivers.errors import DriveError
 from drivers.link import Address, Trajectory
+from drivers.virtual.device import Device
 from drivers.virtual.firmware.states import State as FirmwareState
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, mechanics, settings_of
@@ -30,29 +33,41 @@ TOOLS: dict[str, tuple[str, Callable[[DirectBench, Progress], Awaitable[object]]
 }
 
 
-@pytest.mark.parametrize(("drive", "tool"), [("mms7", "inertia"), ("r6l", "step")])
-async def test_a_fault_after_the_last_sample_is_told(drive: str, tool: str) -> None:
-    """It was measured to its end, and the drive tripped before it was disabled."""
+@pytest.mark.parametrize(
+    ("drive", "tool", "trouble"),
+    [("mms7", "inertia", "tripped"), ("r6l", "step", "tripped"), ("ep3e", "step", "stopped")],
+)
+async def test_trouble_after_the_last_sample_is_told(drive: str, tool: str, trouble: str) -> None:
+    """It was measured to its end, and the drive was out before it was disabled."""
     async with direct(ONE, drive=drive) as b:
         before = await settings_of(b.axis.drive)
         step, work = TOOLS[tool]
         progress = Progress(lambda: None)
-        disable = b.link.halt
         struck: list[float] = []
 
-        async def strike(station: int | None = None) -> None:
+        def strike(*arguments: Any, **more: Any) -> Any:
             if progress.step == step and not struck:
                 struck.append(progress.fraction)
-                b.link.device.inject("over_temperature")
-                b.link.pass_s(0.002)
-            await disable(station)
+                if trouble == "tripped":
+                    b.link.device.inject("over_temperature")
+                else:
+                    take_torque_off(b.link.device)
+            return aligned(*arguments, **more)
 
-        b.link.halt = strike  # type: ignore[method-assign]
-        with pytest.raises(NotAllowed, match="temperature"):
-            await work(b, progress)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("backend.tools.recording.aligned", strike)
+            with pytest.raises(Interrupted, match=r"emperature|Switch on disabled"):
+                await work(b, progress)
         assert struck
-        assert await b.axis.state() is State.FAULT
+        assert await b.axis.state() is not State.OPERATION_ENABLED
         assert await settings_of(b.axis.drive) == before
+
+
+def take_torque_off(device: Device) -> None:
+    """What an open safe-torque-off input does: no fault, and no power."""
+    control = device.control  # type: ignore[attr-defined]
+    control._switch_off(at_once=True)
+    control.state = FirmwareState.SWITCH_ON_DISABLED
 
 
 async def test_a_load_whose_drive_was_stopped_does_not_seem_to_pull_nothing() -> None:
@@ -69,10 +84,8 @@ async def test_a_load_whose_drive_was_stopped_does_not_seem_to_pull_nothing() ->
             return await play(trajectories)
 
         async def stopped(station: int, addresses: Sequence[Address]) -> list[bytes | DriveError]:
-            # What an open safe-torque-off input does: no fault, and no power.
             if control.state is FirmwareState.OPERATION_ENABLED:
-                control._switch_off(at_once=True)
-                control.state = FirmwareState.SWITCH_ON_DISABLED
+                take_torque_off(b.link.device)
             return await read_many(station, addresses)
 
         read_many = b.link.read_many

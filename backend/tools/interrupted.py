@@ -1,0 +1,85 @@
+"""What ends a measurement: something that was asked of the axis, or others."""
+
+from __future__ import annotations
+
+from backend.axis import Axis
+from backend.cyclic import CyclicSession
+from drivers.cia402 import State
+from drivers.errors import DriveError, LinkLost, NotAllowed
+
+#: Ends that the loop makes by itself for what a tool has asked of the axis. A smaller motion or
+#: other gains may mend them; nothing mends any other end but a person.
+_OF_THE_MOTION = ("is beyond the limit", "were not renewed in time")
+#: How the loop tells that the drive did it.
+_FELL_OUT = "the drive left Operation enabled"
+_LOOK = (
+    "see the Alarms page; without an alarm look at the emergency stop, the drive's supply and "
+    "whoever else may disable it, then measure again"
+)
+
+
+class Interrupted(NotAllowed):
+    """The drive, a switch or a person ended the motion, or did not let it begin.
+
+    No work in progress tries anything else then: an emergency stop that was pressed and is
+    released again must not let an axis move by itself (ISO 13850).
+    """
+
+
+def interrupted(error: NotAllowed) -> Interrupted:
+    """The same, as an end that nothing else may be tried after."""
+    return Interrupted(
+        error.message, drive=error.drive, parameter=error.parameter, value=error.value,
+        limit=error.limit, remedy=error.remedy,
+    )  # fmt: skip
+
+
+def require_held(axis: Axis, session: CyclicSession) -> None:
+    """Disabled by others after its last sample, it must not be enabled again to go home either."""
+    power = session.power()
+    reason = "" if power is None else power.axis_state(session.station(axis.drive))[2]
+    if reason.startswith(_FELL_OUT):
+        raise Interrupted(f"{axis.drive.name}: {reason}", drive=axis.drive.name, remedy=_LOOK)
+
+
+async def require_enabled(axis: Axis) -> None:
+    """What is read of a standing axis counts only if its loop has held it all the time.
+
+    Raises:
+        Interrupted: it is disabled meanwhile.
+    """
+    state = await axis.state()
+    if state is not State.OPERATION_ENABLED:
+        raise Interrupted(
+            f"{axis.drive.name}: {_FELL_OUT}: {state.value}",
+            drive=axis.drive.name,
+            remedy=_LOOK,
+        )
+
+
+async def ends_all(axis: Axis, error: DriveError) -> bool:
+    """Whether work must end with this error, whatever else it could try."""
+    if isinstance(error, Interrupted | LinkLost):
+        return True
+    return await axis.state() in (State.FAULT, State.FAULT_REACTION)
+
+
+def raise_if_ended(axis: Axis, session: CyclicSession) -> None:
+    """Raise with the reason when the loop has ended the motion by force.
+
+    Raises:
+        NotAllowed: by what was asked of the axis.
+        Interrupted: by something else.
+        LinkLost: nothing is exchanged any more.
+    """
+    power, name = session.power(), axis.drive.name
+    if power is not None and (reason := power.axis_state(session.station(axis.drive))[2]):
+        if any(words in reason for words in _OF_THE_MOTION):
+            raise NotAllowed(
+                f"{name}: {reason}", drive=name,
+                remedy="check load, limits and gains, then widen the envelope only if the machine "
+                "allows it",
+            )  # fmt: skip
+        raise Interrupted(f"{name}: {reason}", drive=name, remedy=_LOOK)
+    if not session.running:
+        raise LinkLost("the cyclic exchange ended during the measurement")
