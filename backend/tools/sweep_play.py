@@ -13,6 +13,7 @@ from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.tools import excite, speed_injection
 from backend.tools.go_back import go_back
+from backend.tools.interrupted import Interrupted
 from backend.tools.recording import Play, Recording, bus_limits, enabled, play, quiet, share
 from backend.tools.sweep_evaluation import SweepSettings
 from backend.tools.sweep_plan import Setup, sequences_of
@@ -104,6 +105,8 @@ def _too_much(error: NotAllowed, setup: Setup) -> bool:
     Torque is a loop's own answer; without a loop it is what was asked for. An axis that leaves its
     travel is one that a load pulls, or whose place is too narrow.
     """
+    if isinstance(error, Interrupted):
+        return False
     if setup.loop != "none":
         return "torque" in error.message
     return "speed" in error.message and "is beyond the limit" in error.message
