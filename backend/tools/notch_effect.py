@@ -219,8 +219,8 @@ def _sequence(
             f"the envelope does not allow to measure the notches: {error}",
             remedy="widen travel, speed or torque of the envelope",
         ) from error
-    # What turns has far more torque than one that trembles: one period tells as much.
-    return made[0] if still else _one_period(made[0])
+    # Another period tells no more: tried on axes that turn and on such that tremble.
+    return _one_period(made[0])
 
 
 def _one_period(sequence: excite.Sequence) -> excite.Sequence:

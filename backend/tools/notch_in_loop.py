@@ -43,6 +43,9 @@ _TURN = 2.0 * np.pi
 _HIGHEST_MS = 3.0
 #: What a notch may be: width as a share of its centre, depth in dB.
 _WIDTHS, _DEPTHS = (0.05, 0.3, 1.0, 2.5), (-6.0, -20.0, -45.0)
+#: Share of the travel within which the next trial may begin: the loop leads the axis back
+#: but for what friction and a pull take of it.
+_NEAR = 0.15
 #: Centres to try, Hz.
 _CENTRES = np.geomspace(50.0, 400.0, 19)
 
@@ -76,7 +79,9 @@ async def measure_meaning_in_loop(
     plant = measured_plant(mechanics.frf, mechanics.model)
     player = _Beside(axis, session, settings, setup, plant, await axis.position_raw())
     async with temporary(axis, await filters_off(axis, settings)):
-        return await tried_with(player, axis, session, envelope, facts, progress)
+        return await tried_with(
+            player, axis, session, envelope, facts, progress, _NEAR * envelope.travel_rev
+        )
 
 
 @dataclass

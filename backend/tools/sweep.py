@@ -70,7 +70,9 @@ async def sweep(
                 loop = held_by_loop(axis, settings.loop, held)
             else:
                 progress(0.02, "feeling the axis with a small torque")
-                probed = await probe_axis(axis, session, settings.envelope, facts, home)
+                probed = await probe_axis(
+                    axis, session, settings.envelope, facts, home, settings.inertia_kgm2
+                )
                 loop = chosen_loop(axis, settings, probed)
         how = _Sweep(axis, session, settings, facts, home, probed)
         try:
