@@ -119,7 +119,7 @@ def _automatic(page: Page, station: Station, drive: str, folder: Path, colours: 
     page.get_by_role("heading", name="Verification").wait_for()
     page.wait_for_timeout(SETTLE_MS)
     panel = _panel(page, "Tune automatically")
-    whole, told = panel.bounding_box(), panel.locator(".note.good").bounding_box()
+    whole, told = panel.bounding_box(), panel.locator(".note.good").first.bounding_box()
     assert whole is not None
     assert told is not None
     above = round(told["y"] - whole["y"])
