@@ -49,6 +49,8 @@ def test_edit_write_save_and_power_cycle(laptop: Page, bench: Bench) -> None:
     page.keyboard.type(str(wanted))
     page.keyboard.press("Enter")
     expect(found).to_contain_text("edited")
+    # Digits missing from it would be read as another number.
+    assert found.locator(".typed").evaluate("shown => shown.scrollWidth <= shown.clientWidth")
     assert bench.raw(ACCELERATION) == before
 
     page.get_by_role("button", name="Write edited (1)").click()

@@ -124,9 +124,9 @@ function ValueCell({ row, edit, asRaw, reading, onBegin }: Props & { reading: Pa
       }}
     >
       {edit ? (
-        <>
+        <span className="change" title={`${text} → ${edit.text}`}>
           <s className="dim">{text}</s> <span className="typed">{edit.text}</span>
-        </>
+        </span>
       ) : (
         text
       )}

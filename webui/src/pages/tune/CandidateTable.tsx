@@ -19,7 +19,7 @@ export function CandidateTable({
   return (
     <>
       <div className="scroll-table">
-        <table aria-label={t('candidate.title')}>
+        <table className="designs" aria-label={t('candidate.title')}>
           <thead>
             <tr>
               <th>{t('candidate.mark')}</th>
