@@ -30,8 +30,9 @@ from drivers.errors import (
 from drivers.link import Address, Found, LinkQuality
 from profiles.schema import Parameter, Profile, Raw
 
-#: After so many batches in a row without an answer a drive is asked for nothing more of a list.
-_SILENT_BATCHES = 4
+#: A drive that left so many objects in a row without an answer, in two batches at least, is asked
+#: for nothing more of a list.
+_SILENT_OBJECTS = 64
 
 #: Roles that command motion; they are never "changed but not saved".
 _COMMAND_ROLES = frozenset({
@@ -302,14 +303,14 @@ class Drive:
         self, port: Port, group: Sequence[Parameter]
     ) -> AsyncIterator[list[Reading]]:
         """Readings in batches; those left out while the drive was silent come once more."""
-        silent: list[LinkTimeout] = []
+        silent: list[Sequence[bytes | DriveError]] = []
         left_out: list[Parameter] = []
         for chunk in port.batches(group):
-            if len(silent) < _SILENT_BATCHES:
+            if len(silent) < 2 or sum(map(len, silent)) < _SILENT_OBJECTS:
                 answers = await self._ask(port, chunk)
-                silent = [*silent, late] if (late := _silence(answers)) else []
+                silent = [*silent, answers] if _silence(answers) else []
             else:
-                answers = silent[-1:] * len(chunk)
+                answers = [silent[-1][-1]] * len(chunk)
             pairs = zip(chunk, answers, strict=True)
             left_out += [parameter for parameter, answer in pairs if isinstance(answer, NotAsked)]
             yield self._taken(chunk, answers)
@@ -559,7 +560,6 @@ class Drive:
         return cia402.fault_bit(echoes_control=self._own_status)
 
 
-def _silence(answers: Sequence[bytes | DriveError]) -> LinkTimeout | None:
-    """The last time-out of a batch without any answer; one object alone tells nothing."""
-    timeouts = [answer for answer in answers if isinstance(answer, LinkTimeout)]
-    return timeouts[-1] if 1 < len(answers) == len(timeouts) else None
+def _silence(answers: Sequence[bytes | DriveError]) -> bool:
+    """Whether nothing of a batch was answered; one object alone tells nothing."""
+    return len(answers) > 1 and all(isinstance(answer, LinkTimeout) for answer in answers)

@@ -6,27 +6,23 @@ event. Nothing here blocks: the wire belongs to the other process.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from drivers import cia402
-from drivers.codec import size_of
-from drivers.errors import DriveError, NotAllowed, ProtocolError
+from drivers.errors import DriveError, NotAllowed
 from drivers.ethercat import firmware, permissions
 from drivers.ethercat.al_status import AlState
 from drivers.ethercat.hostprocess import HostProcess
 from drivers.ethercat.information import EntryDescription, ObjectInfo
-from drivers.ethercat.protocol import Message, error_from_wire
+from drivers.ethercat.listing import Item, fitted, object_of, read_list
+from drivers.ethercat.protocol import Message
 from drivers.ethercat.segmentcyclic import EthercatCyclic
 from drivers.ethercat.survey import ExchangeFigures, Survey, exchange_from, survey_from
 from drivers.link import Address, Cyclic, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
 from profiles.schema import LinkKind, Profile
 
-_Item = tuple[int, int, int | None]
-_CHUNK, _CHUNKS_AHEAD = 32, 2
 _SCHEME = "ethercat://"
 _ANSWER_S, _SCAN_S, _FOE_S = 15.0, 60.0, 1800.0
 
@@ -100,45 +96,28 @@ class EthercatLink:
 
     async def read(self, station: int, address: Address) -> bytes:
         """Read one value; text as sent."""
-        index, subindex = _object(address)
+        index, subindex = object_of(address)
         data: bytes = await self._call(
             {"op": "read", "station": station, "index": index, "subindex": subindex}, _ANSWER_S
         )
-        return _fitted(address, data)
+        return fitted(address, data)
 
     async def read_many(
         self, station: int, addresses: Sequence[Address]
     ) -> list[bytes | DriveError]:
-        """Read several; objects of which all subindices are wanted are read at once."""
-        items = [(*_object(address), size_of(address.type)) for address in addresses]
-        told: dict[_Item, bytes | Message] = {}
-        chunks = _chunks(items)
-        # One part is under way while the next one waits, so that the drive is never idle; a third
-        # reader comes in between, and a write or a stop before them.
-        ahead = asyncio.Semaphore(_CHUNKS_AHEAD)
+        """Read several; objects of which all subindices are wanted are read at once.
 
-        async def ask(chunk: list[_Item]) -> None:
-            async with ahead:
-                answers: list[bytes | Message] = await self._call(
-                    {"op": "read_many", "station": station, "items": chunk},
-                    _ANSWER_S + 1.5 * _CHUNKS_AHEAD * len(chunk),
-                )
-            told.update(zip(chunk, answers, strict=True))
+        A drive whose mailbox leaves two parts of the list without any answer is not asked for more.
+        """
 
-        try:
-            async with asyncio.TaskGroup() as group:
-                for chunk in chunks:
-                    group.create_task(ask(chunk))
-        except* DriveError as errors:
-            raise errors.exceptions[0] from None
-        self._counts["transactions"] += len(items)
-        results: list[bytes | DriveError] = []
-        for address, item in zip(addresses, items, strict=True):
-            try:
-                results.append(_fitted(address, _value(told[item])))
-            except DriveError as error:
-                results.append(error.at(parameter=str(address)))
-        return results
+        async def ask(items: list[Item], patience_s: float) -> list[bytes | Message]:
+            answers: list[bytes | Message] = await self._call(
+                {"op": "read_many", "station": station, "items": items}, _ANSWER_S + patience_s
+            )
+            return answers
+
+        self._counts["transactions"] += len(addresses)
+        return await read_list(station, addresses, ask)
 
     async def write(self, station: int, address: Address, data: bytes) -> None:
         """Write one value; never repeated. A mapped output is set in the process data.
@@ -147,7 +126,7 @@ class EthercatLink:
             NotAllowed: control word or setpoint while the cyclic exchange owns it; an enabling
                 control word while it is being set up again, which resets the drives.
         """
-        index, subindex = _object(address)
+        index, subindex = object_of(address)
         if (
             self.process_data.trouble
             and (index, subindex) == (0x6040, 0)
@@ -328,42 +307,6 @@ class EthercatLink:
     def _tell(self, event: LinkEvent) -> None:
         for listener in tuple(self._listeners):
             listener(event)
-
-
-def _chunks(items: Sequence[_Item]) -> list[list[_Item]]:
-    """Parts of some dozens, an object never cut, so that other requests come in between."""
-    chunks: list[list[_Item]] = [[]]
-    for _, members in itertools.groupby(sorted(set(items), key=lambda i: i[:2]), lambda i: i[0]):
-        if len(chunks[-1]) >= _CHUNK:
-            chunks.append([])
-        chunks[-1].extend(members)
-    return [chunk for chunk in chunks if chunk]
-
-
-def _object(address: Address) -> tuple[int, int]:
-    if address.index is None:
-        raise NotAllowed(f"{address} has no object index: EtherCAT does not reach it")
-    return address.index, address.subindex
-
-
-def _value(answer: bytes | Message) -> bytes:
-    if isinstance(answer, bytes):
-        return answer
-    raise error_from_wire(answer)  # type: ignore[arg-type]
-
-
-def _fitted(address: Address, data: bytes) -> bytes:
-    """Exactly the bytes of the type; a longer answer is cut only where the rest is padding."""
-    size = size_of(address.type)
-    if size is None or len(data) == size:
-        return data
-    if len(data) > size and not any(data[size:]):
-        return data[:size]
-    raise ProtocolError(
-        f"{address} came with {len(data)} bytes, its type {address.type} has {size}",
-        parameter=str(address),
-        remedy="the drive's firmware may be of another version: compare with its dictionary",
-    )
 
 
 def _found(item: Message) -> Found:

@@ -1,0 +1,128 @@
+"""Reading a list of objects through a mailbox, in parts that let others in between."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Awaitable, Callable, Sequence
+from typing import TypeAlias
+
+from drivers.codec import size_of
+from drivers.errors import DriveError, LinkTimeout, NotAllowed, NotAsked, ProtocolError
+from drivers.ethercat.protocol import Message, error_from_wire
+from drivers.link import Address
+
+Item: TypeAlias = tuple[int, int, int | None]
+"""Index, subindex and size in bytes where it is known."""
+
+Ask: TypeAlias = Callable[[list[Item], float], Awaitable[list[bytes | Message]]]
+"""Ask for items, waiting that many seconds more than for one answer; errors are as on the pipe."""
+
+_CHUNK, _CHUNKS_AHEAD = 32, 2
+#: After so many parts in a row without any answer the rest of a list is not asked for.
+_SILENT_CHUNKS = 2
+
+
+async def read_list(
+    station: int, addresses: Sequence[Address], ask: Ask
+) -> list[bytes | DriveError]:
+    """Read ``addresses`` in order; an error stands for what was not read.
+
+    Raises:
+        DriveError: the process that owns the segment did not answer, or does not know the station.
+    """
+    items = [(*object_of(address), size_of(address.type)) for address in addresses]
+    told: dict[Item, bytes | Message | NotAsked] = {}
+    silent: list[list[Item]] = []
+    # One part is under way while the next one waits, so that the drive is never idle; a third
+    # reader comes in between, and a write or a stop before them.
+    ahead = asyncio.Semaphore(_CHUNKS_AHEAD)
+
+    async def part(chunk: list[Item]) -> None:
+        async with ahead:
+            if len(silent) >= _SILENT_CHUNKS:
+                told.update(dict.fromkeys(chunk, _not_asked(station)))
+                return
+            answers = await ask(chunk, 1.5 * _CHUNKS_AHEAD * len(chunk))
+        told.update(zip(chunk, answers, strict=True))
+        if len(chunk) > 1 and all(_late(answer) for answer in answers):
+            silent.append(chunk)
+        else:
+            silent.clear()
+
+    try:
+        async with asyncio.TaskGroup() as group:
+            for chunk in _chunks(items):
+                group.create_task(part(chunk))
+    except* DriveError as errors:
+        raise errors.exceptions[0] from None
+    results: list[bytes | DriveError] = []
+    for address, item in zip(addresses, items, strict=True):
+        try:
+            results.append(fitted(address, _value(told[item])))
+        except DriveError as error:
+            results.append(error.at(parameter=str(address)))
+    return results
+
+
+def object_of(address: Address) -> tuple[int, int]:
+    """Index and subindex.
+
+    Raises:
+        NotAllowed: it exists only on other links.
+    """
+    if address.index is None:
+        raise NotAllowed(
+            f"{address} has no object index: EtherCAT does not reach it",
+            parameter=str(address),
+            remedy="connect the drive over the link that has it as well",
+        )
+    return address.index, address.subindex
+
+
+def fitted(address: Address, data: bytes) -> bytes:
+    """Exactly the bytes of the type; a longer answer is cut only where the rest is padding.
+
+    Raises:
+        ProtocolError: it is no value of the type.
+    """
+    size = size_of(address.type)
+    if size is None or len(data) == size:
+        return data
+    if len(data) > size and not any(data[size:]):
+        return data[:size]
+    raise ProtocolError(
+        f"{address} came with {len(data)} bytes, its type {address.type} has {size}",
+        parameter=str(address),
+        remedy="the drive's firmware may be of another version: compare with its dictionary",
+    )
+
+
+def _chunks(items: Sequence[Item]) -> list[list[Item]]:
+    """Parts of some dozens, an object never cut, so that other requests come in between."""
+    chunks: list[list[Item]] = [[]]
+    for _, members in itertools.groupby(sorted(set(items), key=lambda i: i[:2]), lambda i: i[0]):
+        if len(chunks[-1]) >= _CHUNK:
+            chunks.append([])
+        chunks[-1].extend(members)
+    return [chunk for chunk in chunks if chunk]
+
+
+def _late(answer: bytes | Message) -> bool:
+    return not isinstance(answer, bytes) and answer["kind"] == LinkTimeout.kind
+
+
+def _not_asked(station: int) -> NotAsked:
+    return NotAsked(
+        f"station {station} left so much unanswered that this was not asked",
+        remedy="read again; if it stays mute, switch the drive off and on",
+    )
+
+
+def _value(answer: bytes | Message | NotAsked) -> bytes:
+    if isinstance(answer, bytes):
+        return answer
+    if isinstance(answer, NotAsked):
+        # One of its own for every place, as the caller names the parameter in it.
+        raise NotAsked(answer.message, remedy=answer.remedy)
+    raise error_from_wire(answer)  # type: ignore[arg-type]
