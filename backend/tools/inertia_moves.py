@@ -18,6 +18,7 @@ from backend.tools.inertia_evaluation import InertiaSettings
 from backend.tools.interrupted import Interrupted
 from backend.tools.probe import RoughFit, require_right_sign, rough_fit
 from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play, quiet
+from backend.tools.temporary import stopping_hard
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 
@@ -77,6 +78,7 @@ async def speed_move(
         offsets = np.round(torque_nm * per_nm).astype(np.int64)
         sent = replace(sent, offset_role="torque_offset", offsets=offsets)
     async with (
+        stopping_hard(axis, envelope.speed_rpm),
         profile_speed.interpolated(axis, session, speed_rpm),
         enabled(axis, session, Mode.CSV) as start,
     ):

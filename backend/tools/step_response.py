@@ -27,6 +27,7 @@ from backend.tools.recording import (
     require_signals,
     share,
 )
+from backend.tools.temporary import stopping_hard
 from drivers.cia402 import Mode
 from drivers.errors import OutOfRange
 
@@ -86,7 +87,10 @@ async def step_response(
     facts = await read_facts(axis, settings.rated_torque_nm)
     demand = _demand(settings, rate)
     home = await axis.position_raw()
-    async with enabled(axis, session, mode) as start:
+    async with (
+        stopping_hard(axis, settings.envelope.speed_rpm),
+        enabled(axis, session, mode) as start,
+    ):
         await quiet(axis)
         if speed:
             raw = np.round(demand * (units.velocity_raw(1e6) / 1e6))
