@@ -19,6 +19,7 @@ from backend.jobs import Progress
 from backend.tools import profile_speed
 from backend.tools.inertia import inertia
 from backend.tools.inertia_evaluation import InertiaSettings
+from backend.tools.interrupted import Interrupted
 from backend.tools.settling import settle
 from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import SweepSettings
@@ -136,3 +137,19 @@ async def test_what_a_lost_drive_is_owed_comes_back_by_itself(
         assert found["left"] == {}
         assert await settings_of(b.axis.drive, MODE) == before
         assert not b.axis.drive.owed
+
+
+async def test_an_emergency_stop_that_is_released_lets_nothing_go_on() -> None:
+    """DS_C has an input for it (003:514-516), which brakes without any fault."""
+    async with under("ds_c") as b:
+        before = await settings_of(b.axis.drive, MODE)
+        control = b.device.control  # type: ignore[attr-defined]
+        at = At("moving forth and back", lambda: control.emergency_stop(True))
+        with pytest.raises(Interrupted, match="left Operation enabled"):
+            await b.measure("inertia", at.progress)
+        assert at.done
+        assert await settings_of(b.axis.drive, MODE) == before
+        control.emergency_stop(False)
+        b.line.pass_s(0.5)
+        assert await b.axis.state() is not State.OPERATION_ENABLED
+        assert await b.axis.standstill(1.0)
