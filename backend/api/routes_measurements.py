@@ -9,6 +9,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from backend.api.context import TheBench
+from backend.api.disposition import disposition
 from backend.api.errors import NotFound
 from backend.api.models_tune import MeasurementContent, MeasurementInfo
 from backend.bench import Bench
@@ -111,7 +112,7 @@ async def download_measurement(bench: TheBench, name: str) -> Response:
     return Response(
         data,
         media_type="application/octet-stream",
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+        headers=disposition("attachment", name),
     )
 
 

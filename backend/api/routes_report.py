@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from fastapi import APIRouter, Response
 
 from backend.api.context import TheBench, TheMember
+from backend.api.disposition import disposition
 from backend.api.errors import NotFound
 from backend.api.models_report import ReportInfo, ReportRequest
 from backend.api.routes_measurements import change_log, measurement_head
@@ -93,7 +94,7 @@ async def read_report(bench: TheBench, name: str) -> Response:
     except NotAllowed as error:
         raise NotFound(error.message, value=name) from error
     form: Format = "html" if name.endswith(".html") else "pdf"
-    headers = {"Content-Disposition": f'inline; filename="{name}"'}
+    headers = disposition("inline", name)
     if form == "html":
         # Whatever a file in this folder contains, it runs nothing and belongs to no origin.
         headers["Content-Security-Policy"] = (
