@@ -43,6 +43,10 @@ export const saidTexts = {
   'said.moving': ['moving', '运动中'],
   'said.running': ['running', '运行中'],
   'said.playing': ['playing', '正在激励'],
+  'said.realisation': [
+    'measuring, realisation {n} of {count}',
+    '测量中，第 {n} 次激励（共 {count} 次）',
+  ],
   'said.preparing': ['preparing', '准备中'],
   'said.searching': ['searching home', '正在寻找零点'],
   'said.end': ['looking for an end at limited torque', '以限定转矩寻找行程端点'],
