@@ -48,6 +48,8 @@ _WIDTHS, _DEPTHS = (0.05, 0.3, 1.0, 2.5), (-6.0, -20.0, -45.0)
 _NEAR = 0.15
 #: Centres to try, Hz.
 _CENTRES = np.geomspace(50.0, 400.0, 19)
+#: A recording with fewer whole periods is made again, so many times in all.
+_FEWEST_PERIODS, _ATTEMPTS = 2, 3
 
 
 async def measure_meaning_in_loop(
@@ -141,15 +143,27 @@ class _Beside:
     async def _played(
         self, sequence: excite.Sequence, told: Callable[[float], None]
     ) -> tuple[excite.Sequence, Recording, LoopLines]:
-        """Once, weaker where the loop answers with too much torque; lines per rad/s sent."""
-        ((sent, recording),) = await play_fitting(
-            self.axis, self.session, self.settings, self.setup, (sequence,), self.home,
-            _progress(told),
-        )  # fmt: skip
-        e = sent.excitation
-        period = e.samples[e.first_sample :][: e.period_samples]
-        torque, velocity = periods_of(self.axis, sent, recording)
-        return sent, recording, LoopLines.of(np.fft.rfft(period)[e.lines], torque, velocity)
+        """Weaker where the loop answers with too much torque; lines per rad/s sent.
+
+        Raises:
+            NotAllowed: also where samples are lost each time, so that nothing tells the noise.
+        """
+        for _attempt in range(_ATTEMPTS):
+            ((sent, recording),) = await play_fitting(
+                self.axis, self.session, self.settings, self.setup, (sequence,), self.home,
+                _progress(told),
+            )  # fmt: skip
+            e = sent.excitation
+            period = e.samples[e.first_sample :][: e.period_samples]
+            torque, velocity = periods_of(self.axis, sent, recording)
+            if len(torque) >= _FEWEST_PERIODS:
+                lines = LoopLines.of(np.fft.rfft(period)[e.lines], torque, velocity)
+                return sent, recording, lines
+        raise NotAllowed(
+            f"{self.axis.drive.name}: samples were lost in all but one period, {_ATTEMPTS} times",
+            drive=self.axis.drive.name,
+            remedy="look at the link quality; the computer or the bus is overloaded",
+        )
 
 
 def safe_centre_hz(
