@@ -82,8 +82,8 @@ async def serve(bench: Bench, serving: Serving) -> None:
 
 async def settle() -> None:
     """What a first request would wait for otherwise, and every later one again and again."""
-    # One that cannot be read is told where it is asked for.
-    with contextlib.suppress(ProfileError):
+    # One that cannot be read is told where it is asked for, and keeps no server from its work.
+    with contextlib.suppress(ProfileError, OSError, UnicodeDecodeError):
         await asyncio.to_thread(load_all)
     scheduling.spare_collector()
 

@@ -50,6 +50,8 @@ _PLACE, _LOWEST_HZ, _HIGHEST_HZ = 0.12, 55.0, 400.0
 #: Widths in shares of the centre (Hz), or level pairs (width, depth).
 _WIDTHS = (0.5, 0.2)
 _SHARE_OF_TORQUE = 0.35
+#: A trial that lost samples is made again, so many times in all.
+ATTEMPTS = 3
 #: Share of the travel within which the next trial may begin.
 _NEAR = 0.4
 #: An axis that only trembles: its lines begin here, and it may go so far and so fast. Nothing
@@ -261,28 +263,32 @@ class _Free:
         return fit_effect(self.sequence.excitation.line_hz, seen / self._plain, self.path)
 
     async def _torque(self, told: Callable[[float], None]) -> ComplexArray:
-        """Spectrum of the reported torque at the lines, over the whole periods."""
+        """Spectrum of the reported torque at the lines, over the whole periods.
+
+        Raises:
+            NotAllowed: also where samples were lost each time.
+        """
         axis, facts = self.axis, self.facts
         units = await axis.units()
         step = units.torque(1.0) / 100.0 * facts.rated_torque_nm
-        sign, self._sign = self._sign, -self._sign
-        raw = sign * np.round(self.sequence.excitation.samples / step).astype(np.int64)
-        async with enabled(axis, self.session, Mode.CST):
-            recording = await play(
-                axis, self.session, Play(Mode.CST, raw),
-                await bus_limits(axis, self.envelope, self.home), facts.rated_torque_nm, told,
-            )  # fmt: skip
-        return np.asarray(sign * np.mean(periods_of(axis, self.sequence, recording)[0], axis=0))
+        for _attempt in range(ATTEMPTS):
+            sign, self._sign = self._sign, -self._sign
+            raw = sign * np.round(self.sequence.excitation.samples / step).astype(np.int64)
+            async with enabled(axis, self.session, Mode.CST):
+                recording = await play(
+                    axis, self.session, Play(Mode.CST, raw),
+                    await bus_limits(axis, self.envelope, self.home), facts.rated_torque_nm, told,
+                )  # fmt: skip
+            torque, _ = periods_of(self.sequence, recording)
+            if len(torque):
+                return np.asarray(sign * np.mean(torque, axis=0))
+        raise samples_lost(axis)
 
 
 def periods_of(
-    axis: Axis, sequence: excite.Sequence, recording: Recording
+    sequence: excite.Sequence, recording: Recording
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Spectra of torque and speed at the lines, [whole periods, lines] each.
-
-    Raises:
-        NotAllowed: samples were lost in every period.
-    """
+    """Spectra of torque (Nm) and speed (rad/s), [periods without a gap, lines] each."""
     e = sequence.excitation
     torque, velocity = [], []
     for number in range(e.transient_periods, e.periods):
@@ -291,12 +297,16 @@ def periods_of(
         if np.all(recording.valid[cut]):
             torque.append(np.fft.rfft(recording.torque_nm[cut])[e.lines])
             velocity.append(np.fft.rfft(recording.velocity_rad_s[cut])[e.lines])
-    if not torque:
-        raise NotAllowed(
-            f"{axis.drive.name}: samples were lost in every period", drive=axis.drive.name,
-            remedy="look at the link quality; the computer or the bus is overloaded",
-        )  # fmt: skip
     return np.asarray(torque), np.asarray(velocity)
+
+
+def samples_lost(axis: Axis) -> NotAllowed:
+    """No trial of a notch had as many periods without a gap as it needs."""
+    return NotAllowed(
+        f"{axis.drive.name}: samples were lost in {ATTEMPTS} tries of a notch in a row",
+        drive=axis.drive.name,
+        remedy="look at the link quality; the computer or the bus is overloaded",
+    )
 
 
 def _meaning(

@@ -27,7 +27,7 @@ from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.tools import excite, gains, speed_injection
 from backend.tools.axis_facts import AxisFacts
-from backend.tools.notch_effect import periods_of, tried_with
+from backend.tools.notch_effect import ATTEMPTS, periods_of, samples_lost, tried_with
 from backend.tools.notch_meaning import NotchMeaning
 from backend.tools.recording import Recording, require_signals
 from backend.tools.sweep import filters_off
@@ -48,8 +48,8 @@ _WIDTHS, _DEPTHS = (0.05, 0.3, 1.0, 2.5), (-6.0, -20.0, -45.0)
 _NEAR = 0.15
 #: Centres to try, Hz.
 _CENTRES = np.geomspace(50.0, 400.0, 19)
-#: A recording with fewer whole periods is made again, so many times in all.
-_FEWEST_PERIODS, _ATTEMPTS = 2, 3
+#: Fewer tell nothing of noise.
+_FEWEST_PERIODS = 2
 
 
 async def measure_meaning_in_loop(
@@ -148,22 +148,18 @@ class _Beside:
         Raises:
             NotAllowed: also where samples are lost each time, so that nothing tells the noise.
         """
-        for _attempt in range(_ATTEMPTS):
+        for _attempt in range(ATTEMPTS):
             ((sent, recording),) = await play_fitting(
                 self.axis, self.session, self.settings, self.setup, (sequence,), self.home,
                 _progress(told),
             )  # fmt: skip
             e = sent.excitation
             period = e.samples[e.first_sample :][: e.period_samples]
-            torque, velocity = periods_of(self.axis, sent, recording)
+            torque, velocity = periods_of(sent, recording)
             if len(torque) >= _FEWEST_PERIODS:
                 lines = LoopLines.of(np.fft.rfft(period)[e.lines], torque, velocity)
                 return sent, recording, lines
-        raise NotAllowed(
-            f"{self.axis.drive.name}: samples were lost in all but one period, {_ATTEMPTS} times",
-            drive=self.axis.drive.name,
-            remedy="look at the link quality; the computer or the bus is overloaded",
-        )
+        raise samples_lost(self.axis)
 
 
 def safe_centre_hz(

@@ -1,14 +1,16 @@
-"""A notch that is tried beside the loop is tried again where samples were lost."""
+"""A notch is tried again where samples were lost."""
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from backend.tools import notch_in_loop
+from backend.tools import notch_effect, notch_in_loop
 from drivers.errors import NotAllowed
 
 LINES = np.array([2, 3, 5])
@@ -47,7 +49,46 @@ async def test_one_that_lost_samples_is_made_again(monkeypatch: pytest.MonkeyPat
 
 async def test_a_line_that_loses_samples_each_time_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     trial, left = beside(monkeypatch, [1, 1, 1, 9])
-    with pytest.raises(NotAllowed, match="X: samples were lost in all but one period") as told:
+    with pytest.raises(NotAllowed, match="X: samples were lost in 3 tries") as told:
         await trial._played(None, lambda _: None)
     assert told.value.remedy
     assert left == [9]
+
+
+async def test_without_a_loop_too_with_the_sign_turned_each_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A whole trial leaves a free axis a turn away; the next one leads it back."""
+    signs: list[int] = []
+    whole = [0, 0, 1, 9]
+
+    async def played(axis: object, session: object, play: Any, *_: object) -> None:
+        signs.append(int(np.sign(play.values[0])))
+
+    async def nothing(*_: object) -> None: ...
+
+    @asynccontextmanager
+    async def enabled(*_: object) -> AsyncIterator[None]:
+        yield
+
+    async def units() -> Any:
+        return SimpleNamespace(torque=lambda _raw: 0.1)
+
+    def periods(*_: object) -> tuple[Any, Any]:
+        count = whole.pop(0)
+        return np.full((count, LINES.size), 2.0 + 0j), None
+
+    for name, made in (("play", played), ("bus_limits", nothing), ("enabled", enabled)):
+        monkeypatch.setattr(notch_effect, name, made)
+    monkeypatch.setattr(notch_effect, "periods_of", periods)
+    axis = SimpleNamespace(drive=SimpleNamespace(name="X"), units=units)
+    sequence = SimpleNamespace(excitation=SimpleNamespace(samples=np.ones(8)))
+    facts = SimpleNamespace(rated_torque_nm=1.0)
+    none = cast(Any, None)
+    free = notch_effect._Free(
+        cast(Any, axis), none, none, cast(Any, facts), none, cast(Any, sequence), 0
+    )
+    spectrum = await free._torque(lambda _: None)
+    assert signs == [1, -1, 1]
+    assert np.all(spectrum == 2.0)
+    assert whole == [9]
