@@ -4,66 +4,89 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from drivers.virtual.device import ABORT_NO_OBJECT, ABORT_WRITE_ONLY, SdoAbort
+from drivers.virtual.device import (
+    ABORT_NO_OBJECT,
+    ABORT_TOO_HIGH,
+    ABORT_WRITE_ONLY,
+    SdoAbort,
+)
 from drivers.virtual.firmware.dictionary import Entry, ObjectDictionary
 from profiles.schema import Profile
 
 
 class RegisterTable:
-    """Registers to entries. Values longer than 16 bits take several registers."""
+    """Registers to entries. Values longer than 16 bits take several registers.
+
+    Each register is one of its own, as the manual prints them (003:633-673 and 003:905-990 give H
+    and L a line each): a master may ask for one half, and write one half with function 06.
+    """
 
     def __init__(self, profile: Profile, od: ObjectDictionary) -> None:
         modbus = next((link for link in profile.links if link.kind == "modbus"), None)
-        self._high_first = modbus is None or modbus.word_order != "low_first"
-        self._entries: dict[int, Entry] = {
-            entry.parameter.modbus_register: entry
-            for entry in od
-            if entry.parameter.modbus_register is not None
-        }
+        high_first = modbus is None or modbus.word_order != "low_first"
+        self._places: dict[int, tuple[Entry, int]] = {}
+        """Per register its entry and how many bits its word is shifted in the value."""
+        for entry in od:
+            start = entry.parameter.modbus_register
+            if start is None:
+                continue
+            count = max(1, (entry.size + 1) // 2)
+            for word in range(count):
+                shift = 16 * (count - 1 - word if high_first else word)
+                self._places[start + word] = entry, shift
 
-    def _words(self, entry: Entry) -> int:
-        return max(1, (entry.size + 1) // 2)
-
-    def _find(self, register: int) -> Entry:
-        entry = self._entries.get(register)
-        if entry is None:
+    def _find(self, register: int) -> tuple[Entry, int]:
+        place = self._places.get(register)
+        if place is None:
             raise SdoAbort(ABORT_NO_OBJECT)
-        return entry
+        return place
 
     def read(self, register: int, count: int) -> list[int]:
-        """Values of ``count`` registers; every value must lie inside the block as a whole."""
+        """Values of ``count`` registers. The words of one value are of one moment."""
         words: list[int] = []
-        while len(words) < count:
-            entry = self._find(register + len(words))
+        held: dict[str, int] = {}
+        for at in range(register, register + count):
+            entry, shift = self._find(at)
             if entry.parameter.access == "wo":
                 raise SdoAbort(ABORT_WRITE_ONLY)
-            value = entry.current()
-            if isinstance(value, str):
-                raise SdoAbort(ABORT_NO_OBJECT)
+            if entry.key not in held:
+                value = entry.current()
+                if isinstance(value, str):
+                    raise SdoAbort(ABORT_NO_OBJECT)
+                held[entry.key] = int(value)
             # Short values are sign-extended to the register, as their type says.
-            size = self._words(entry)
-            unsigned = int(value) & ((1 << 16 * size) - 1)
-            parts = [unsigned >> 16 * i & 0xFFFF for i in range(size)]
-            words += parts[::-1] if self._high_first else parts
-        if len(words) != count:
-            raise SdoAbort(ABORT_NO_OBJECT)
+            words.append(held[entry.key] >> shift & 0xFFFF)
         return words
 
     def write(
         self, register: int, values: Sequence[int], write_entry: Callable[[Entry, bytes], None]
     ) -> None:
-        """Write whole values. A refusal in the middle leaves those before it written."""
-        done = 0
-        plan: list[tuple[Entry, bytes]] = []
-        while done < len(values):
-            entry = self._find(register + done)
-            size = self._words(entry)
-            parts = list(values[done : done + size])
-            if len(parts) != size:
-                raise SdoAbort(ABORT_NO_OBJECT)
-            ordered = parts[::-1] if self._high_first else parts
-            data = b"".join(part.to_bytes(2, "little") for part in ordered)
-            plan.append((entry, data[: entry.size]))
-            done += size
-        for entry, data in plan:
-            write_entry(entry, data)
+        """Write registers; all words of one value at once, a half leaves the other as it is.
+
+        A refusal in the middle leaves the values before it written.
+        """
+        plan: dict[str, tuple[Entry, int]] = {}
+        for at, word in enumerate(values, register):
+            entry, shift = self._find(at)
+            value = plan[entry.key][1] if entry.key in plan else _raw(entry)
+            plan[entry.key] = entry, value & ~(0xFFFF << shift) | word << shift
+        for entry, value in plan.values():
+            write_entry(entry, _stored(entry, value))
+
+
+def _raw(entry: Entry) -> int:
+    """The bits of an entry's value, without sign."""
+    value = entry.current()
+    if isinstance(value, str):
+        raise SdoAbort(ABORT_NO_OBJECT)
+    return int(value) & ((1 << 16 * max(1, (entry.size + 1) // 2)) - 1)
+
+
+def _stored(entry: Entry, value: int) -> bytes:
+    """A register's bits as the entry's bytes; what does not fit 8 bits is out of range."""
+    if entry.size == 1:
+        fits = range(0xFF80, 0x10000) if entry.parameter.type == "INT8" else range(0x80, 0x100)
+        if value >= 0x80 and value not in fits:
+            raise SdoAbort(ABORT_TOO_HIGH)
+        value &= 0xFF
+    return value.to_bytes(entry.size, "little")

@@ -16,6 +16,7 @@ from drivers.virtual.firmware.families.mms7 import Mms7
 from drivers.virtual.firmware.registers import RegisterTable
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import TravelSpec
+from profiles.loader import load_profile
 from profiles.schema import LinkSpec, Parameter, Watchdog
 
 from .servo_bench import REV, TURN, Bench, rigid, small_profile
@@ -350,11 +351,33 @@ def test_register_table_with_the_high_word_first() -> None:
     assert servo.read_register(1, 4) == [0xFFFF, 0x0001, 0x0002, 7]
     assert servo.od.numbered["PA_2"].value == 0x00010002
     assert servo.od.numbered["PA_1"].value == -1
-    for start, count in ((2, 1), (9, 1)):
+    assert servo.read_register(2, 1) == [1]
+    assert servo.read_register(3, 2) == [2, 7]
+    for start, count in ((5, 1), (0, 2), (4, 2)):
         with pytest.raises(SdoAbort):
             table.read(start, count)
+
+
+def test_half_of_a_long_value_is_a_register_of_its_own() -> None:
+    """003:633-673 and 003:905-990 print H and L as two registers; function 06 writes one."""
+    servo = make_device(load_profile("ds_c"), rigid())
+    servo.write_registers(0x20A, [0x0001, 0x0002])
+    servo.write_registers(0x20B, [0x0007])
+    assert servo.read_register(0x20A, 2) == [1, 7]
+    servo.write_registers(0x20A, [0xFFFF])
+    assert struct.unpack("<i", servo.read(0x607A, 0)) == (0xFFFF0007 - (1 << 32),)
+    servo.write_registers(0x20B, [8, 0])  # the low half of 607Ah and the high half of 6081h
+    assert servo.read_register(0x20A, 3) == [0xFFFF, 8, 0]
     with pytest.raises(SdoAbort):
-        servo.write_registers(2, [1])
+        servo.write_registers(0x203, [0])
+
+
+@pytest.mark.parametrize("word", [0x0101, 0x0080, 0xFF00])
+def test_a_register_of_eight_bits_takes_no_more_than_eight(word: int) -> None:
+    servo = make_device(load_profile("ds_c"), rigid())
+    with pytest.raises(SdoAbort):
+        servo.write_registers(0x204, [word])
+    assert servo.read_register(0x204, 1) == [1]
 
 
 def test_unknown_family() -> None:
