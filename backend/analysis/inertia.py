@@ -2,13 +2,14 @@
 
 torque = J·a + b·ω + Tc·sign(ω) + Tg, every signal through the *same* zero-phase filter (so that
 the filter drops out of the equation), samples near standstill left out, outliers weighted down
-(Huber 1964), loads that swing told apart from it (`load_swing`), and intervals that know how few
-independent samples a filtered signal holds, and how long what is left swings.
+(Huber 1964), loads that swing told apart from it (`load_swing`), torques that depend on the place
+or grow with the square of the speed where they show (`load_terms`), and intervals that know how
+few independent samples a filtered signal holds, and how long what is left swings.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import convolve1d
@@ -16,6 +17,15 @@ from scipy.stats import t as student_t
 
 from backend.analysis.arrays import BoolArray, FloatArray
 from backend.analysis.load_swing import find_swings, lag_of_load, lag_slopes
+from backend.analysis.load_terms import (
+    NOTHING_BESIDE,
+    Beside,
+    Motion,
+    Terms,
+    find_terms,
+    independent_share,
+)
+from backend.analysis.place_torque import angle_of
 
 #: Shares of J, viscous, Coulomb and gravity torque by which compliance, timing and the smoothing
 #: of standstill bend the answer however little noise there is; part of every interval.
@@ -27,6 +37,8 @@ _SWINGS_TO = 2.0
 #: What the model leaves may be alike for about this long.
 _ALIKE_S = 0.2
 _FEWEST = 20
+#: Columns of a rigid axis with friction, as `_columns` makes them.
+_RIGID = 6
 #: Share of the Coulomb friction that may have been taken for viscous friction.
 _TOLD_APART = 0.01
 _AT_LIMIT = "the torque was at its limit: raise the limit or lower the acceleration"
@@ -57,80 +69,8 @@ class InertiaResult:
     r2: float
     identifiable: bool
     verdict: str
-
-
-@dataclass(frozen=True)
-class MoveLimits:
-    """Envelope of the identification moves, at the motor: rad, rad/s, Nm."""
-
-    travel_rad: float
-    speed_rad_s: float
-    torque_nm: float
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """Position, velocity and acceleration [n] of a move that ends where it began."""
-
-    position_rad: FloatArray
-    velocity_rad_s: FloatArray
-    acceleration_rad_s2: FloatArray
-    sample_rate_hz: float
-
-
-def _there_and_back(
-    travel: float, speed: float, acceleration: float, dwell_s: float, rate: float
-) -> FloatArray:
-    """Velocity of one trapezoid forward, a dwell, and one back."""
-    peak = min(speed, float(np.sqrt(travel * acceleration)))
-    ramp = max(2, int(np.ceil(peak / acceleration * rate)))
-    cruise = max(0, round((travel / peak - peak / acceleration) * rate))
-    up = (np.arange(ramp) + 0.5) / ramp
-    one = np.concatenate([up, np.ones(cruise), up[::-1]]) * peak
-    rest = np.zeros(round(dwell_s * rate))
-    return np.concatenate([one, rest, -one, rest])
-
-
-def design_moves(
-    limits: MoveLimits,
-    estimated_inertia_kgm2: float,
-    sample_rate_hz: float,
-    *,
-    friction_nm: float = 0.0,
-    repetitions: int = 3,
-    smoothing_s: float = 0.01,
-    dwell_s: float = 0.05,
-) -> Trajectory:
-    """Bidirectional trapezoids inside travel, speed and torque.
-
-    The acceleration uses 70 % of the torque left after friction; every second repetition runs at
-    half speed and 60 % of the acceleration, so that viscous and Coulomb friction can be told
-    apart. ``smoothing_s`` bounds the jerk.
-    """
-    torque = 0.7 * (limits.torque_nm - friction_nm)
-    if torque <= 0:
-        raise ValueError(
-            f"{limits.torque_nm} Nm do not exceed the friction of {friction_nm} Nm; raise the limit"
-        )
-    acceleration = torque / estimated_inertia_kgm2
-    parts: list[FloatArray] = []
-    for i in range(repetitions):
-        share = 1.0 if i % 2 == 0 else 0.5
-        parts.append(
-            _there_and_back(
-                0.95 * limits.travel_rad, share * limits.speed_rad_s,
-                acceleration * (1.0 if i % 2 == 0 else 0.6), dwell_s, sample_rate_hz,
-            )
-        )  # fmt: skip
-    velocity: FloatArray = np.concatenate(parts)
-    width = max(1, round(smoothing_s * sample_rate_hz))
-    velocity = np.convolve(velocity, np.ones(width) / width)
-    velocity = velocity - np.sum(velocity) / velocity.size * (velocity != 0)
-    # Ramps of whole samples make short moves longer than computed.
-    reached = float(np.ptp(np.cumsum(velocity))) / sample_rate_hz
-    velocity = velocity * min(1.0, 0.97 * limits.travel_rad / reached)
-    position = np.cumsum(velocity) / sample_rate_hz
-    return Trajectory(position, velocity, np.gradient(velocity) * sample_rate_hz, sample_rate_hz)
+    beside: Beside = NOTHING_BESIDE
+    """What the torque depends on beside inertia and friction."""
 
 
 def _smoothing_kernel(sample_rate_hz: float, cutoff_hz: float) -> FloatArray:
@@ -164,21 +104,6 @@ def _huber(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
             break
         weight = np.minimum(1.0, 1.345 * scale / np.maximum(residual, 1e-300))
     return x, weight
-
-
-def _independent_share(residual: FloatArray, keep: BoolArray) -> float:
-    """Share of samples that are independent, from the residual's autocorrelation."""
-    whole = np.zeros(keep.size)
-    whole[keep] = residual
-    n = 1 << int(np.ceil(np.log2(2 * keep.size)))
-    power = np.abs(np.fft.rfft(whole, n)) ** 2
-    correlation = np.fft.irfft(power, n)[: keep.size // 2]
-    if correlation[0] <= 0:
-        return 1.0
-    rho = correlation / correlation[0]
-    negative = np.flatnonzero(rho <= 0.05)
-    length = int(negative[0]) if negative.size else rho.size
-    return float(1.0 / (1.0 + 2.0 * np.sum(rho[1:length])))
 
 
 def _swinging_variance(
@@ -241,15 +166,43 @@ def estimate_inertia(
     samples, saturated_share = int(np.count_nonzero(keep)), float(np.mean(saturated))
     if samples < _FEWEST:
         return _nothing(saturated_share)
-    acceleration = matrix[:, 0]
-    swings = find_swings(matrix, torque, acceleration, keep, sample_rate_hz, _SWINGS_TO * cutoff_hz)
-    lags = [lag_of_load(acceleration, s, sample_rate_hz) for s in swings]
-    bends = [c[keep] for s in swings for c in lag_slopes(acceleration, s, sample_rate_hz)]
-    return _regress(
-        np.column_stack([matrix, *lags])[keep], torque[keep],
-        np.array(bends, dtype=np.float64).reshape(len(bends), samples).T,
-        keep, round(_ALIKE_S * sample_rate_hz), saturated_share, motor_inertia_kgm2,
+    angle = angle_of(velocity_rad_s, sample_rate_hz)
+    motion = Motion(velocity_rad_s, angle, lambda x: _smooth(x, kernel))
+    highest_hz = _SWINGS_TO * cutoff_hz
+    terms, matrix, bends = _machine(matrix, torque, motion, keep, sample_rate_hz, highest_hz)
+    found, sizes = _regress(
+        matrix[keep], torque[keep], bends[keep], keep,
+        round(_ALIKE_S * sample_rate_hz), saturated_share, motor_inertia_kgm2,
     )  # fmt: skip
+    return replace(found, beside=terms.sized(motion, sizes[_RIGID:]))
+
+
+def _machine(
+    rigid: FloatArray, torque: FloatArray, motion: Motion, keep: BoolArray, rate: float,
+    highest_hz: float,
+) -> tuple[Terms, FloatArray, FloatArray]:  # fmt: skip
+    """What of the machine shows in the torque beside a rigid inertia and friction.
+
+    Returns the terms, all columns (the rigid ones, those of the terms, those of loads that
+    swing) and how what was searched bends them [n, columns].
+    """
+    acceleration = rigid[:, 0]
+
+    def lags(known: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
+        swings = find_swings(known, torque, acceleration, keep, rate, highest_hz)
+        return (
+            [lag_of_load(acceleration, s, rate) for s in swings],
+            [c for s in swings for c in lag_slopes(acceleration, s, rate)],
+        )
+
+    swinging, slopes = lags(rigid)
+    terms = find_terms(np.column_stack([rigid, *swinging]), torque, motion, keep)
+    known = np.column_stack([rigid, terms.columns(motion)])
+    if terms != Terms():
+        # Without them they may have been taken for a load that swings.
+        swinging, slopes = lags(known)
+    bends = np.column_stack([np.empty((torque.size, 0)), *slopes, *terms.slopes(motion)])
+    return terms, np.column_stack([known, *swinging]), bends
 
 
 def _smooth(x: FloatArray, kernel: FloatArray) -> FloatArray:
@@ -298,7 +251,7 @@ def _intervals(
     whole = np.column_stack([a, bends])
     scale = np.maximum(np.max(np.abs(whole), axis=0), 1e-12)
     whole = whole / scale
-    share = _independent_share(residual * np.sqrt(weight), keep)
+    share = independent_share(residual * np.sqrt(weight), keep)
     count = float(np.sum(weight))
     freedom = max(count * share - whole.shape[1], 1.0)
     normal = np.linalg.pinv((whole * weight[:, None]).T @ whole)
@@ -321,8 +274,8 @@ def _intervals(
 def _regress(
     a: FloatArray, b: FloatArray, bends: FloatArray, keep: BoolArray, block: int,
     saturated_share: float, motor_inertia_kgm2: float | None,
-) -> InertiaResult:  # fmt: skip
-    """Solve, judge and report."""
+) -> tuple[InertiaResult, FloatArray]:  # fmt: skip
+    """Solve, judge and report; the result, and the size of every column."""
     scale = np.maximum(np.max(np.abs(a), axis=0), 1e-12)
     x, weight = _huber(a / scale, b)
     driving = min(float(x[1] / scale[1]), 0.0)
@@ -341,10 +294,11 @@ def _regress(
         ratio = parts[0].value / motor_inertia_kgm2 - 1.0
         if ratio < -0.1:
             reasons.append("the result is below the motor's own inertia: check the motor data")
-    return InertiaResult(
+    result = InertiaResult(
         parts[0], parts[1], parts[2], parts[3], ratio, r2,
         not reasons, "\n".join(reasons) or "ok",
     )  # fmt: skip
+    return result, np.asarray(x / scale)
 
 
 def _reasons(
@@ -371,6 +325,10 @@ def _reasons(
         )
     if inertia.value <= 0:
         reasons.append("the torque opposes the acceleration: wrong sign of torque or velocity")
+    if parts[2].high < 0:
+        reasons.append(
+            "friction comes out negative: something beside inertia and friction drives the axis"
+        )
     if r2 < 0.8 and accelerating >= 3 * noise:
         reasons.append("the moves do not follow inertia and friction (R² below 0.8)")
     if _looks_like_backlash(a, b, residual):

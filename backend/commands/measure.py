@@ -224,6 +224,7 @@ def _told(tool: str, answer: dict[str, object]) -> list[str]:
             f"inertia {_shown(answer['inertia_kgm2'])} kg·m²  friction "
             f"{_shown(answer['coulomb_nm'])} Nm + {_shown(answer['viscous_nms'])} Nm·s  load "
             f"{_shown(answer['gravity_nm'])} Nm",
+            *_told_beside(answer),
             f"verdict: {answer['verdict']}",
         ]
     rows = answer["resonances"]
@@ -233,6 +234,19 @@ def _told(tool: str, answer: dict[str, object]) -> list[str]:
     ]
     warnings = answer["warnings"]
     return lines + [f"note: {w}" for w in (warnings if isinstance(warnings, list) else [])]
+
+
+def _told_beside(answer: dict[str, object]) -> list[str]:
+    """Torques beside inertia and friction, where some are found."""
+    words = {
+        "place_nm": "the torque depends on the place (spring, arm, imbalance)",
+        "fan_nm": "a torque grows with the square of the speed (fan, pump)",
+    }
+    return [
+        f"{text}: up to {_shown(answer[key])} Nm"
+        for key, text in words.items()
+        if answer.get(key) is not None
+    ]
 
 
 def _shown(value: object) -> str:

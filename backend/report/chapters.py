@@ -74,7 +74,10 @@ def _inertia(view: InertiaView, words: Words) -> list[Block]:
         ("coulomb", view.coulomb_nm, "coulomb_nm", "N·m"),
         ("viscous", view.viscous_nms, "viscous_nms", "N·m·s/rad"),
         ("gravity", view.gravity_nm, "gravity_nm", "N·m"),
+        ("place", view.place_nm, "place_nm", "N·m"),
+        ("fan", view.fan_nm, "fan_nm", "N·m"),
     ]  # fmt: skip
+    rows = [row for row in rows if row[0] not in ("place", "fan") or row[1] is not None]
     table = tuple(
         (words(name), significant(value, unit if si else "", 3), _interval(view.ci95.get(key)))
         for name, value, key, unit in rows

@@ -76,6 +76,11 @@ TEXTS: dict[str, tuple[str, str]] = {
     "coulomb": ("Coulomb friction", "库仑摩擦"),
     "viscous": ("Viscous friction", "粘性摩擦"),
     "gravity": ("Gravity", "重力"),
+    "place": (
+        "Torque by place (spring, arm, imbalance), ±",
+        "随位置变化的转矩（弹簧、摆臂、不平衡），±",
+    ),
+    "fan": ("Torque of a fan or pump, at most", "风机或泵类转矩，最大"),
     "identified": (
         "The data support these values (R² {r2}).",
         "数据支持这些值（R² {r2}）。",

@@ -54,6 +54,8 @@ class InertiaView(View):
     coulomb_nm: float | None
     viscous_nms: float | None
     gravity_nm: float | None
+    place_nm: float | None = None
+    fan_nm: float | None = None
     ci95: dict[str, tuple[float | None, float | None] | None]
     r2: float
     verdict: str

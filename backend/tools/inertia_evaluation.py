@@ -99,6 +99,8 @@ def oscillation_hz(recording: Recording, result: InertiaResult) -> float | None:
     rest = recording.torque_nm - result.inertia_kgm2.value * np.gradient(velocity) * rate
     rest = rest - result.viscous_nms.value * velocity - result.gravity_nm.value
     rest = rest - result.coulomb_nm.value * np.sign(velocity)
+    if result.beside.torque_nm.size:
+        rest = rest - result.beside.torque_nm
     density = power_density(rest, rate, round(2.0 * rate))
     band = (density.frequency_hz >= _SWING_HZ[0]) & (density.frequency_hz <= _SWING_HZ[1])
     levels = density.value[band]
@@ -188,6 +190,10 @@ def as_json(outcome: InertiaOutcome) -> dict[str, object]:
             **{name: [_number(p.low), _number(p.high)] for name, p in parts.items()},
             "load_ratio": spread,
         },
+        # A spring, an arm or a load out of balance; and a fan or a pump at the highest speed.
+        "place_nm": r.beside.place_nm or None,
+        "place_periods_rev": [period / (2 * np.pi) for period in r.beside.periods_rad],
+        "fan_nm": r.beside.fan_nm or None,
         "r2": r.r2,
         "verdict": r.verdict,
         "identifiable": r.identifiable,

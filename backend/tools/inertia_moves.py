@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.inertia import MoveLimits, Trajectory, design_moves
+from backend.analysis.identification_path import MoveLimits, Trajectory, design_moves
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.tools import profile_speed

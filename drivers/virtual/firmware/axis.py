@@ -65,6 +65,10 @@ class VirtualAxis:
         p[k.P_NOISE] = spec.encoder.noise_counts
         p[k.P_COULOMB] = spec.friction.coulomb_nm
         p[k.P_GRAVITY] = spec.friction.gravity_nm
+        p[k.P_PLACE_NM] = spec.place.torque_nm
+        p[k.P_PLACE_PER_RAD] = 1.0 / spec.place.period_rev
+        p[k.P_PLACE_AT] = spec.place.at_rev * 2.0 * math.pi
+        p[k.P_FAN] = spec.friction.fan_nms2
         p[k.P_STOP_MIN] = spec.travel.min_rev * turn
         p[k.P_STOP_MAX] = spec.travel.max_rev * turn
         negative, positive = spec.limit_switches_rev

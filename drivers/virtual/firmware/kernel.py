@@ -81,9 +81,9 @@ LIMIT_IGNORED, LIMIT_FAULT, LIMIT_HOLDS = range(3)
     P_THIRD_GAINS, P_THIRD_DELAY, P_KP_POSITION_3, P_KP_SPEED_3, P_KI_SPEED_3,
     P_SHAPE_ON, P_SHAPE_A11, P_SHAPE_A12, P_SHAPE_A21, P_SHAPE_A22, P_SHAPE_B1, P_SHAPE_B2,
     P_QUADRANT_POSITIVE, P_QUADRANT_NEGATIVE, P_QUADRANT_DELAY, P_QUADRANT_FILTER,
-    P_QUADRANT_ANGLE,
-) = range(133)  # fmt: skip
-P_NOTCHES = 133
+    P_QUADRANT_ANGLE, P_PLACE_NM, P_PLACE_PER_RAD, P_PLACE_AT, P_FAN,
+) = range(137)  # fmt: skip
+P_NOTCHES = 137
 """Start of the notches: per notch a1, a2, b1, b2 of (z² + a1·z + a2)/(z² + b1·z + b2)."""
 P_SIZE = P_NOTCHES + 16
 
@@ -573,11 +573,31 @@ def _control(p, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _beyond(p, x, size):  # type: ignore[no-untyped-def]
-    """How far the last inertia is beyond an end stop, signed."""
+def _behind(x, size):  # type: ignore[no-untyped-def]
+    """Angle of the last inertia of the chain, in rad."""
     behind = x[0]
     for i in range(3, size, 2):
         behind -= x[i]
+    return behind
+
+
+@njit(cache=True, nogil=True)
+def _pull(p, x, size):  # type: ignore[no-untyped-def]
+    """What the load takes of the last inertia: its weight, by its place, and as a fan does."""
+    pull = p[P_GRAVITY]
+    if p[P_PLACE_NM] != 0.0:
+        angle = _behind(x, size) - p[P_PLACE_AT]
+        pull += p[P_PLACE_NM] * math.sin(p[P_PLACE_PER_RAD] * angle)
+    if p[P_FAN] != 0.0:
+        speed = x[size - 1] if size > 3 else x[1]
+        pull += p[P_FAN] * speed * abs(speed)
+    return pull
+
+
+@njit(cache=True, nogil=True)
+def _beyond(p, x, size):  # type: ignore[no-untyped-def]
+    """How far the last inertia is beyond an end stop, signed."""
+    behind = _behind(x, size)
     if behind > p[P_STOP_MAX]:
         return behind - p[P_STOP_MAX]
     if behind < p[P_STOP_MIN]:
@@ -594,8 +614,9 @@ def _step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no
         if abs(x[gap_state[g]]) >= half_gap[g]:
             contact |= 1 << g
     am, bm = a[contact], b[contact]
+    pull = _pull(p, x, size)
     for i in range(size):
-        total = bm[i, 0] * s[S_TORQUE_COMMAND] - bm[i, 2] * p[P_GRAVITY]
+        total = bm[i, 0] * s[S_TORQUE_COMMAND] - bm[i, 2] * pull
         for j in range(size):
             total += am[i, j] * x[j]
         for g in range(gap_state.shape[0]):

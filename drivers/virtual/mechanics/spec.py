@@ -34,7 +34,8 @@ class MotorSpec(_Finite):
 
 
 class FrictionSpec(_Finite):
-    """Friction at the motor shaft and a constant torque on the last inertia of the chain.
+    """Friction at the motor shaft, and on the last inertia of the chain a constant torque and one
+    that grows with the square of its speed, as that of a fan, a pump or a stirrer.
 
     The motor holds the load with ``+gravity_nm``: the load itself pulls to negative positions.
     """
@@ -42,6 +43,21 @@ class FrictionSpec(_Finite):
     viscous_nms: float = Field(default=0.0, ge=0)
     coulomb_nm: float = Field(default=0.0, ge=0)
     gravity_nm: float = 0.0
+    fan_nms2: float = Field(default=0.0, ge=0)
+
+
+class PlaceSpec(_Finite):
+    """A torque that depends on the place of the last inertia, as the motor has to make it:
+    ``torque_nm`` · sin(2π (place − ``at_rev``) / ``period_rev``), places in motor revolutions.
+
+    A period of one revolution is a load out of balance on the shaft, a longer one an arm behind a
+    gear, and one far longer than the travel a spring of 2π · ``torque_nm`` / ``period_rev`` per
+    revolution.
+    """
+
+    torque_nm: float = 0.0
+    period_rev: float = Field(default=1.0, gt=0)
+    at_rev: float = 0.0
 
 
 class EncoderSpec(_Finite):
@@ -127,6 +143,7 @@ class MechanicsSpec(_Part):
 
     motor: MotorSpec
     friction: FrictionSpec = FrictionSpec()
+    place: PlaceSpec = PlaceSpec()
     encoder: EncoderSpec = EncoderSpec()
     travel: TravelSpec = TravelSpec()
     switches: SwitchSpec = SwitchSpec()
@@ -142,11 +159,19 @@ class MechanicsSpec(_Part):
     @model_validator(mode="after")
     def _can_be_held(self) -> MechanicsSpec:
         most_nm = _PEAK_PER_RATED * self.motor.rated_torque_nm
-        if abs(self.friction.gravity_nm) > most_nm:
+        place = self.place
+        furthest = max(
+            abs(end - place.at_rev) for end in (self.travel.min_rev, self.travel.max_rev)
+        )
+        reached = math.sin(2 * math.pi * min(furthest / place.period_rev, 0.25))
+        pull_nm = abs(self.friction.gravity_nm) + abs(place.torque_nm) * reached
+        if pull_nm > most_nm:
             raise ValueError(
-                f"friction: gravity_nm {self.friction.gravity_nm:g} is more than this motor holds "
-                f"even for a moment ({_PEAK_PER_RATED:g} times rated_torque_nm: {most_nm:g} Nm); "
-                "torques are those at the motor shaft, behind the gear"
+                f"friction: gravity_nm {self.friction.gravity_nm:g}"
+                + (f" with torque_nm {place.torque_nm:g} of place" if place.torque_nm else "")
+                + f" is more than this motor holds even for a moment ({_PEAK_PER_RATED:g} times "
+                f"rated_torque_nm: {most_nm:g} Nm); torques are those at the motor shaft, behind "
+                "the gear"
             )
         return self
 

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from drive_sim import TURN, Drive, Mechanics, simulate
 
+from backend.analysis.identification_path import MoveLimits, design_moves
 from backend.analysis.inertia import (
-    MoveLimits,
     _columns,
     _smooth,
     _smoothing_kernel,
     _swinging_variance,
-    design_moves,
     estimate_inertia,
 )
 from backend.analysis.load_swing import Swing, find_swings, lag_of_load

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scipy.linalg import expm
 
 from drivers.virtual.firmware import kernel as k
@@ -17,6 +18,7 @@ from drivers.virtual.mechanics import (
     LoadSpec,
     MechanicsSpec,
     MotorSpec,
+    PlaceSpec,
     TravelSpec,
     analytic_response,
     load_mechanics,
@@ -284,3 +286,44 @@ def test_damping_of_rigid_couplings_does_not_show_in_the_response() -> None:
         change = analytic_response(run, f) / analytic_response(written, f)
         assert np.max(np.abs(20 * np.log10(np.abs(change)))) < 0.1
         assert np.max(np.abs(np.angle(change, deg=True))) < 1.0
+
+
+def test_a_load_out_of_balance_swings_like_a_pendulum() -> None:
+    """Small swings about the lower rest: ω = √(A·k / J), k = 1 for one period to a turn."""
+    mechanics = spec(place=PlaceSpec(torque_nm=0.02))
+    axis = axis_with_torque(mechanics, 0.0)
+    axis._x[0] = 0.02
+    crossings, before = [], axis._x[0]
+    for step in range(20_000):
+        axis.run(1)
+        if before > 0.0 >= axis._x[0]:
+            crossings.append(step * k.STEP_S)
+        before = axis._x[0]
+    period = float(np.mean(np.diff(crossings)))
+    assert period == pytest.approx(TURN / math.sqrt(0.02 / 5e-5), rel=1e-3)
+
+
+def test_a_spring_is_a_place_torque_of_a_long_period() -> None:
+    """Held still at one revolution it takes 2π · torque / period."""
+    mechanics = spec(
+        place=PlaceSpec(torque_nm=2.0, period_rev=200.0), travel=TravelSpec(min_rev=-5, max_rev=5)
+    )
+    axis = axis_with_torque(mechanics, TURN * 2.0 / 200.0)
+    axis._x[0] = TURN
+    axis.run(200)
+    # What the current loop is late by: 1 / (2π · 1 kHz) of the acceleration. Not held: 12 rad/s.
+    late = TURN * 2.0 / 200.0 / 5e-5 / (TURN * 1000.0)
+    assert axis._x[1] == pytest.approx(-late, rel=0.05)
+
+
+def test_a_fan_slows_an_axis_down_by_the_square_of_its_speed() -> None:
+    """J·dω/dt = −c·ω²: ω(t) = ω₀ / (1 + ω₀·c·t/J)."""
+    axis = axis_with_torque(spec(friction=FrictionSpec(fan_nms2=1e-6)), 0.0)
+    axis._x[1] = -100.0
+    axis.run(20_000)
+    assert axis._x[1] == pytest.approx(-100.0 / (1 + 100.0 * 1e-6 * 1.0 / 5e-5), rel=1e-3)
+
+
+def test_a_place_that_no_motor_can_hold_is_refused() -> None:
+    with pytest.raises(ValidationError, match="torque_nm 9 of place is more than this motor holds"):
+        spec(place=PlaceSpec(torque_nm=9.0))

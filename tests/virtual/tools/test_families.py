@@ -15,7 +15,7 @@ from backend.tools.notch_meaning import meaning_of
 from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import SweepSettings
 from backend.tools.temporary import put_back
-from drivers.virtual.mechanics import MechanicsSpec
+from drivers.virtual.mechanics import MechanicsSpec, PlaceSpec
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent
 
@@ -123,3 +123,21 @@ async def _raws(b: DirectBench) -> dict[str, int]:
 def _limits(b: DirectBench) -> list[str]:
     roles = ("torque_limit_positive", "torque_limit_negative", "max_torque")
     return [key for role in roles if (key := b.axis.drive.key(role)) is not None]
+
+
+@pytest.mark.parametrize(
+    ("drive", "place"),
+    [
+        # A load out of balance on the shaft, and an arm behind a gear whose weight grows.
+        ("mms7", PlaceSpec(torque_nm=0.2, at_rev=0.1)),
+        ("r6l", PlaceSpec(torque_nm=0.3, period_rev=50.0)),
+    ],
+)
+async def test_a_load_that_pulls_by_its_place_is_no_inertia(drive: str, place: PlaceSpec) -> None:
+    spec = ONE.model_copy(update={"place": place})
+    async with direct(spec, drive=drive) as b:
+        found = (await inertia(b.axis, b.session, InertiaSettings(WIDE), silent())).result
+    assert found.verdict == "ok"
+    assert found.inertia_kgm2.value == pytest.approx(spec.total_inertia_kgm2, rel=0.02)
+    assert found.coulomb_nm.value == pytest.approx(spec.friction.coulomb_nm, rel=0.1)
+    assert found.beside.place_nm > 0.02

@@ -408,6 +408,11 @@ export const tuning = {
   'inertia.coulomb': ['Coulomb friction', '库仑摩擦'],
   'inertia.viscous': ['Viscous friction', '粘性摩擦'],
   'inertia.gravity': ['Gravity', '重力'],
+  'inertia.place': [
+    'Torque by place (spring, arm, imbalance), ±',
+    '随位置变化的转矩（弹簧、摆臂、不平衡），±',
+  ],
+  'inertia.fan': ['Torque of a fan or pump, at most', '风机或泵类转矩，最大'],
   'inertia.perRated': [
     'The drive does not tell its rated torque: torques are shares of it.',
     '驱动器未提供额定转矩：转矩以其比例表示。',

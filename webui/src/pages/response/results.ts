@@ -38,6 +38,10 @@ export interface Inertia {
   viscous_nms: number | null
   coulomb_nm: number | null
   gravity_nm: number | null
+  /** Half the span of a torque that depends on the place; missing in older measurements. */
+  place_nm?: number | null
+  /** A torque that grows with the square of the speed, at the highest; likewise. */
+  fan_nm?: number | null
   load_ratio: number | null
   load_ratio_against: string
   ci95: Record<string, [number | null, number | null] | null>

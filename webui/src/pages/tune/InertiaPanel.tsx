@@ -129,10 +129,17 @@ const ROWS = [
   { name: 'gravity_nm', text: 'inertia.gravity', unit: 'N·m' },
 ] as const
 
+/** What few machines have: shown where it was found. */
+const BESIDE = [
+  { name: 'place_nm', text: 'inertia.place', unit: 'N·m' },
+  { name: 'fan_nm', text: 'inertia.fan', unit: 'N·m' },
+] as const
+
 /** What was found, how sure it is, and whether the data support it at all. */
 export function InertiaResult({ result }: { result: Inertia }) {
   const t = useT()
   const si = result.unit === 'SI'
+  const rows = [...ROWS, ...BESIDE.filter(({ name }) => result[name] != null)]
   return (
     <>
       <p className={`note ${result.identifiable ? 'good' : 'warn'}`}>
@@ -148,11 +155,11 @@ export function InertiaResult({ result }: { result: Inertia }) {
             </tr>
           </thead>
           <tbody className="num">
-            {ROWS.map(({ name, text, unit }) => (
+            {rows.map(({ name, text, unit }) => (
               <tr key={name}>
                 <td>{t(text)}</td>
                 <td className="right">
-                  {amount(result[name], si ? unit : '')}
+                  {amount(result[name] ?? null, si ? unit : '')}
                   <small className="dim interval">{interval(result.ci95[name])}</small>
                 </td>
               </tr>
