@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from queue import Empty, SimpleQueue
 from typing import NoReturn, TypeVar
 
@@ -166,9 +166,14 @@ class SdoChannel:
                 break
             self.late_answers += 1
         self._unanswered.clear()
-        if answer[0] & 0xE0 == 0x40 and not answer[0] & 0x02:
-            # A segmented answer would stay open.
-            self._send(sdo.abort_frame(mux, 0x08000000))
+        self._end_segments([answer])
+
+    def _end_segments(self, answers: Sequence[bytes]) -> None:
+        """Abort what these answers to a read began: a segmented transfer would stay open."""
+        for answer in answers:
+            if answer[0] & 0xE0 == 0x40 and not answer[0] & 0x02:
+                self._send(sdo.abort_frame(answer[1:4], sdo.ABORT_GENERAL))
+                return
 
     def _still_silent(self, mux: bytes, timeout_s: float) -> NoReturn:
         self.timeouts += 1
@@ -253,6 +258,7 @@ class SdoChannel:
         except Empty:
             if not answers:
                 self._unanswered.add(_PROBE[1:4])
+            self._end_segments(answers)
             return answers
         finally:
             self._turn.release()

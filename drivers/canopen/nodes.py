@@ -38,6 +38,8 @@ _EMERGENCY_EXACT = {
 #: A heartbeat this many of its own periods late is lost; 0.1 s more for a busy host.
 _LATE_PERIODS = 2.5
 _LATE_EXTRA_S = 0.1
+#: The longest of so many intervals is the period: one that came late makes the next one short.
+_INTERVALS_KEPT = 3
 _DUPLICATE_WINDOW_S = 10.0
 _FORGIVEN_S = 60.0
 """Two nodes with one number go on answering twice; what a busy computer mixed up does not."""
@@ -60,7 +62,7 @@ class NodeRecord:
     node: int
     state: int | None = None
     last_heartbeat_s: float | None = None
-    period_s: float | None = None
+    intervals_s: list[float] = field(default_factory=list)
     alive: bool = True
     boots: int = 0
     emergencies: int = 0
@@ -69,11 +71,18 @@ class NodeRecord:
     emergencies_told: int = 0
     emergencies_untold: int = 0
     guard_toggle: int | None = None
+    guarded: bool = False
+    """Its toggle bit was seen set, which heartbeats never have: it does answer guarding."""
     guard_asked_s: float | None = None
     foreign_master_s: float | None = None
     strays_s: list[float] = field(default_factory=list)
     in_use: bool = False
     conflict: str = ""
+
+    @property
+    def period_s(self) -> float | None:
+        """Time between its heartbeats; None while none is known."""
+        return max(self.intervals_s, default=None)
 
     @property
     def state_text(self) -> str:
@@ -107,15 +116,19 @@ class NodeWatch:
     def _heartbeat(self, record: NodeRecord, byte: int, now_s: float) -> list[LinkEvent]:
         state, toggle = byte & 0x7F, byte >> 7
         events = []
+        # Some nodes send one at once when their state changes, and after the boot-up message.
+        in_its_turn = record.alive and state == record.state
         if not record.alive:
             record.alive = True
             events.append(LinkEvent("back", record.node, f"node {record.node} answers again"))
         if state == 0 and not toggle:
             events.append(self._boot(record))
-        elif record.guard_asked_s is not None:
+        elif record.guard_asked_s is not None and not self._is_heartbeat(record, toggle):
             events += self._guard_answer(record, toggle)
-        elif record.last_heartbeat_s is not None:
-            record.period_s = now_s - record.last_heartbeat_s
+        elif in_its_turn and not record.guarded and record.last_heartbeat_s is not None:
+            record.guard_asked_s = None
+            record.intervals_s.append(now_s - record.last_heartbeat_s)
+            del record.intervals_s[:-_INTERVALS_KEPT]
         record.last_heartbeat_s = now_s
         if state != record.state:
             known = record.state not in (None, 0)
@@ -126,9 +139,15 @@ class NodeWatch:
                 )
         return events
 
+    def _is_heartbeat(self, record: NodeRecord, toggle: int) -> bool:
+        """Whether this is no guarding answer: heartbeats of a node that is asked all the same."""
+        return not record.guarded and record.guard_toggle == 0 == toggle
+
     def _boot(self, record: NodeRecord) -> LinkEvent:
         record.boots += 1
-        record.period_s = record.guard_toggle = record.guard_asked_s = None
+        record.intervals_s.clear()
+        record.guard_toggle = record.guard_asked_s = None
+        record.guarded = False
         if record.in_use:
             return LinkEvent(
                 "boot",
@@ -139,6 +158,7 @@ class NodeWatch:
 
     def _guard_answer(self, record: NodeRecord, toggle: int) -> list[LinkEvent]:
         record.guard_asked_s = None
+        record.guarded = record.guarded or toggle == 1
         repeated = record.guard_toggle == toggle
         record.guard_toggle = toggle
         if not repeated:
@@ -204,7 +224,7 @@ class NodeWatch:
             silent_s = now_s - record.last_heartbeat_s
             if silent_s > limit_s:
                 record.alive = False
-                record.period_s = None
+                record.intervals_s.clear()
                 events.append(
                     LinkEvent(
                         "lost",
@@ -230,7 +250,7 @@ class NodeWatch:
             last = record.last_heartbeat_s
             if asked is None and last is not None and now_s - last < guard_s:
                 continue
-            if asked is not None and record.alive and record.guard_toggle is not None:
+            if asked is not None and record.alive and record.guarded:
                 record.alive = False
                 events.append(
                     LinkEvent("lost", record.node, f"node {record.node} does not answer guarding")

@@ -40,8 +40,8 @@ def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) ->
             f"{len(answers)} nodes answer as number {channel.node}: switch all but one off and "
             "give them other numbers before writing anything"
         )
-    device_type = int.from_bytes(answers[0][4:8], "little")
-    if answers[0][0] & 0xE0 == 0x40 and device_type & 0xFFFF != _SERVO:
+    device_type = _device_type(channel, answers[0], timeout_s)
+    if device_type is not None and device_type & 0xFFFF != _SERVO:
         notes.append(f"device profile {device_type & 0xFFFF}, not a CiA 402 drive")
 
     def number(index: int, subindex: int) -> int | None:
@@ -64,6 +64,17 @@ def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) ->
         firmware=text(0x100A),
         notes=tuple(notes),
     )
+
+
+def _device_type(channel: SdoChannel, answer: bytes, timeout_s: float) -> int | None:
+    """What the answer to the probe says, or None where it was refused."""
+    if answer[0] & 0xE0 != 0x40:
+        return None
+    if answer[0] & 0x02:
+        return int.from_bytes(answer[4:8], "little")
+    # A node may send even four bytes in segments (CiA 301 clause 7.2.4.3.5): then this is a length.
+    data = _read(channel, 0x1000, 0, timeout_s)
+    return None if data is None else int.from_bytes(data, "little")
 
 
 def _read(channel: SdoChannel, index: int, subindex: int, timeout_s: float) -> bytes | None:

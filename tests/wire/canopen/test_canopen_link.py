@@ -234,11 +234,32 @@ async def test_node_guarding_notices_a_silent_node(bench: Bench) -> None:
     await link.open()
     try:
         await link.read(5, SMALL)
-        await until(lambda: link._watch.record(5).state == 127)
+        # One answer alone could be a heartbeat: the toggle bit tells.
+        await until(lambda: link._watch.record(5).guarded)
+        assert link._watch.record(5).state == 127
         bench.node.mute = True
         await until(lambda: any("does not answer guarding" in e.text for e in events))
     finally:
         await link.close()
+
+
+async def test_a_device_type_that_comes_in_segments_is_no_other_device(
+    bench: Bench, link: CanopenLink
+) -> None:
+    """CiA 301 lets a server send any length in segments; the first answer then tells a length."""
+    server = bench.node._server
+    whole, asked = server.request, []
+
+    def in_segments(request: bytes) -> list[bytes]:
+        asked.append(request)
+        if request[:4] == b"\x40\x00\x10\x00":
+            return [bytes.fromhex("4100100004000000")]
+        return [bytes.fromhex("0792010200000000")] if request[0] == 0x60 else whole(request)
+
+    bench.wire.do(lambda: setattr(server, "request", in_segments))
+    (found,) = await link.scan(lambda *_: None, [5])
+    assert found.notes == ()
+    assert asked[1][:4] == b"\x80\x00\x10\x00", "what the probe began is ended"
 
 
 async def test_bus_off_is_told_and_recovered(slcan_bench: Bench) -> None:

@@ -124,6 +124,43 @@ def test_a_silent_node_is_told_once_and_its_return_too() -> None:
     assert [e.kind for e in watch.observe(beat, 3.0)] == ["back"]
 
 
+def told_by(watch: NodeWatch, beats: list[tuple[float, int]], until_s: float) -> list[str]:
+    """Losses that are told while node 5 sends these states at these times."""
+    told: list[str] = []
+    waiting = list(beats)
+    for now_ms in range(round(until_s * 1000)):
+        while waiting and waiting[0][0] <= now_ms / 1000:
+            watch.observe(Frame(0x705, bytes([waiting.pop(0)[1]])), now_ms / 1000)
+        told += [event.text for event in watch.overdue(now_ms / 1000) if event.kind == "lost"]
+    return told
+
+
+def test_a_heartbeat_at_once_after_boot_or_a_change_of_state_tells_no_period() -> None:
+    """As CANopenNode does it; the period here is 1 s, and the exchange begins with NMT start."""
+    beats = [(0.0, 0), (0.001, 127), (0.4, 5), (1.4, 5), (2.4, 5), (2.41, 127), (3.41, 127)]
+    watch = NodeWatch()
+    assert told_by(watch, beats, 4.4) == []
+    assert watch.record(5).period_s == pytest.approx(1.0)
+
+
+def test_a_heartbeat_that_came_late_makes_the_next_one_no_period() -> None:
+    watch = NodeWatch()
+    assert told_by(watch, [(0, 5), (1, 5), (2.9, 5), (3, 5), (4, 5), (5, 5)], 5.9) == []
+    assert len(told_by(NodeWatch(), [(0, 5), (1, 5), (2, 5)], 5)) == 1
+
+
+def test_a_node_with_a_slow_heartbeat_is_not_taken_for_one_that_answers_guarding() -> None:
+    watch = NodeWatch()
+    watch.record(5).in_use = True
+    events = []
+    for now_ms in range(0, 20_000, 50):
+        if now_ms % 2000 == 1700:
+            events += watch.observe(Frame(0x705, b"\x05"), now_ms / 1000)
+        events += watch.guard_due(0.5, now_ms / 1000)[1] + watch.overdue(now_ms / 1000)
+    assert events == []
+    assert watch.record(5).period_s == pytest.approx(2.0)
+
+
 def test_state_changes_and_restarts_are_told() -> None:
     watch = NodeWatch()
     watch.record(5).in_use = True
