@@ -97,7 +97,8 @@ class LineSpectra:
 def good_periods(record: Record) -> tuple[list[int], int]:
     """Numbers of the usable periods, and how many had to be dropped.
 
-    A gap spoils its own period; the one after it is kept, since the axis itself saw nothing.
+    A gap spoils its own period; the one after it is kept, since the axis itself saw nothing. A
+    position is looked at from each sample to the next, so that the one after a period counts.
     """
     e = record.excitation
     if e.segments:
@@ -105,10 +106,11 @@ def good_periods(record: Record) -> tuple[list[int], int]:
     numbers = range(e.transient_periods, e.periods)
     if record.valid is None:
         return list(numbers), 0
+    more = 0 if record.position is None else 1
     good = [
         p
         for p in numbers
-        if np.all(record.valid[e.first_sample + p * e.period_samples :][: e.period_samples])
+        if np.all(record.valid[e.first_sample + p * e.period_samples :][: e.period_samples + more])
     ]
     return good, len(numbers) - len(good)
 

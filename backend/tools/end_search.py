@@ -77,7 +77,8 @@ class _Stall:
 
     def seen(self, rows: npt.NDArray[np.float64]) -> bool:
         """Whether it rests; ``rows`` [n, 3] are raw position, velocity and torque."""
-        moving = np.flatnonzero(np.abs(rows[:, 1]) >= self.slow)
+        # What was lost is not a number, and no standstill.
+        moving = np.flatnonzero(~(np.abs(rows[:, 1]) < self.slow))
         self.resting = self.resting + len(rows) if not moving.size else len(rows) - moving[-1] - 1
         self.count += len(rows)
         self.found = self.count > self.start + self.enough and self.resting >= self.enough

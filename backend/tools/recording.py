@@ -1,7 +1,8 @@
 """Play a precomputed excitation cycle by cycle and keep every sample of it, or fail.
 
 The recording is aligned with what was sent by the set-points that come back with each sample,
-so lost blocks cannot shift it. A cycle that was lost or late is marked, never interpolated.
+so lost blocks cannot shift it. A cycle that was lost or late is marked and never evaluated; it
+holds what lies between its neighbours, since filters and extremes run over it.
 """
 
 from __future__ import annotations
@@ -301,6 +302,7 @@ async def _in_si(
 ) -> Recording:
     units = await axis.units()
     count = len(table)
+    table = bridged(table, valid)
     return Recording(
         sample_rate_hz=1.0 / period_s,
         position_rad=table[:, 0] * (units.position(1.0) * 2 * np.pi),
@@ -310,6 +312,18 @@ async def _in_si(
         offset=whole[:count, 1] if whole.shape[1] > 1 else np.zeros(count),
         valid=valid,
     )
+
+
+def bridged(table: FloatArray, valid: BoolArray) -> FloatArray:
+    """Rows [n, k] that are not ``valid`` [n] replaced by a straight line between those that are.
+
+    What came in their place is nothing, zero or not a number: an axis far from zero would seem to
+    leap there and back.
+    """
+    if np.all(valid) or not np.any(valid):
+        return table
+    rows, good = np.arange(len(table)), np.flatnonzero(valid)
+    return np.column_stack([np.interp(rows, good, column[good]) for column in table.T])
 
 
 def share(progress: Progress, low: float, high: float, step: str) -> Callable[[float], None]:

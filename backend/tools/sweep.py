@@ -126,8 +126,10 @@ class _Sweep:
             sequences = await scaled_by_speed(
                 axis, session, settings, setup, sequences, home, progress
             )
+        # A stepped sine takes too long for a second time.
+        spare = 0 if settings.excitation == "stepped" else len(sequences)
         return setup, await play_fitting(
-            axis, session, settings, setup, sequences, home, progress
+            axis, session, settings, setup, sequences, home, progress, spare
         )  # fmt: skip
 
 

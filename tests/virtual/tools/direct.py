@@ -104,6 +104,10 @@ class DirectLink:
         """The cable is pulled: nothing comes back."""
         self.highest = {"speed": 0.0, "torque": 0.0, "low": 0.0, "high": 0.0}
         """Extremes of the actual values since the exchange began, raw."""
+        self.late: Callable[[], int] = lambda: 0
+        """Asked before each cycle: by how many cycles the computer is late for it."""
+        self.lost: Callable[[], bool] = lambda: False
+        """Asked at each cycle: whether its answer does not come; the drive has heard it."""
         self._loop: AxisLoop | None = None
         self._pump: asyncio.Task[None] | None = None
         self._ordinary_time = time.monotonic
@@ -239,17 +243,36 @@ class DirectLink:
     async def _run(self) -> None:
         per_turn = max(1, round(_TURN_NS / self.cycle_ns))
         while True:
-            rows = [self._cycle() for _ in range(per_turn)]
+            rows: list[list[float]] = []
+            missed = 0
+            for _ in range(per_turn):
+                if late := self.late():
+                    self._deliver(rows, missed)
+                    rows, missed = [], late
+                    self.now_ns += late * self.cycle_ns
+                    self.device.advance(self.now_ns)
+                rows.append(self._cycle())
+                if self.lost():
+                    # What was sent is known all the same.
+                    inputs = len(self._columns[1])
+                    rows[-1][-inputs:] = [np.nan] * inputs
             if not self._reached:
                 return
-            block = ScopeBlock(0, self.now_ns / 1e9, self.cycle_ns / 1e9, self._channels,
-                               np.array(rows, np.float64))  # fmt: skip
-            for consumer in tuple(self._consumers):
-                consumer(block)
+            self._deliver(rows, missed)
             await asyncio.sleep(0)
             if _Computing.count:
                 # Not asyncio's: that would be over in no time, as it is the drive's.
                 time.sleep(_REST_S)  # noqa: ASYNC251
+
+    def _deliver(self, rows: list[list[float]], missed: int) -> None:
+        if not rows:
+            return
+        samples = np.array(rows, np.float64)
+        valid = ~np.isnan(samples).any(axis=1)
+        block = ScopeBlock(0, self.now_ns / 1e9, self.cycle_ns / 1e9, self._channels, samples,
+                           missed, valid)  # fmt: skip
+        for consumer in tuple(self._consumers):
+            consumer(block)
 
     def _cycle(self) -> list[float]:
         loop = self._loop

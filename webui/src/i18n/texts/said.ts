@@ -47,6 +47,7 @@ export const saidTexts = {
     'measuring, realisation {n} of {count}',
     '测量中，第 {n} 次激励（共 {count} 次）',
   ],
+  'said.onceMore': ['once more, since samples were lost', '因丢失采样，重新测量一次'],
   'said.preparing': ['preparing', '准备中'],
   'said.searching': ['searching home', '正在寻找零点'],
   'said.end': ['looking for an end at limited torque', '以限定转矩寻找行程端点'],
