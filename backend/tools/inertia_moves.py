@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.identification_path import MoveLimits, Trajectory, design_moves
+from backend.analysis.identification_path import MoveLimits, design_moves
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.tools import profile_speed
@@ -18,6 +18,7 @@ from backend.tools.inertia_evaluation import InertiaSettings
 from backend.tools.interrupted import Interrupted
 from backend.tools.probe import RoughFit, require_right_sign, rough_fit
 from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play, quiet
+from backend.tools.soft_loop import SoftLoop, soft_loop_of
 from backend.tools.temporary import stopping_hard
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
@@ -34,6 +35,10 @@ _FOLLOWED = 0.2
 _FOLLOWS_WELL = 0.7
 #: Moves that take more torque than is permitted become weaker by this factor, so many times.
 _WEAKER, _ATTEMPTS = 0.6, 3
+#: A move is made where its loop is expected to take this share of the permitted torque at most, by
+#: an inertia that is known to so much; else torque is sent ahead, and the move becomes weaker.
+_EXPECTED, _ROUGHLY = 0.8, 0.1
+_SHARES = (1.0, 0.8, _WEAKER, 0.45, _WEAKER**2)
 _FRICTION_RAD_S = 0.5
 
 
@@ -53,10 +58,14 @@ class Shape:
 
 @dataclass(frozen=True)
 class FirstLook:
-    """About how heavy the axis is, and what share of a short way its speed loop followed."""
+    """About how heavy the axis is, and what share of a short way its speed loop followed.
+
+    ``loop``: its gains, where they explain the torque of that move.
+    """
 
     rough: RoughFit
     followed: float
+    loop: SoftLoop | None = None
 
 
 async def speed_move(
@@ -143,7 +152,10 @@ async def first_look(
     )
     floor = 0.5 * (facts.motor_inertia_kgm2 or 1e-7)
     rough = RoughFit(max(fit.inertia_kgm2, floor), max(fit.coulomb_nm, 0.0), fit.gravity_nm)
-    return FirstLook(rough, moved / (float(np.sum(np.abs(speed))) / rate / 60.0))
+    loop = soft_loop_of(
+        whole * _TURN / 60.0, recording.velocity_rad_s, recording.torque_nm, recording.valid, rate
+    )
+    return FirstLook(rough, moved / (float(np.sum(np.abs(speed))) / rate / 60.0), loop)
 
 
 async def _first_move(
@@ -175,21 +187,26 @@ async def identification_moves(
     shape: Shape,
     told: Callable[[float], None],
 ) -> Recording:
-    """The identification moves; weaker ones where the loop answers with too much torque."""
-    envelope, rough = settings.envelope, look.rough
-    ahead = look.followed < _FOLLOWS_WELL and _takes_torque_ahead(axis, session)
+    """The identification moves; weaker ones where the loop answers with too much torque.
+
+    What a soft loop will take is expected from the first look, so that this is seldom seen.
+    """
+    envelope = settings.envelope
     room = replace(envelope, travel_rev=min(envelope.travel_rev, travel_rev * 1.15))
     start = await axis.position_raw()
+    can = _takes_torque_ahead(axis, session)
+
+    def planned(share: float) -> _Moves:
+        return _moves(axis, session, settings, facts, look.rough, travel_rev, shape, share)
+
+    permitted_nm = envelope.torque_percent / 100.0 * facts.rated_torque_nm
+    share, ahead = _bearable(planned, look, permitted_nm, can)
     for attempt in range(_ATTEMPTS):
-        trajectory = _moves(axis, session, settings, facts, rough, travel_rev, shape, attempt)
-        tail = np.zeros(round(0.2 * trajectory.sample_rate_hz))
-        speed = np.concatenate([trajectory.velocity_rad_s, tail])
-        torque = rough.inertia_kgm2 * np.concatenate([trajectory.acceleration_rad_s2, tail])
-        torque += rough.coulomb_nm * np.tanh(speed / _FRICTION_RAD_S)
+        moves = planned(share * _WEAKER**attempt)
         try:
             return await speed_move(
-                axis, session, speed * 60.0 / _TURN, room, facts, told,
-                torque_nm=torque if ahead else None,
+                axis, session, moves.speed_rad_s * 60.0 / _TURN, room, facts, told,
+                torque_nm=moves.torque_nm if ahead else None,
             )  # fmt: skip
         except NotAllowed as error:
             last = attempt == _ATTEMPTS - 1
@@ -200,9 +217,38 @@ async def identification_moves(
     raise AssertionError
 
 
+def _bearable(
+    planned: Callable[[float], _Moves], look: FirstLook, permitted_nm: float, can: bool
+) -> tuple[float, bool]:
+    """How strong the moves may be for this loop, and whether torque is to be sent ahead of it."""
+    ahead = can and look.followed < _FOLLOWS_WELL
+    if look.loop is None:
+        return 1.0, ahead
+    pull_nm = abs(look.rough.gravity_nm)
+    for share in _SHARES:
+        moves = planned(share)
+        for sends in (ahead, can):
+            sent_nm = (1.0 - _ROUGHLY) * moves.torque_nm * sends
+            expected_nm = look.loop.peak_nm(
+                moves.torque_nm, sent_nm, look.rough.inertia_kgm2, moves.rate_hz
+            )
+            if pull_nm + expected_nm <= _EXPECTED * permitted_nm:
+                return share, sends
+    return _SHARES[-1], can
+
+
 def _takes_torque_ahead(axis: Axis, session: CyclicSession) -> bool:
     key = axis.drive.key("torque_offset")
     return key is not None and session.carries(axis.drive, key)
+
+
+@dataclass(frozen=True)
+class _Moves:
+    """What is played, and the torque [n] that a rigid axis needs for it, but for a pull."""
+
+    speed_rad_s: npt.NDArray[np.float64]
+    torque_nm: npt.NDArray[np.float64]
+    rate_hz: float
 
 
 def _moves(
@@ -213,9 +259,9 @@ def _moves(
     rough: RoughFit,
     travel_rev: float,
     shape: Shape,
-    attempt: int,
-) -> Trajectory:
-    """The trajectory of the first attempt, or a weaker one of a later.
+    share: float,
+) -> _Moves:
+    """The moves with this share of the torque that goes into acceleration.
 
     Raises:
         OutOfRange: the envelope does not allow it.
@@ -226,7 +272,7 @@ def _moves(
     speed = 0.8 * envelope.speed_rpm * _TURN / 60.0
     # As gentle as ramps of this length are, but well above friction.
     gentle = max(rough.inertia_kgm2 * speed / shape.ramp_s, 4.0 * rough.coulomb_nm)
-    wanted = friction + _WEAKER**attempt * (min(0.7 * torque, friction + gentle / 0.7) - friction)
+    wanted = friction + share * (min(0.7 * torque, friction + gentle / 0.7) - friction)
     try:
         trajectory = design_moves(
             MoveLimits(0.8 * travel_rev * _TURN, speed, wanted), rough.inertia_kgm2, rate,
@@ -245,4 +291,8 @@ def _moves(
             value=duration_s, limit=f"{envelope.time_s:g} s",
             remedy="allow more time, speed or torque, or less travel",
         )  # fmt: skip
-    return trajectory
+    tail = np.zeros(round(0.2 * rate))
+    played = np.concatenate([trajectory.velocity_rad_s, tail])
+    needed = rough.inertia_kgm2 * np.concatenate([trajectory.acceleration_rad_s2, tail])
+    needed += rough.coulomb_nm * np.tanh(played / _FRICTION_RAD_S)
+    return _Moves(played, needed, rate)

@@ -1,0 +1,61 @@
+"""What a speed loop does with a load that it was never tuned for: how much torque a move takes.
+
+A loop that is soft for its load lags, then swings and asks for far more torque than the move
+itself. Its two gains are read from a first short move (torque over error of speed and its
+integral), and a move is tried on them before it is made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import bilinear, lfilter
+
+FloatArray = npt.NDArray[np.float64]
+
+#: Gains that explain less of the torque of a move (share of its variance) are not the loop's.
+_EXPLAINED = 0.98
+#: The loop's torque follows its error by so many cycles at most.
+_LATEST = 6
+
+
+@dataclass(frozen=True)
+class SoftLoop:
+    """Proportional gain Nm·s/rad and integral gain Nm/rad of a speed loop."""
+
+    proportional: float
+    integral: float
+
+    def peak_nm(
+        self, needed_nm: FloatArray, ahead_nm: FloatArray, inertia_kgm2: float, rate_hz: float
+    ) -> float:
+        """Highest torque of a move that needs ``needed_nm`` [n] to be followed exactly.
+
+        ``ahead_nm`` [n] is what is sent ahead of the loop; the axis is taken to be rigid.
+        """
+        above = [self.proportional, self.integral]
+        below = [inertia_kgm2, self.proportional, self.integral]
+        b, a = bilinear(above, below, rate_hz)
+        own = lfilter(b, a, needed_nm - ahead_nm)
+        return float(np.max(np.abs(own + ahead_nm)))
+
+
+def soft_loop_of(
+    wanted_rad_s: FloatArray, velocity_rad_s: FloatArray, torque_nm: FloatArray,
+    valid: npt.NDArray[np.bool_], rate_hz: float,
+) -> SoftLoop | None:  # fmt: skip
+    """The gains that explain the torque of a move best; None where none do, as of a stiff loop."""
+    error = wanted_rad_s - velocity_rad_s
+    best, found = _EXPLAINED, None
+    for late in range(_LATEST):
+        seen = np.concatenate([np.zeros(late), error[: error.size - late]])
+        columns = np.column_stack([seen, np.cumsum(seen) / rate_hz, np.ones(seen.size)])[valid]
+        torque = torque_nm[valid]
+        gains = np.linalg.lstsq(columns, torque, rcond=None)[0]
+        spread = float(np.var(torque))
+        share = 1.0 - float(np.var(torque - columns @ gains)) / spread if spread else 0.0
+        if share > best and gains[0] > 0.0 and gains[1] >= 0.0:
+            best, found = share, SoftLoop(float(gains[0]), float(gains[1]))
+    return found
