@@ -132,13 +132,15 @@ def estimate_inertia(
     torque_limit_nm: float | None = None,
     motor_inertia_kgm2: float | None = None,
     valid: BoolArray | None = None,
+    position_rad: FloatArray | None = None,
 ) -> InertiaResult:
     """Regression over whole recordings of moves in both directions.
 
     ``torque_nm`` is the motor's torque. ``minimum_speed_rad_s`` defaults to 5 % of the peak
     speed. The motion must be smooth between bus cycles (interpolated, or made by the drive's own
     profile): with a reference that steps every cycle T, the torque sampled beside each step is
-    off by half a step, about ω_speed·T/2 of the acceleration torque. Samples at the torque limit,
+    off by half a step, about ω_speed·T/2 of the acceleration torque. ``position_rad`` [n] is the
+    motor's; without it the speed is summed up. Samples at the torque limit,
     in gaps (``valid`` False) and within the filter's reach of either are left out.
     """
     n = torque_nm.size
@@ -151,11 +153,13 @@ def estimate_inertia(
     if torque_limit_nm is not None:
         saturated = np.abs(torque_nm) >= 0.98 * torque_limit_nm
     spoilt = saturated
+    angle = angle_of(velocity_rad_s, sample_rate_hz) if position_rad is None else position_rad
     if valid is not None and np.any(valid):
         spoilt = saturated | ~valid
         # A load that swings remembers what a gap seems to do.
         count = np.arange(n)
         velocity_rad_s = np.interp(count, count[valid], velocity_rad_s[valid])
+        angle = np.interp(count, count[valid], angle[valid])
     peak = float(np.max(np.abs(velocity_rad_s)))
     slowest = 0.05 * peak if minimum_speed_rad_s is None else minimum_speed_rad_s
     matrix = _columns(velocity_rad_s, kernel, slowest, sample_rate_hz)
@@ -166,8 +170,8 @@ def estimate_inertia(
     samples, saturated_share = int(np.count_nonzero(keep)), float(np.mean(saturated))
     if samples < _FEWEST:
         return _nothing(saturated_share)
-    angle = angle_of(velocity_rad_s, sample_rate_hz)
-    motion = Motion(velocity_rad_s, angle, lambda x: _smooth(x, kernel))
+    middle = 0.5 * (float(np.min(angle)) + float(np.max(angle)))
+    motion = Motion(velocity_rad_s, angle - middle, lambda x: _smooth(x, kernel))
     highest_hz = _SWINGS_TO * cutoff_hz
     terms, matrix, bends = _machine(matrix, torque, motion, keep, sample_rate_hz, highest_hz)
     found, sizes = _regress(

@@ -1,30 +1,33 @@
 """Torques that some machines need beside inertia and friction, told by the moves themselves.
 
 A fan, a pump or a stirrer takes a torque that grows with the square of its speed; a spring, an arm
-or a load out of balance one that depends on the place (`place_torque`). Left out, either passes for
-inertia or turns friction negative. A term is taken up only where it clearly explains what the
+or a load out of balance one that depends on the place (`place_torque`); and friction is larger near
+standstill (Stribeck 1902). Left out, they pass for inertia, for play, or turn friction negative. A
+term is taken up only where it clearly explains what the
 others leave, so that an axis without it is judged as if there were no such thing.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from backend.analysis.arrays import BoolArray, FloatArray
-from backend.analysis.place_torque import Smooth, find_period, place_columns
+from backend.analysis.place_torque import COGGING_RAD, Smooth, find_period, place_columns
 
 #: A term that takes this share of the power that is left is there, whatever the noise.
 _PLAIN = 0.5
-#: Beside noise a smaller share counts, where chance would hardly take as much: least share, and
-#: least ratio of variances (F) for the three things that are fitted.
+#: Beside noise a smaller share counts for a fan and for the machine's place, which bend inertia
+#: most: least share, and least ratio of variances (F) for the three things that are fitted.
 _SHARE, _F = 0.15, 20.0
 #: Of the largest torque, what takes less matters to nobody; of the Coulomb friction, the shape of
 #: friction itself is not known better.
 _LEAST, _LEAST_OF_FRICTION = 0.01, 0.1
-#: An arm may hang on a shaft that is out of balance itself.
-_PLACES = 2
+#: An arm may hang on a shaft that is out of balance, of a motor that cogs in two ways.
+_PLACES = 4
+#: Speeds within which friction falls to its Coulomb value, as shares of the highest.
+_STATIC = (0.01, 0.02, 0.04, 0.08)
 #: Relative step of numerical slopes.
 _DIFFERENCE = 1e-3
 
@@ -40,10 +43,11 @@ class Motion:
 
 @dataclass(frozen=True)
 class Beside:
-    """What the terms come to: the largest torque of a fan in the recording, half the span of the
-    torque by place, in Nm; 0 where there is none.
+    """What the terms come to: the largest torque of a fan in the recording, half the span of what
+    the machine takes by its place, in Nm; 0 where there is none.
 
-    ``torque_nm`` [n] is what they make of the torque of the recording; empty where none is found.
+    ``torque_nm`` [n] is what all of them make of the torque of the recording, static friction and
+    the motor's cogging included; empty where none is found.
     """
 
     fan_nm: float
@@ -59,28 +63,47 @@ NOTHING_BESIDE = Beside(0.0, 0.0, (), np.empty(0))
 class Terms:
     """What the torque is made of beside inertia and friction.
 
+    ``static_rad_s`` is the speed within which static friction falls, 0 where there is none;
     ``periods_rad`` are those of torques that depend on the place.
     """
 
     fan: bool = False
+    static_rad_s: float = 0.0
     periods_rad: tuple[float, ...] = ()
 
     def columns(self, motion: Motion) -> FloatArray:
-        """Their shapes [n, columns]: that of a fan first, then two for each period."""
+        """Their shapes [n, columns]: a fan's, static friction's, then two for each period."""
         velocity = motion.velocity_rad_s
-        fan = [motion.smooth(velocity * np.abs(velocity))] if self.fan else []
-        places = [place_columns(motion.angle_rad, p, motion.smooth) for p in self.periods_rad]
-        return np.column_stack([np.empty((velocity.size, 0)), *fan, *places])
+        parts: list[FloatArray] = [np.empty((velocity.size, 0))]
+        if self.fan:
+            parts.append(motion.smooth(velocity * np.abs(velocity))[:, None])
+        if self.static_rad_s:
+            falling = np.exp(-((velocity / self.static_rad_s) ** 2))
+            parts.append(motion.smooth(np.sign(velocity) * falling)[:, None])
+        parts += [place_columns(motion.angle_rad, p, motion.smooth) for p in self.periods_rad]
+        return np.column_stack(parts)
+
+    def may_hide(self, before: Terms) -> bool:
+        """Whether what these have more than ``before`` is taken up beside noise, too."""
+        if self.static_rad_s != before.static_rad_s:
+            return False
+        return self.periods_rad == before.periods_rad or self.periods_rad[-1] > COGGING_RAD
 
     def sized(self, motion: Motion, sizes: FloatArray) -> Beside:
         """What they come to; ``sizes`` begins with those of `columns`."""
-        columns, at = self.columns(motion), int(self.fan)
+        columns = self.columns(motion)
         if not columns.shape[1]:
             return NOTHING_BESIDE
-        sizes = sizes[: columns.shape[1]]
-        fan, place = columns[:, :at] @ sizes[:at], columns[:, at:] @ sizes[at:]
+        made = columns * sizes[: columns.shape[1]]
+        at = int(self.fan) + int(self.static_rad_s > 0)
+        # What repeats more than twice in a turn is the motor's own cogging, not the machine's.
+        told = [i for i, period in enumerate(self.periods_rad) if period > COGGING_RAD]
+        place = sum(made[:, at + 2 * i] + made[:, at + 2 * i + 1] for i in told)
         return Beside(
-            float(np.max(np.abs(fan))), 0.5 * float(np.ptp(place)), self.periods_rad, fan + place
+            float(np.max(np.abs(made[:, 0]))) if self.fan else 0.0,
+            0.5 * float(np.ptp(place)),
+            tuple(self.periods_rad[i] for i in told),
+            made.sum(axis=1),
         )
 
     def slopes(self, motion: Motion) -> list[FloatArray]:
@@ -100,8 +123,8 @@ def find_terms(others: FloatArray, torque_nm: FloatArray, motion: Motion, keep: 
 
     The third of ``others`` is the direction of motion, whose size is the Coulomb friction.
     """
-
     largest = float(np.max(np.abs(torque_nm[keep])))
+    fastest = float(np.max(np.abs(motion.velocity_rad_s)))
 
     def fitted(terms: Terms) -> _Fit:
         extra = terms.columns(motion)[keep]
@@ -116,12 +139,13 @@ def find_terms(others: FloatArray, torque_nm: FloatArray, motion: Motion, keep: 
     best = fitted(Terms())
     while True:
         terms = best.terms
-        possible = [] if terms.fan else [Terms(True, terms.periods_rad)]
+        possible = [] if terms.fan else [replace(terms, fan=True)]
+        if not terms.static_rad_s:
+            possible += [replace(terms, static_rad_s=share * fastest) for share in _STATIC]
         if len(terms.periods_rad) < _PLACES:
             known = np.column_stack([others, terms.columns(motion)])
             period = find_period(known, torque_nm, motion.angle_rad, keep, motion.smooth)
-            if period is not None:
-                possible.append(Terms(terms.fan, (*terms.periods_rad, period)))
+            possible.append(replace(terms, periods_rad=(*terms.periods_rad, period)))
         if not possible:
             return terms
         better = min(map(fitted, possible), key=lambda fit: fit.power)
@@ -148,6 +172,8 @@ def _clearly(before: _Fit, after: _Fit, keep: BoolArray) -> bool:
     taken = before.power - after.power
     if taken > _PLAIN * before.power:
         return True
+    if not after.terms.may_hide(before.terms):
+        return False
     freedom = independent_share(after.rest, keep) * float(np.count_nonzero(keep))
     return taken > _SHARE * before.power and taken / 3.0 > _F * after.power / max(freedom, 1.0)
 

@@ -66,6 +66,7 @@ def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) 
             torque_limit_nm=settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm,
             motor_inertia_kgm2=facts.motor_inertia_kgm2,
             valid=recording.valid,
+            position_rad=recording.position_rad if np.any(recording.position_rad) else None,
         )
     except ValueError as error:
         raise NotAllowed(

@@ -64,6 +64,8 @@ class VirtualAxis:
         p[k.P_COUNTS_PER_RAD] = spec.encoder.counts_per_rev / turn
         p[k.P_NOISE] = spec.encoder.noise_counts
         p[k.P_COULOMB] = spec.friction.coulomb_nm
+        p[k.P_STICTION] = max(spec.friction.static_nm - spec.friction.coulomb_nm, 0.0)
+        p[k.P_STRIBECK] = spec.friction.stribeck_rad_s
         p[k.P_GRAVITY] = spec.friction.gravity_nm
         p[k.P_PLACE_NM] = spec.place.torque_nm
         p[k.P_PLACE_PER_RAD] = 1.0 / spec.place.period_rev

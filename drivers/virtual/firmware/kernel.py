@@ -82,8 +82,9 @@ LIMIT_IGNORED, LIMIT_FAULT, LIMIT_HOLDS = range(3)
     P_SHAPE_ON, P_SHAPE_A11, P_SHAPE_A12, P_SHAPE_A21, P_SHAPE_A22, P_SHAPE_B1, P_SHAPE_B2,
     P_QUADRANT_POSITIVE, P_QUADRANT_NEGATIVE, P_QUADRANT_DELAY, P_QUADRANT_FILTER,
     P_QUADRANT_ANGLE, P_PLACE_NM, P_PLACE_PER_RAD, P_PLACE_AT, P_FAN,
-) = range(137)  # fmt: skip
-P_NOTCHES = 137
+    P_STICTION, P_STRIBECK,
+) = range(139)  # fmt: skip
+P_NOTCHES = 139
 """Start of the notches: per notch a1, a2, b1, b2 of (z² + a1·z + a2)/(z² + b1·z + b2)."""
 P_SIZE = P_NOTCHES + 16
 
@@ -624,6 +625,9 @@ def _step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no
                 total += bm[i, 3 + g] * (1.0 if x[gap_state[g]] > 0.0 else -1.0)
         scratch[i] = total
     coulomb = p[P_COULOMB]
+    if p[P_STICTION] > 0.0:
+        slow = x[1] / p[P_STRIBECK]
+        coulomb += p[P_STICTION] * math.exp(-slow * slow)
     if int(p[P_LOOP]) == LOOP_OFF or p[P_BRAKE_CLOSED] > 0.0:
         coulomb += p[P_BRAKE_TORQUE]
     friction = 0.0

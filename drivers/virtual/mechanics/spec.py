@@ -34,14 +34,18 @@ class MotorSpec(_Finite):
 
 
 class FrictionSpec(_Finite):
-    """Friction at the motor shaft, and on the last inertia of the chain a constant torque and one
-    that grows with the square of its speed, as that of a fan, a pump or a stirrer.
+    """Friction at the motor shaft, and torques on the last inertia of the chain.
 
-    The motor holds the load with ``+gravity_nm``: the load itself pulls to negative positions.
+    Friction begins at ``static_nm``, where that is more than ``coulomb_nm``, and falls to it within
+    ``stribeck_rad_s`` (Stribeck's curve). The motor holds the load with ``+gravity_nm``: the load
+    itself pulls to negative positions. ``fan_nms2`` grows with the square of the speed, as the
+    torque of a fan, a pump or a stirrer does.
     """
 
     viscous_nms: float = Field(default=0.0, ge=0)
     coulomb_nm: float = Field(default=0.0, ge=0)
+    static_nm: float = Field(default=0.0, ge=0)
+    stribeck_rad_s: float = Field(default=1.0, gt=0)
     gravity_nm: float = 0.0
     fan_nms2: float = Field(default=0.0, ge=0)
 

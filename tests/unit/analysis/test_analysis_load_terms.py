@@ -109,3 +109,26 @@ def test_friction_that_drives_is_no_answer():
     result = found(2 * MOTOR, driven)
     assert not result.identifiable
     assert "friction comes out negative" in result.verdict
+
+
+@pytest.mark.parametrize("ratio", [1, 10])
+def test_cogging_is_neither_play_nor_the_machine_s(ratio):
+    inertia = MOTOR * (1 + ratio)
+    result = found(inertia, lambda angle, _speed: 0.03 * np.sin(8 * angle))
+    assert result.verdict == "ok"
+    assert result.inertia_kgm2.value == pytest.approx(inertia, rel=0.02)
+    assert result.coulomb_nm.value == pytest.approx(COULOMB, rel=0.10)
+    assert result.beside.place_nm == 0.0
+
+
+@pytest.mark.parametrize("ratio", [1, 10])
+def test_static_friction_is_no_inertia(ratio):
+    def static(_angle, speed):
+        return 0.05 * np.exp(-((speed / 2.0) ** 2)) * np.tanh(speed / 0.05)
+
+    inertia = MOTOR * (1 + ratio)
+    result = found(inertia, static)
+    assert result.verdict == "ok"
+    assert result.inertia_kgm2.value == pytest.approx(inertia, rel=0.02)
+    assert result.coulomb_nm.value == pytest.approx(COULOMB, rel=0.10)
+    assert result.beside.place_nm == result.beside.fan_nm == 0.0

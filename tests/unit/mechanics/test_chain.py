@@ -327,3 +327,15 @@ def test_a_fan_slows_an_axis_down_by_the_square_of_its_speed() -> None:
 def test_a_place_that_no_motor_can_hold_is_refused() -> None:
     with pytest.raises(ValidationError, match="torque_nm 9 of place is more than this motor holds"):
         spec(place=PlaceSpec(torque_nm=9.0))
+
+
+def test_an_axis_breaks_away_at_its_static_friction_and_runs_at_its_coulomb_friction() -> None:
+    friction = FrictionSpec(coulomb_nm=0.03, static_nm=0.08, stribeck_rad_s=1.0)
+    held = axis_with_torque(spec(friction=friction), 0.079)
+    held.run(2000)
+    assert held._x[1] == 0.0
+    axis = axis_with_torque(spec(friction=friction), 0.081)
+    axis.run(4000)
+    before = axis._x[1]
+    axis.run(2000)
+    assert (axis._x[1] - before) / 0.1 == pytest.approx((0.081 - 0.03) / 5e-5, rel=1e-6)
