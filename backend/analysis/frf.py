@@ -19,7 +19,7 @@ from backend.analysis.arrays import (
     neighbour_mean,
     phase_deg,
 )
-from backend.analysis.friction import estimate_coulomb
+from backend.analysis.friction import estimate_coulomb, scatter_left
 from backend.analysis.line_spectra import (
     LineSpectra,
     Quantity,
@@ -60,6 +60,8 @@ class Frf:
     periods_used: int
     periods_dropped: int
     coulomb_nm: float = 0.0
+    scatter_left: float = 1.0
+    """Share of what the realisations differ by that is left without that friction."""
     friction: ComplexArray | None = None
     """By how much the logarithm of each line may be off, all together, by friction; or nothing."""
 
@@ -167,6 +169,7 @@ def estimate_periodic(
         periods_used=s.used,
         periods_dropped=s.dropped,
         coulomb_nm=coulomb_nm,
+        scatter_left=scatter_left(s, path, quantity, coulomb_nm),
         friction=np.asarray(doubt),
     )
 

@@ -61,6 +61,20 @@ def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> fl
     return 0.0
 
 
+def scatter_left(s: LineSpectra, path: SignalPath, quantity: Quantity, coulomb_nm: float) -> float:
+    """Share of the scatter between realisations that is left with this friction taken out.
+
+    It tells which of two ways to know the direction of motion is better; 1 without friction.
+    """
+    if coulomb_nm <= 0.0 or len(s.sent) < 2:
+        return 1.0
+    plain = continuous_input(s, path, quantity)
+    turned = friction_input(s, path, quantity, plain)
+    weight = _torque_weight(s, plain)
+    before = max(_scatter(0.0, s, plain, turned, weight), 1e-300)
+    return _scatter(coulomb_nm, s, plain, turned, weight) / before
+
+
 def _beyond_chance(s: LineSpectra, share: float, left: float) -> bool:
     """Whether friction is there that makes little of the scatter because noise makes the rest.
 

@@ -62,6 +62,8 @@ _UNSURE, _WORTH_A_MODE = 0.25, 80.0
 _HIDDEN, _HIDDEN_SHARE = 0.1, 0.03
 #: Rounds of friction by the balance of torques and mechanics by what that leaves.
 _BALANCES = 2
+#: Realisations are as alike as before up to this multiple of what they differ by.
+_AS_ALIKE = 1.02
 #: What is left of a distortion along one axis of the complex plane, two draws averaged.
 _AVERAGED = 0.5
 #: Path parameters are moved by this much (cycles, logarithm) to see what they do, moved at all
@@ -222,8 +224,13 @@ class _Task:
         return last
 
     def balanced(self, trial: _Trial) -> tuple[_Task, _Trial]:
-        """The same refined with friction as the balance of torques tells it at reversals."""
+        """The same refined with friction as the balance of torques tells it at reversals.
+
+        The round whose friction leaves the realisations most alike: a balance that is off bends
+        friction and damping against each other.
+        """
         task, last = self, trial
+        best = task, last
         lag_s = speed_lag_s(self.records, trial.path)
         motion = trial.fit if self.quantity == "torque_injection" else None
         for n in range(_BALANCES):
@@ -236,7 +243,10 @@ class _Task:
             task = replace(self, records=told)
             anew = n == 0 and _hidden_by_friction(trial)
             last = task.trial(trial.path, None, motion, None if anew else last.solution)
-        return task, last
+            least = best[1].views.velocity.scatter_left
+            if last.views.velocity.scatter_left < _AS_ALIKE * least:
+                best = task, last
+        return best
 
     def with_sure_modes(
         self, trial: _Trial, doubt: Doubt, corner_known: bool

@@ -7,6 +7,7 @@ import pytest
 from drive_sim import TURN, Drive, Mechanics
 from random_axes import ENVELOPE, RATED_NM, Case, errors, facts_of, played
 
+from backend.analysis import identify
 from backend.analysis.fit_problem import CHAIN, Problem, View
 from backend.analysis.frf import Frf
 from backend.analysis.line_spectra import Record, collect
@@ -62,6 +63,24 @@ def test_where_friction_rules_the_lines_are_right_and_their_band_holds(rubbed):
     assert low.magnitude_db < 0.1
     assert low.phase_deg < 0.6
     assert low.covered >= 0.9
+
+
+def test_a_balance_that_leaves_realisations_less_alike_is_not_believed(rubbed, monkeypatch):
+    """Directions some cycles too late take the wrong friction, and damp the mode instead."""
+    case, found, records = rubbed
+
+    def late(given, *_):
+        directions = [np.roll(r.direction(0.0), 6) for r in given]
+        return tuple(replace(r, told_direction=d) for r, d in zip(given, directions, strict=True))
+
+    monkeypatch.setattr(identify, "with_balanced_reversals", late)
+    settings = SweepSettings(ENVELOPE)
+    again = evaluate(records, 1000.0, facts_of(case), settings, "speed", dc=False)
+    assert again.frf.coulomb_nm == pytest.approx(0.1, rel=0.05)
+    low = errors(again.frf, case.mechanics, 5.0, 150.0)
+    assert low.phase_deg < 1.5
+    # The speed tells reversals less well, and the band says so.
+    assert np.median(again.frf.std_deg) > np.median(found.frf.std_deg)
 
 
 def test_speed_and_position_together_leave_no_first_image():
