@@ -23,9 +23,10 @@ from backend.tools import inertia_evaluation, sweep_evaluation
 from backend.tools import step_response as step_tool
 from backend.tools import sweep as sweep_tool
 from backend.tools.axis_facts import AxisFacts, read_facts
+from backend.tools.go_back import go_back
 from backend.tools.interrupted import ends_all
 from backend.tools.probe import holding_torque
-from backend.tools.recording import cycle_s
+from backend.tools.recording import cycle_s, quiet
 from backend.tools.temporary import stopping_hard, temporary
 from backend.tools.tune_apply import part
 from backend.tools.tune_candidates import (
@@ -124,6 +125,7 @@ async def _tuned(
     progress: Progress, keep: Keep | None, time_left: TimeLeft,
 ) -> AutotuneResult:  # fmt: skip
     """Everything that moves."""
+    home = await axis.position_raw()
     gains = await _steady_gains(axis, session, facts)
     try:
         found = await _measured(axis, session, settings, facts, gains, progress, keep)
@@ -133,7 +135,7 @@ async def _tuned(
             raise
         # It stood still, but its own gains answer a motion with all the torque there is.
         gains = _soft_gains(axis, facts)
-        found = await _measured(axis, session, settings, facts, gains, progress, keep)
+        found = await _measured(axis, session, settings, facts, gains, progress, keep, home)
     facts = sweep_evaluation.completed(facts, found.mechanics)
     progress(0.6, "4 of 6: notches and gains")
     found = _with(found, await _design(axis, session, settings, facts, found))
@@ -144,10 +146,16 @@ async def _tuned(
 
 async def _measured(
     axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
-    gains: dict[str, int], progress: Progress, keep: Keep | None,
+    gains: dict[str, int], progress: Progress, keep: Keep | None, begun_raw: int | None = None,
 ) -> AutotuneResult:  # fmt: skip
-    """Inertia, frequency response and what the notches do, with these gains meanwhile."""
+    """Inertia, frequency response and what the notches do, with these gains meanwhile.
+
+    ``begun_raw`` is where it stood before something ended it elsewhere: travel counts from there.
+    """
     async with temporary(axis, gains):
+        if begun_raw is not None:
+            await quiet(axis)
+            await go_back(axis, session, begun_raw, settings.envelope, facts)
         outcome = await inertia_tool.inertia(
             axis, session,
             inertia_evaluation.InertiaSettings(
@@ -289,6 +297,7 @@ async def apply_and_verify(
     check = Check(
         settings.envelope, facts, inertia, found.mechanics.hold, settings.rated_torque_nm,
         settings.motor_inertia_kgm2, found.inertia.result.coulomb_nm.value,
+        await axis.position_raw(),
     )  # fmt: skip
     promised = goals_for(found.load, settings.mark)
     clock = time_left or TimeLeft()

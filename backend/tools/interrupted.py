@@ -88,4 +88,7 @@ def raise_if_ended(axis: Axis, session: CyclicSession) -> None:
             )  # fmt: skip
         raise Interrupted(f"{name}: {reason}", drive=name, remedy=_LOOK)
     if not session.running:
-        raise LinkLost("the cyclic exchange ended during the measurement")
+        raise LinkLost(
+            f"{name}: the cyclic exchange ended during the measurement", drive=name,
+            remedy="look at the cable and at the drive's supply",
+        )  # fmt: skip

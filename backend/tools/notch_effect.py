@@ -27,6 +27,7 @@ from backend.jobs import Progress
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.go_back import go_back
+from backend.tools.interrupted import too_fast
 from backend.tools.notch import plan_notches
 from backend.tools.notch_meaning import NotchMeaning
 from backend.tools.recording import (
@@ -36,6 +37,7 @@ from backend.tools.recording import (
     cycle_s,
     enabled,
     play,
+    quiet,
     require_signals,
     share,
 )
@@ -50,6 +52,8 @@ _PLACE, _LOWEST_HZ, _HIGHEST_HZ = 0.12, 55.0, 400.0
 #: Widths in shares of the centre (Hz), or level pairs (width, depth).
 _WIDTHS = (0.5, 0.2)
 _SHARE_OF_TORQUE = 0.35
+#: What was too fast for the envelope is played with so much less torque and speed.
+_SLOWER = 0.7
 #: A trial that lost samples is made again, so many times in all.
 ATTEMPTS = 3
 #: Share of the travel within which the next trial may begin.
@@ -96,10 +100,14 @@ async def measure_meaning(
         NotAllowed: the axis cannot be measured so, or the notch does nothing that can be seen.
     """
     require_signals(axis, session, Mode.CST, False)
-    sequence = await asyncio.to_thread(
-        _sequence, 1.0 / cycle_s(session), envelope, facts, rigid, still
-    )
-    free = _Free(axis, session, envelope, facts, path, sequence, await axis.position_raw())
+    rate = 1.0 / cycle_s(session)
+
+    def designed(attempt: int) -> excite.Sequence:
+        return _sequence(rate, envelope, facts, rigid, still, _SLOWER**attempt)
+
+    sequence = await asyncio.to_thread(designed, 0)
+    home = await axis.position_raw()
+    free = _Free(axis, session, envelope, facts, path, sequence, home, designed)
     near_rev = 0.0 if still else _NEAR * envelope.travel_rev
     return await tried_with(free, axis, session, envelope, facts, progress, near_rev)
 
@@ -203,18 +211,26 @@ def _raw(slot: NotchSlot, centre: int, trial: _Trial) -> dict[str, int]:
 
 
 def _sequence(
-    rate: float, envelope: Envelope, facts: AxisFacts, rigid: excite.Rigid, still: bool
-) -> excite.Sequence:
-    """The excitation of a frequency response, one realisation of it."""
+    rate: float, envelope: Envelope, facts: AxisFacts, rigid: excite.Rigid, still: bool,
+    part: float = 1.0,
+) -> excite.Sequence:  # fmt: skip
+    """The excitation of a frequency response, one realisation, or ``part`` of its size."""
     rated = facts.rated_torque_nm
     room = excite.Room(
-        envelope.torque_percent / 100.0 * rated, envelope.speed_rpm * _TURN / 60.0,
+        envelope.torque_percent / 100.0 * rated, part * envelope.speed_rpm * _TURN / 60.0,
         envelope.travel_rev * _TURN,
     )  # fmt: skip
     band = excite.band_for(rate, _STILL_FROM_HZ if still else 5.0, None)
     try:
         made = excite.torque_mode(
-            rate, band, room, rigid, 0.0, share=_SHARE_OF_TORQUE, realisations=1, base=not still
+            rate,
+            band,
+            room,
+            rigid,
+            0.0,
+            share=part * _SHARE_OF_TORQUE,
+            realisations=1,
+            base=not still,
         )
     except ValueError as error:
         raise NotAllowed(
@@ -250,11 +266,26 @@ class _Free:
     path: SignalPath
     sequence: excite.Sequence
     home: int
+    smaller: Callable[[int], excite.Sequence] | None = None
+    """The sequence after so many that were too fast; nothing where there is one alone."""
     _plain: ComplexArray | None = None
     _sign: int = 1
 
     async def plain(self, told: Callable[[float], None]) -> float:
-        self._plain = await self._torque(told)
+        """How fast the axis becomes depends on how its load swings: smaller where too fast."""
+        for attempt in range(1, ATTEMPTS + 1):
+            try:
+                self._plain = await self._torque(told)
+                break
+            except NotAllowed as error:
+                if self.smaller is None or attempt == ATTEMPTS or not too_fast(error):
+                    raise
+                try:
+                    self.sequence = await asyncio.to_thread(self.smaller, attempt)
+                except NotAllowed:
+                    raise error from None
+            await quiet(self.axis)
+            await go_back(self.axis, self.session, self.home, self.envelope, self.facts)
         return 0.0
 
     async def notched(self, told: Callable[[float], None]) -> NotchEffect:

@@ -278,7 +278,8 @@ async def _drive_through(
             return False
         if time.monotonic() > deadline:
             raise LinkLost(
-                f"only {arrived} of {count} samples came back from the bus",
+                f"{axis.drive.name}: only {arrived} of {count} samples came back from the bus",
+                drive=axis.drive.name,
                 remedy="look at the link quality; the computer or the bus is overloaded",
             )
         await asyncio.sleep(_RENEW_S)

@@ -11,11 +11,12 @@ from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.tools import excite, inertia_evaluation, notch_effect, sweep_evaluation
 from backend.tools.axis_facts import AxisFacts
+from backend.tools.go_back import go_back
 from backend.tools.interrupted import ends_all
 from backend.tools.notch_in_loop import measure_meaning_in_loop
 from backend.tools.notch_meaning import NotchMeaning, meaning_of, remember
 from backend.tools.probe import PULLED
-from backend.tools.recording import cycle_s
+from backend.tools.recording import cycle_s, quiet
 from drivers.errors import NotAllowed
 
 #: A resonance that rises by less bounds no gain.
@@ -47,6 +48,7 @@ async def learn_notches(
     if mechanics.model is None:
         return ""
     found = outcome.result
+    home = await axis.position_raw()
     held = abs(found.gravity_nm.value) > PULLED * facts.rated_torque_nm
     try:
         if held or how.loop not in ("auto", "none"):
@@ -59,6 +61,9 @@ async def learn_notches(
     except NotAllowed as error:
         if await ends_all(axis, error):
             raise
+        # It was stopped somewhere; travel counts from where the tuning began.
+        await quiet(axis)
+        await go_back(axis, session, home, how.envelope, facts)
         return f"designed without notches: {error.message}"
     remember(axis.drive, meaning)
     return ""

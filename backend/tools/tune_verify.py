@@ -20,7 +20,9 @@ from backend.tools import step_response as step_tool
 from backend.tools import sweep as sweep_tool
 from backend.tools import sweep_evaluation
 from backend.tools.axis_facts import AxisFacts
+from backend.tools.go_back import go_back
 from backend.tools.probe import holding_torque
+from backend.tools.recording import quiet
 from backend.tools.tune_time import TimeLeft
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
@@ -72,6 +74,8 @@ class Check:
     rated_torque_nm: float | None
     motor_inertia_kgm2: float | None
     coulomb_nm: float | None = None
+    home_raw: int | None = None
+    """Where each verification begins, whatever ended the one before."""
 
 
 async def verify(
@@ -90,6 +94,9 @@ async def verify(
     standing, measuring, stepping = told
     standing(0.0, "")
     await holding_torque(axis, session, check.facts)
+    if check.home_raw is not None:
+        await quiet(axis)
+        await go_back(axis, session, check.home_raw, check.envelope, check.facts)
     settings = sweep_evaluation.SweepSettings(
         check.envelope, kind="speed_loop", realisations=1,
         inertia_kgm2=check.inertia_kgm2, hold=check.hold,

@@ -45,6 +45,9 @@ class Axis:
     async def state(self) -> State:
         return State.SWITCH_ON_DISABLED
 
+    async def position_raw(self) -> int:
+        return 4711
+
 
 async def tried_on(
     monkeypatch: pytest.MonkeyPatch, end: DriveError
@@ -120,6 +123,15 @@ async def test_tuning_goes_on_without_notches_only_where_the_axis_kept_them_back
     async def learn(*_: Any) -> None:
         raise end
 
+    gone: list[int] = []
+
+    async def stands(_axis: Any) -> None: ...
+
+    async def go_back(_axis: Any, _session: Any, goal: int, *_: Any) -> None:
+        gone.append(goal)
+
+    monkeypatch.setattr(tune_notches, "quiet", stands)
+    monkeypatch.setattr(tune_notches, "go_back", go_back)
     monkeypatch.setattr(tune_notches, "_learn_free", learn)
     monkeypatch.setattr(tune_notches, "meaning_of", lambda _drive: None)
     monkeypatch.setattr("backend.tools.notch_effect.unknown", lambda _drive: True)
@@ -128,7 +140,7 @@ async def test_tuning_goes_on_without_notches_only_where_the_axis_kept_them_back
     found: Any = SimpleNamespace(
         result=SimpleNamespace(gravity_nm=SimpleNamespace(value=0.0))
     )  # fmt: skip
-    how: Any = SimpleNamespace(loop="auto")
+    how: Any = SimpleNamespace(loop="auto", envelope=None)
     facts: Any = SimpleNamespace(rated_torque_nm=1.27)
     nothing: Any = None
     learned = tune_notches.learn_notches(
@@ -136,9 +148,11 @@ async def test_tuning_goes_on_without_notches_only_where_the_axis_kept_them_back
     )
     if end is TOO_FAR:
         assert "beyond the limit" in await learned
+        assert gone == [4711], "travel counts from there"
         return
     with pytest.raises(Interrupted):
         await learned
+    assert not gone
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,117 @@
+"""What ends a part of a tuning and is survived leaves the axis elsewhere; the next begins at home.
+
+Travel counts from where the tuning began, however many parts were stopped by their envelope. And
+what was too fast for it when notches are learned on a free axis is tried with less.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from backend.tools import autotune as tuning
+from backend.tools import excite, notch_effect, tune_notches, tune_verify
+from backend.tools.autotune import AutotuneSettings, autotune
+from backend.tools.axis_facts import read_facts
+from backend.tools.go_back import go_back
+from backend.tools.sweep import sweep
+from backend.tools.sweep_evaluation import SweepSettings, completed
+from drivers.cia402 import State
+from drivers.errors import NotAllowed
+from tests.virtual.tools.direct import DirectBench, direct
+from tests.virtual.tools.rig import WIDE, mechanics, silent
+from tests.virtual.tools.test_measured_again import SWINGING
+
+ONE = mechanics((1e-4, 60.0, 0.006))
+TOO_FAST = "X: speed 9 is beyond the limit of 8: the axis is braked and disabled"
+
+
+class Ended(Exception):
+    """The part that is looked at begins."""
+
+
+class Away:
+    """A part of a tuning that is ended a turn from where it began, and the next one."""
+
+    def __init__(self, b: DirectBench, message: str = TOO_FAST) -> None:
+        self._b, self._message = b, message
+        self.begun_rev: list[float] = []
+
+    async def part(self, *_: object, **__: object) -> Any:
+        axis = self._b.axis
+        units = await axis.units()
+        self.begun_rev.append(units.position(await axis.position_raw()))
+        if len(self.begun_rev) > 1:
+            raise Ended
+        there = await axis.position_raw() + units.position_raw(1.0)
+        await go_back(axis, self._b.session, there, WIDE, await read_facts(axis))
+        raise NotAllowed(self._message)
+
+
+async def test_after_a_notch_that_could_not_be_learned(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with direct(ONE, drive="r6l") as b:
+        away = Away(b)
+        monkeypatch.setattr(notch_effect, "measure_meaning", away.part)
+        monkeypatch.setattr(notch_effect, "path_of", lambda *_: None)
+        value = SimpleNamespace(value=0.0)
+        outcome: Any = SimpleNamespace(
+            ends_rev=None,
+            result=SimpleNamespace(gravity_nm=value, inertia_kgm2=value, coulomb_nm=value),
+        )
+        found: Any = SimpleNamespace(
+            resonances=[SimpleNamespace(kind="resonance")], model="one", hold=None, delay_s=0.0
+        )
+        how = tune_notches.Learning(WIDE, "auto", "free")
+        facts = await read_facts(b.axis)
+        home = await b.axis.position_raw()
+        said = await tune_notches.learn_notches(
+            b.axis, b.session, how, facts, outcome, found, silent()
+        )
+        units = await b.axis.units()
+        assert "beyond the limit" in said
+        assert len(away.begun_rev) == 1
+        assert abs(units.position(await b.axis.position_raw() - home)) < 0.05
+        assert await b.axis.state() is not State.OPERATION_ENABLED
+
+
+async def test_after_a_design_that_was_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with direct(ONE, drive="r6l") as b:
+        away = Away(b)
+        monkeypatch.setattr(tune_verify.sweep_tool, "sweep", away.part)
+        facts, home = await read_facts(b.axis), await b.axis.position_raw()
+        check = tune_verify.Check(WIDE, facts, 1.5e-4, None, None, None, 0.03, home)
+        told, none = (silent(), silent(), silent()), cast(Any, None)
+        for ended in (NotAllowed, Ended):
+            with pytest.raises(ended):
+                await tune_verify.verify(b.axis, b.session, check, none, none, told, None)
+        assert away.begun_rev[1] == pytest.approx(away.begun_rev[0], abs=0.05)
+
+
+async def test_after_gains_that_took_all_the_torque(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with direct(ONE, drive="r6l") as b:
+        away = Away(b, "X: torque 9 is beyond the limit of 8: the axis is braked and disabled")
+        monkeypatch.setattr(tuning.inertia_tool, "inertia", away.part)
+        settings = AutotuneSettings(WIDE, motor_inertia_kgm2=5e-5)
+        with pytest.raises(Ended):
+            await autotune(b.axis, b.session, settings, silent())
+        assert away.begun_rev[1] == pytest.approx(away.begun_rev[0], abs=0.05)
+
+
+async def test_notches_of_a_free_axis_that_becomes_too_fast_are_learned_with_less() -> None:
+    async with direct(SWINGING, drive="r6l") as b:
+        found = await sweep(b.axis, b.session, SweepSettings(WIDE, realisations=1), silent())
+        facts = completed(await read_facts(b.axis), found)
+        path = notch_effect.path_of(found.frf.sample_rate_hz, facts, found.hold, found.delay_s)
+        rigid = excite.Rigid(SWINGING.total_inertia_kgm2, SWINGING.friction.coulomb_nm)
+        units, home = await b.axis.units(), await b.axis.position_raw()
+        b.link.highest["speed"] = 0.0
+        meaning = await notch_effect.measure_meaning(
+            b.axis, b.session, WIDE, facts, rigid, path, silent()
+        )
+        assert units.velocity(b.link.highest["speed"]) > WIDE.speed_rpm, "else it shows nothing"
+        assert abs(units.position(await b.axis.position_raw() - home)) < 0.05
+    assert meaning.levels is not None
+    for level, share in meaning.levels.width_ratio:
+        assert share == pytest.approx(level / 20.0, rel=0.08)
