@@ -159,6 +159,26 @@ class Drive:
             return None
         return parameter.key
 
+    @property
+    def modes_key(self) -> str | None:
+        """Where the drive tells its modes, if its profile does not know them.
+
+        Only a profile that stands for many drives does not: manuals print 6502h with wrong bits
+        (002:14076).
+        """
+        return self.key("supported_modes") if self.profile.partial else None
+
+    @property
+    def modes(self) -> tuple[int, ...]:
+        """Modes of operation: the profile's, without those that the drive itself says it lacks."""
+        modes = self.profile.supported_modes
+        reading = self.readings.get(self.modes_key or "")
+        told = reading.raw if reading is not None else None
+        if not isinstance(told, int):
+            return modes
+        lacks = {mode for mode, bit in cia402.SUPPORTED_MODE_BIT.items() if not told >> bit & 1}
+        return tuple(mode for mode in modes if mode not in lacks) or modes
+
     def require(self, role: str) -> str:
         """Like `key`, for a role that cannot be done without.
 

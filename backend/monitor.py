@@ -176,6 +176,8 @@ class Monitor:
         wanted = [drive.require("status_word")]
         wanted += [key for role in _SHOWN_ROLES if (key := drive.key(role))]
         wanted += fault_keys(drive)
+        if drive.modes_key is not None and drive.modes_key not in drive.readings:
+            wanted.append(drive.modes_key)
         self._last = await drive.read_many(dict.fromkeys(wanted))
         self._last_causes, self._waiting = [], list(drive.pending)
         if self._state() is not State.OPERATION_ENABLED:

@@ -240,7 +240,7 @@ class PowerState:
             NotAllowed: the family or the drive does not have this mode.
         """
         drive = self.drive
-        if int(mode) not in drive.profile.supported_modes:
+        if int(mode) not in drive.modes:
             raise NotAllowed(
                 f"{drive.name}: {drive.profile.title} has no {cia402.MODE_NAMES[mode]} mode",
                 drive=drive.name,

@@ -156,7 +156,7 @@ def axis_state(bench: Bench, member: Member, now: Snapshot) -> models.AxisState:
         status_word=now.status_word,
         mode=now.mode,
         mode_name=name,
-        modes=list(member.drive.profile.supported_modes),
+        modes=list(member.drive.modes),
         goals=[goal.value for goal in cia402.allowed_goals(now.state)] if now.fresh else [],
         target_reached=now.target_reached,
         internal_limit=now.internal_limit,

@@ -100,7 +100,7 @@ def _mode(member: Member, number: int) -> Mode:
             f"{member.drive.name} has no mode {number}",
             drive=member.drive.name,
             value=number,
-            limit=", ".join(str(mode) for mode in member.drive.profile.supported_modes),
+            limit=", ".join(str(mode) for mode in member.drive.modes),
             remedy="choose one of its modes",
         ) from error
 

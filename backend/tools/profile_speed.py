@@ -46,7 +46,7 @@ _WHOLE_RANGE = 2**31
 
 def needed(drive: Drive, link: Link) -> bool:
     """Whether this drive takes speeds with every cycle only in Profile velocity."""
-    modes = set(drive.profile.supported_modes)
+    modes = set(drive.modes)
     target = drive.profile.by_role.get("velocity_target")
     mapped = target is not None and target.pdo in ("rx", "rxtx")
     only_profile = Mode.PV in modes and not modes & {Mode.CSP, Mode.CSV, Mode.CST}
