@@ -252,6 +252,12 @@ def _watch_outputs() -> Steps[int]:
     return watching
 
 
+_NOT_MOVED = (
+    "it can be read and written, but not moved through cyclic data;"
+    " its maker has an EEPROM file for it"
+)
+
+
 class FoundInPart(ProtocolError):
     """The EEPROM tells what the search did not learn: one of its frames was lost or late."""
 
@@ -273,7 +279,14 @@ def check_places(station: Station, setup: StationSetup, clock: Callable[[], floa
         placed += bool(active and length and start >= _PROCESS_MEMORY)
     needed = bool(setup.rx.size) + bool(setup.tx.size)
     if placed < needed:
-        if (yield from sii.process_data_places(clock)) >= needed:
+        told, within_reach = yield from sii.process_data_places(clock)
+        if told >= needed and not within_reach:
+            raise NotAllowed(
+                f"station {station.number}: its EEPROM tells where its process data are only behind"
+                " 4096 bytes of other things, which is farther than the search reads",
+                remedy=_NOT_MOVED,
+            )
+        if told >= needed:
             raise FoundInPart(
                 f"station {station.number} was found only in part: its EEPROM tells where its"
                 " process data are, but the search missed it",
@@ -281,8 +294,7 @@ def check_places(station: Station, setup: StationSetup, clock: Callable[[], floa
             )
         raise NotAllowed(
             f"station {station.number}: its EEPROM does not tell where its process data are",
-            remedy="it can be read and written, but not moved through cyclic data;"
-            " its maker has an EEPROM file for it",
+            remedy=_NOT_MOVED,
         )
 
 

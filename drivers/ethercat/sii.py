@@ -24,6 +24,8 @@ CONFIG_WORDS = 7
 _CATEGORIES_WORD, _SYNC_MANAGERS, _LAST = 0x0040, 41, 0xFFFF
 """Type and length in words head every category (ETG.1000.6 table 19 and 5.4)."""
 _MOST_CATEGORIES = 64
+_SOEM_BYTES = 4096
+"""SOEM takes every byte behind these for the end of the EEPROM (its EC_MAXEEPBUF)."""
 
 _OWNER, _CONTROL, _DATA = 0x500, 0x502, 0x508
 _READ, _WRITE, _ENABLE_WRITE = 0x0100, 0x0200, 0x0001
@@ -128,10 +130,11 @@ def has_mailbox(clock: Callable[[], float]) -> Steps[bool]:
     return not blank and min(out_size, in_size) >= _LEAST_MAILBOX and protocols != 0
 
 
-def process_data_places(clock: Callable[[], float]) -> Steps[int]:
+def process_data_places(clock: Callable[[], float]) -> Steps[tuple[int, bool]]:
     """How many sync managers beyond the mailboxes the EEPROM puts into the process memory.
 
-    0 where it has no such category. Errors as `read`.
+    0 where it has no such category. The second value tells whether it stands where SOEM reads.
+    Errors as `read`.
     """
     word = _CATEGORIES_WORD
     for _ in range(_MOST_CATEGORIES):
@@ -142,9 +145,9 @@ def process_data_places(clock: Callable[[], float]) -> Steps[int]:
             managers = yield from read(word + 2, words, clock)
             # Each has eight bytes; the first two are where it begins.
             starts = [start for start, _ in struct.iter_unpack("<H6s", managers[: words // 4 * 8])]
-            return sum(start >= _RAM for start in starts[2:])
+            return sum(start >= _RAM for start in starts[2:]), 2 * (word + 2 + words) <= _SOEM_BYTES
         word += 2 + words
-    return 0
+    return 0, True
 
 
 def _take(clock: Callable[[], float]) -> Steps[None]:

@@ -17,13 +17,15 @@ from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, NotAllowed, Rejected
 from drivers.ethercat.information import EntryDescription, ObjectInfo
 from drivers.ethercat.link import EthercatLink
+from drivers.ethercat.mapping import Entry, Pdo
+from drivers.ethercat.setup import FoundInPart, StationSetup, check_places
 from drivers.ethercat.station import Station, identify
-from drivers.ethercat.steps import Read, Write
+from drivers.ethercat.steps import Read, Steps, Write
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
 from drivers.virtual.wires.netns import Namespace
 from profiles.schema import PdoSet, PdoSpec, Profile
 from tests.wire.ethercat_host.conftest import Bus, until
-from tests.wire.ethercat_host.plain_slaves import LONG, Coupler, Servo, Slave
+from tests.wire.ethercat_host.plain_slaves import LONG, Coupler, Servo, Slave, category
 from tests.wire.ethercat_host.servo_device import servo_profile
 
 HERE = Path(__file__).parent
@@ -162,11 +164,8 @@ async def test_a_drive_with_a_bare_eeprom_is_read_whole_and_moved_by_nobody(bus:
         await bus.link.close()
 
 
-@pytest.mark.parametrize(("slave", "badly"), [(Servo(), True), (Coupler(), False)])
-def test_a_mailbox_that_a_search_missed_is_told_from_none_at_all(slave: Slave, badly: bool) -> None:
-    """Frames with its EEPROM were lost, so its sync managers were never set up."""
-    station = Station(1)
-    steps = identify(station, time.monotonic)
+def answered(steps: Steps[None], slave: Slave) -> None:
+    """Run a transaction with this slave."""
     reply: bytes | None = None
     with contextlib.suppress(StopIteration):
         while True:
@@ -177,6 +176,31 @@ def test_a_mailbox_that_a_search_missed_is_told_from_none_at_all(slave: Slave, b
                 reply = b"" if slave.write(step.register, step.data) else None
             else:
                 reply = b""
+
+
+@pytest.mark.parametrize(("slave", "badly"), [(Servo(), True), (Coupler(), False)])
+def test_a_mailbox_that_a_search_missed_is_told_from_none_at_all(slave: Slave, badly: bool) -> None:
+    """Frames with its EEPROM were lost, so its sync managers were never set up."""
+    station = Station(1)
+    answered(identify(station, time.monotonic), slave)
     assert station.badly_found is badly
     with pytest.raises(LinkLost if badly else NotAllowed, match="in part" if badly else "mailbox"):
         _ = station.box
+
+
+@pytest.mark.parametrize(("filling", "says"), [(0, "in part"), (4200, "behind 4096 bytes")])
+def test_sync_managers_too_far_back_in_the_eeprom_are_told_as_such(filling: int, says: str) -> None:
+    """SOEM reads 4096 bytes of an EEPROM: to search again would not help."""
+
+    class Wordy(Servo):
+        body = category(10, bytes(filling)) + Servo.body
+
+    setup = StationSetup(
+        rx=Pdo(0x1600, (Entry(0x6040, 0, 2, "H"),), write=False),
+        tx=Pdo(0x1A00, (Entry(0x6041, 0, 2, "H"),), write=False),
+        cycle_ns=1_000_000, dc=False, watchdog_ms=50.0,
+    )  # fmt: skip
+    steps = check_places(Station(1), setup, time.monotonic)
+    with pytest.raises(DriveError, match=says) as told:
+        answered(steps, Wordy())
+    assert isinstance(told.value, FoundInPart) is (filling == 0)
