@@ -41,6 +41,9 @@ USUAL_CORNER, _CORNER_SPREAD = float(np.log(2000.0)), 1.0
 _USUAL_ZERO = 0.1
 #: Couplings have about this damping ratio, within a factor of e² (one standard deviation).
 USUAL_DAMPING, _DAMPING_SPREAD = 0.03, 2.0
+#: What moves told of the whole inertia holds for the response to this share at best (one
+#: deviation), as one is told by the reported torque and the other by the commanded.
+_INERTIA_ALIKE = 0.03
 #: Lines with a larger relative deviation take no part.
 _NOISE = 0.3
 #: Residuals beyond this count linearly.
@@ -88,6 +91,14 @@ class View:
 
 
 @dataclass(frozen=True)
+class KnownInertia:
+    """The whole axis' inertia as moves have told it, and its relative standard deviation."""
+
+    kgm2: float
+    deviation: float = 0.0
+
+
+@dataclass(frozen=True)
 class Form:
     """A way to write mechanics down in parameters: what they mean, their bounds and habits."""
 
@@ -96,6 +107,8 @@ class Form:
     bounds: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
     prior: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
     """What is usual: rows that ought to be near zero, and their slopes [rows, parameters]."""
+    inertia: Callable[[FloatArray], tuple[float, FloatArray]]
+    """Logarithm of the whole inertia (kg·m²), and its slopes [parameters]."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +135,8 @@ class Problem:
     """Whether the drive's speed filter is unknown."""
     anchor: FloatArray | None = None
     """Delays and filter that a search stays near to as long as mechanics are missing."""
+    inertia: KnownInertia | None = None
+    """Where friction hides the lowest lines, nothing else may say anything of it."""
 
     @cached_property
     def _frequencies(self) -> FloatArray:
@@ -168,7 +183,7 @@ class Problem:
     def _rows(self, x: FloatArray, values: list[ComplexArray]) -> FloatArray:
         rows = [v * view.weight for v, view in zip(values, self.views, strict=True)]
         path = [*(x[2:4] * self.period_s / _USUAL_DELAY_S), (x[4] - USUAL_CORNER) / _CORNER_SPREAD]
-        usual = [np.array(path), self.form.prior(x)[0]]
+        usual = [np.array(path), self.form.prior(x)[0], self._known(x)[0]]
         return np.concatenate([p for e in rows for p in (e.real, e.imag)] + usual)
 
     def _slopes(self, x: FloatArray, gradients: list[ComplexArray]) -> FloatArray:
@@ -176,8 +191,17 @@ class Problem:
         path = np.zeros((3, x.size))
         path[0, 2] = path[1, 3] = self.period_s / _USUAL_DELAY_S
         path[2, 4] = 1.0 / _CORNER_SPREAD
-        usual = [path, self.form.prior(x)[1]]
+        usual = [path, self.form.prior(x)[1], self._known(x)[1]]
         return np.concatenate([p.T for e in rows for p in (e.real, e.imag)] + usual)
+
+    def _known(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """How far the whole inertia is from what is known of it [0 or 1], and its slopes."""
+        if self.inertia is None:
+            return np.zeros(0), np.zeros((0, x.size))
+        value, slopes = self.form.inertia(x)
+        known = float(np.hypot(self.inertia.deviation, _INERTIA_ALIKE))
+        apart = (value - np.log(self.inertia.kgm2)) / known
+        return np.array([apart]), np.asarray(slopes[None, :] / known)
 
     def with_views(self, views: tuple[View, ...]) -> Problem:
         """The same with other views."""
@@ -290,8 +314,25 @@ def _chain_prior_slopes(size: int) -> FloatArray:
     return slopes
 
 
-CHAIN = Form(chain_response_and_slopes, model_of_chain, _chain_bounds, _chain_prior)
-MODAL = Form(response_and_slopes, model_of, _modal_bounds, _modal_prior)
+def _chain_inertia(x: FloatArray) -> tuple[float, FloatArray]:
+    """That of the motor and of all loads."""
+    parts = np.exp(np.concatenate([x[:1], x[RIGID_PARAMETERS::LOAD_PARAMETERS]]))
+    whole = float(np.sum(parts))
+    slopes = np.zeros(x.size)
+    slopes[0] = parts[0] / whole
+    slopes[RIGID_PARAMETERS::LOAD_PARAMETERS] = parts[1:] / whole
+    return float(np.log(whole)), slopes
+
+
+def _modal_inertia(x: FloatArray) -> tuple[float, FloatArray]:
+    """That of the rigid part, whose gain is its inverse."""
+    slopes = np.zeros(x.size)
+    slopes[0] = -1.0
+    return -float(x[0]), slopes
+
+
+CHAIN = Form(chain_response_and_slopes, model_of_chain, _chain_bounds, _chain_prior, _chain_inertia)
+MODAL = Form(response_and_slopes, model_of, _modal_bounds, _modal_prior, _modal_inertia)
 
 
 def best_view(views: Sequence[View]) -> View:

@@ -17,6 +17,7 @@ from backend.analysis.arrays import ComplexArray
 from backend.analysis.distortion import Distortion, distortion
 from backend.analysis.doubt import Doubt, Shifted
 from backend.analysis.doubt import doubt as joint_doubt
+from backend.analysis.fit_problem import KnownInertia
 from backend.analysis.frf import Frf, estimate_periodic
 from backend.analysis.line_spectra import Quantity, Record, loop_spectra, speed_lag_s
 from backend.analysis.loop_fit import fit_loop
@@ -118,17 +119,19 @@ def identify_mechanics(
 
 
 def identify_with_path(
-    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, *, hold_known: bool
-) -> Identification:
+    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, *, hold_known: bool,
+    inertia: KnownInertia | None = None,
+) -> Identification:  # fmt: skip
     """As `identify_mechanics`, with what ``path`` does not tell found from the recording.
 
     The torque alone cannot always tell whether set-points are interpolated; the motion can: a
     wrong answer leaves a delay that is negative, or a roll-off that no mechanics have. Beside a
-    closed loop, path and mechanics need each other, and are refined in turn.
+    closed loop, path and mechanics need each other, and are refined in turn. ``inertia`` is the
+    whole axis', where moves have told it.
     """
     closed = quantity == "torque_injection"
     corner_known = path.current_bandwidth_hz is not None
-    task = _Task(settled(records), quantity)
+    task = _Task(settled(records), quantity, inertia=inertia)
     paths = find_paths(task.records, path, loop_closed=closed, hold_known=hold_known)
     trials = task.trials(paths)
     best = trials[0]
@@ -173,6 +176,7 @@ class _Task:
     quantity: Quantity
     max_modes: int = 4
     jitter_s: float = 0.0
+    inertia: KnownInertia | None = None
 
     def trial(
         self, path: SignalPath, coulomb_nm: float | None = None, motion: SampledFit | None = None,
@@ -184,7 +188,7 @@ class _Task:
         views = self.views(path, coulomb_nm)
         solution = fit_sampled_model(
             views.velocity, path, from_position=views.position, loop=self._loop(path, motion),
-            max_modes=self.max_modes, start=start,
+            max_modes=self.max_modes, start=start, inertia=self.inertia,
         )  # fmt: skip
         return _Trial(views, path, solution)
 

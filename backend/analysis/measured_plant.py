@@ -17,6 +17,9 @@ DAMPING_FACTORS = (0.6, 1.0, 1.4)
 #: A mode is known a little way beyond the highest line. The factor of frequency counts twice up to
 #: here, and four times above, where a mode stands for whatever is stiffer than what was measured.
 BEYOND = 1.25
+#: A line that is known to this (one deviation of its logarithm) tells as much as the model there:
+#: so much does a mode that is off by a per cent turn the lines beside it.
+_AS_THE_MODEL = np.radians(10.0)
 
 
 @dataclass(frozen=True)
@@ -60,9 +63,12 @@ class MeasuredPlant:
 
 def measured_plant(
     frf: Frf, model: MechanicalModel, *, highest_hz: float = 6000.0, lines: int = 400,
-    variants: tuple[MechanicalModel, ...] = (),
+    variants: tuple[MechanicalModel, ...] = (), fitted: bool = True,
 ) -> MeasuredPlant:  # fmt: skip
     """Join a corrected measurement with its model.
+
+    A model that is ``fitted`` to all lines counts beside each of them by how exactly that line is
+    known: one that friction or noise hides would else decide a design by its error.
 
     The ratio measurement/model is smooth, so it may be interpolated between lines where the
     response itself may not; outside the measured band it fades to 1 within a third of an octave.
@@ -77,8 +83,20 @@ def measured_plant(
         flat = np.ones(dense.size, dtype=np.complex128)
         return MeasuredPlant(dense, flat, model, 0.0, variants)
     log_ratio = np.log(frf.response[use] / model.response(f))
+    if fitted:
+        log_ratio = log_ratio * _own_share(frf)[use]
     fade_f = np.concatenate([[f[0] / 1.26], f, [f[-1] * 1.26]])
     fade = np.concatenate([[0.0], log_ratio, [0.0]])
     x, xp = np.log(dense), np.log(fade_f)
     joined = np.interp(x, xp, fade.real) + 1j * np.interp(x, xp, fade.imag)
     return MeasuredPlant(dense, np.exp(joined), model, float(f[-1]), variants)
+
+
+def _own_share(frf: Frf) -> FloatArray:
+    """What a line says against a model of all lines, 0 to 1, by the variances of both.
+
+    A deviation that is not known, as of a single period, is no reason against a line.
+    """
+    parts = (np.log(10.0) / 20.0 * frf.std_db, np.radians(frf.std_deg))
+    variance = 0.5 * sum(np.nan_to_num(part, nan=0.0) ** 2 for part in parts)
+    return np.asarray(1.0 / (1.0 + variance / _AS_THE_MODEL**2))

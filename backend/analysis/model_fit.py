@@ -19,6 +19,7 @@ from backend.analysis.fit_problem import (
     USUAL_CORNER,
     Form,
     Found,
+    KnownInertia,
     Problem,
     View,
     best_view,
@@ -62,6 +63,7 @@ def fit_sampled_model(
     max_modes: int = 4,
     longest_delay_s: float | None = None,
     start: Solution | None = None,
+    inertia: KnownInertia | None = None,
 ) -> Solution:
     """Fit mechanics and delay to a direct estimate, images included.
 
@@ -70,6 +72,7 @@ def fit_sampled_model(
     0.4 of the sample rate with enough coherence take part. A delay is looked for within
     ``longest_delay_s`` (three bus cycles in torque mode, a quarter of one in a closed loop)
     where none explains nothing. With ``start`` only the numbers of another solution are refined.
+    ``inertia`` is the whole axis', where moves have told it.
 
     Raises:
         ValueError: too few lines are coherent.
@@ -90,10 +93,12 @@ def fit_sampled_model(
     views = tuple(view.thinned(np.flatnonzero(use)) for view in all_views)
     free_filter = path.response_bandwidth_hz is None and from_position is not None
     if start is None:
-        found, form = _best(views, period_s, longest_delay_s, max_modes, free_filter)
+        plain = Problem(views, period_s, CHAIN, free_filter, inertia=inertia)
+        found, form = _best(plain, longest_delay_s, max_modes)
     else:
         form = start.problem.form
-        found = Problem(views, period_s, form, free_filter).solve(start.x)
+        again = Problem(views, period_s, form, free_filter, inertia=inertia)
+        found = again.solve(start.x)
     spread = _spread(found) * period_s
     fit = SampledFit(
         model=found.model,
@@ -110,7 +115,8 @@ def fit_sampled_model(
         score=found.score,
         valid_band_hz=band,
     )
-    return Solution(fit, Problem(all_views, period_s, form, free_filter), found.x)
+    whole = Problem(all_views, period_s, form, free_filter, inertia=inertia)
+    return Solution(fit, whole, found.x)
 
 
 def views_of(
@@ -137,12 +143,9 @@ def _spread(found: Found) -> FloatArray:
     return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
 
 
-def _best(
-    views: tuple[View, ...], period_s: float, longest_delay_s: float, max_modes: int,
-    free_filter: bool,
-) -> tuple[Found, Form]:  # fmt: skip
+def _best(chain: Problem, longest_delay_s: float, max_modes: int) -> tuple[Found, Form]:
     """The chain that the criterion likes best, or modes where they gain much over it."""
-    chain = Problem(views, period_s, CHAIN, free_filter)
+    views, period_s = chain.views, chain.period_s
     found = _grown(chain, _rigid_start(views[0], 0.0), max_modes)
     if found.error > 0.05:
         # Perhaps there is a delay that no path told.
@@ -153,7 +156,7 @@ def _best(
             again = _rigid_start(views[0], float(start.x[2]))
             found = min(found, _grown(chain, again, max_modes), key=lambda t: t.score)
     if found.x.size > RIGID_PARAMETERS:
-        modal = Problem(views, period_s, MODAL, free_filter).solve(modal_start(found.x))
+        modal = replace(chain, form=MODAL).solve(modal_start(found.x))
         # Free modes also imitate delays and noise, so they must explain much that no chain does.
         if modal.score < found.score - _MODES_GAIN and modal.error < 0.7 * found.error:
             return modal, MODAL

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from backend.analysis import excitation as signals
 from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.fit_problem import KnownInertia
 from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
 from backend.analysis.identify import Identification, identify_with_path
 from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
@@ -48,7 +49,9 @@ class SweepSettings:
     ``loop`` is the loop that is closed while mechanics are measured; *auto* takes none on an
     axis that turns freely and the speed loop otherwise; a stepped sine always takes a loop, for
     it lasts too long for an axis that drifts. ``share`` is the excitation's share of the
-    envelope's torque. ``rated_torque_nm`` overrides what the drive says.
+    envelope's torque. ``rated_torque_nm`` overrides what the drive says. ``inertia_kgm2`` is the
+    whole axis'; where moves have told it with a relative ``inertia_deviation`` the model is held
+    to it.
     """
 
     envelope: Envelope
@@ -67,6 +70,7 @@ class SweepSettings:
     excitation: Waveform = "multisine"
     coulomb_nm: float | None = None
     """Friction that is taken out of a speed loop's response; None: the recording tells."""
+    inertia_deviation: float | None = None
 
 
 @dataclass(frozen=True)
@@ -138,7 +142,10 @@ def evaluate(
             f"the drive reports its speed as the mean of {cycles} cycles, from which mechanics "
             "cannot be told; switch that averaging off, or take another cycle time"
         )
-    found = identify_with_path(taken, path, quantity, hold_known=known)
+    found = identify_with_path(
+        taken, path, quantity, hold_known=known,
+        inertia=_known_inertia(settings) if facts.torque_known else None,
+    )  # fmt: skip
     path = found.fit.path
     limit = settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm
     saturated = _saturated(taken, path, quantity, limit)
@@ -174,6 +181,13 @@ def evaluate(
         speed_filter_hz=found.fit.path.response_bandwidth_hz,
         hold=path.hold,
     )
+
+
+def _known_inertia(settings: SweepSettings) -> KnownInertia | None:
+    """What the model is held to; nothing where how exactly it is known is not."""
+    if settings.inertia_kgm2 is None or settings.inertia_deviation is None:
+        return None
+    return KnownInertia(settings.inertia_kgm2, settings.inertia_deviation)
 
 
 def completed(facts: AxisFacts, result: SweepResult) -> AxisFacts:

@@ -158,7 +158,8 @@ def cautious_plant(
         # Nothing is lighter than the motor; a line that says so is a peak, which is in the lines.
         lightest = motor_inertia_kgm2
     rigid = MechanicalModel(1.0 / inertia_kgm2, 1e-3)
-    return measured_plant(frf, rigid, variants=(MechanicalModel(1.0 / lightest, 1e-3),))
+    variants = (MechanicalModel(1.0 / lightest, 1e-3),)
+    return measured_plant(frf, rigid, variants=variants, fitted=False)
 
 
 async def plan(
