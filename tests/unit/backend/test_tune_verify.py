@@ -7,16 +7,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from backend.analysis.design import Candidate
 from backend.analysis.frf import Frf
 from backend.analysis.loop_goals import Goals
+from backend.analysis.loop_structure import Gains
+from backend.analysis.margins import Margins
+from backend.axis import Envelope
+from backend.jobs import Progress
+from backend.tools import tune_verify
+from backend.tools.axis_facts import AxisFacts
 from backend.tools.step_response import LEAD_S, StepResult
-from backend.tools.sweep_evaluation import SweepResult
+from backend.tools.sweep_evaluation import SweepResult, SweepSettings
+from backend.tools.tune_time import TimeLeft
 from backend.tools.tune_verify import (
+    Check,
     Verified,
     hum,
     otherwise,
     sharp_margins,
     unseen,
+    verify,
     worse_than,
 )
 
@@ -61,10 +71,10 @@ def test_each_margin_that_is_missed_is_named(found: dict[str, float], word: str)
     assert words.startswith(word)
 
 
-def loop_swept(std_deg: float) -> SweepResult:
-    """A closed loop of second order, 60 Hz and damping 0.7, whose lines are known to so much."""
+def loop_swept(std_deg: float, hz: float = 60.0, damping: float = 0.7) -> SweepResult:
+    """A closed loop of second order, whose lines are known to so much."""
     f = np.linspace(5.0, 400.0, 80)
-    closed = 1.0 / (1.0 - (f / 60.0) ** 2 + 2j * 0.7 * f / 60.0)
+    closed = 1.0 / (1.0 - (f / hz) ** 2 + 2j * damping * f / hz)
     same = np.ones(f.size)
     frf = Frf(
         f, closed, 0.1 * same, std_deg * same, 0.95 * same, same, same, 2000.0, (5.0, 400.0), 4, 0
@@ -117,3 +127,81 @@ def test_a_crossover_above_the_verified_lines_is_told(
     if told:
         assert "650 Hz" in words
         assert "400 Hz" in words
+
+
+async def verified_of(
+    monkeypatch: pytest.MonkeyPatch, predicted_hz: float, answers: list[SweepResult],
+    time_left: TimeLeft | None = None,
+) -> tuple[Verified, list[int]]:  # fmt: skip
+    """What a verification makes of these answers, and how many pairs were played for each."""
+    pairs: list[int] = []
+
+    async def sweep(_axis: object, _session: object, settings: SweepSettings, *_: object):
+        pairs.append(settings.realisations)
+        return answers[len(pairs) - 1]
+
+    async def stepped(*_: object) -> StepResult:
+        return step(0.5)
+
+    async def still(*_: object) -> float:
+        return 0.0
+
+    monkeypatch.setattr(tune_verify.sweep_tool, "sweep", sweep)
+    monkeypatch.setattr(tune_verify.step_tool, "step_response", stepped)
+    monkeypatch.setattr(tune_verify, "holding_torque", still)
+    gains = Gains(0.1, 6.0, 50.0, 60.0)
+    nominal = Margins(40.0, 65.0, 40.0, None, None, 1.3, 60.0, True)
+    candidate = Candidate((), gains, predicted_hz, None, nominal, PROMISED, 0.0, 5.0, 0.1)
+    facts = AxisFacts(1.27, True, 3000.0, 1000.0, None, None, None, False)
+    check = Check(Envelope(4.0, 1500.0, 100.0, 60.0), facts, 1e-4, None, None, None)
+    told = (Progress(lambda: None), Progress(lambda: None), Progress(lambda: None))
+    found = await verify(None, None, check, candidate, PROMISED, told, None, time_left)
+    return found, pairs
+
+
+async def test_another_bandwidth_than_predicted_is_measured_with_more_realisations(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A single pair cannot tell the distortion of play from the response."""
+    first, more = loop_swept(1.0), loop_swept(1.0, 66.0)
+    found, pairs = await verified_of(monkeypatch, 70.0, [first, more])
+    assert pairs == [1, 4]
+    assert found.kept
+    assert not otherwise(found)
+    assert found.measured_bandwidth_hz == sharp_margins(more)["bandwidth_hz"]
+    # Margins are read from the first, and all motion is counted.
+    assert found.sweep.margins["crossover_hz"] == sharp_margins(first)["crossover_hz"]
+    assert found.sweep.motion_s == first.motion_s + more.motion_s
+
+
+async def test_the_predicted_bandwidth_is_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, pairs = await verified_of(monkeypatch, 62.0, [loop_swept(1.0)])
+    assert pairs == [1]
+    assert found.kept
+
+
+async def test_no_time_is_left_for_more_realisations(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, pairs = await verified_of(monkeypatch, 80.0, [loop_swept(1.0)], TimeLeft.of(0.0))
+    assert pairs == [1]
+    assert found.kept
+    assert otherwise(found)
+
+
+async def test_margins_that_more_realisations_miss_are_missed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    worse = loop_swept(1.0, 66.0, 0.25)
+    found, pairs = await verified_of(monkeypatch, 80.0, [loop_swept(1.0), worse])
+    assert pairs == [1, 4]
+    assert not found.kept
+    assert "phase margin" in found.why
+    assert found.step is None
+
+
+async def test_more_realisations_that_blur_all_lines_take_nothing_away(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found, pairs = await verified_of(monkeypatch, 80.0, [loop_swept(1.0), loop_swept(10.0, 90.0)])
+    assert pairs == [1, 4]
+    assert found.kept
+    assert found.measured_bandwidth_hz == sharp_margins(loop_swept(1.0))["bandwidth_hz"]
