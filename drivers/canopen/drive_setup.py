@@ -94,12 +94,18 @@ class DriveSetup:
 
     def _map(self, pdo: PdoPlan) -> None:
         station = pdo.station
+        cleared = False
         try:
             cob = self._read(station, pdo.communication, 1)
             self._remember(pdo, cob)
             for write in set_up(pdo, int.from_bytes(cob, "little") & _PDO_FLAGS):
                 self._write(station, write.index, write.subindex, write.data)
+                cleared = cleared or write.index == pdo.mapping
         except Rejected as refusal:
+            if not cleared:  # a fixed mapping is as it was, and would refuse to be put back too
+                self._undo = [
+                    (s, w) for s, w in self._undo if (s, w.index) != (station, pdo.mapping)
+                ]
             names = ", ".join(str(s.address) for s in pdo.signals)
             raise NotAllowed(
                 f"node {station} does not let {names} be mapped to PDO {pdo.number + 1}: "

@@ -14,14 +14,15 @@ from hypothesis import strategies as st
 
 from drivers.canopen.adapter import open_bus, translate
 from drivers.canopen.cyclic import CanopenCyclic
+from drivers.canopen.drive_setup import DriveSetup
 from drivers.canopen.frames import Frame, exact_bits, worst_case_bits
 from drivers.canopen.images import Images
 from drivers.canopen.link import _fit
 from drivers.canopen.nodes import NodeWatch, emergency_text
-from drivers.canopen.pdo import plan, plan_within_load, set_up
+from drivers.canopen.pdo import PdoPlan, plan, plan_within_load, set_up
 from drivers.canopen.scanning import readable
 from drivers.canopen.url import INTERFACES, parse_canopen_url
-from drivers.errors import LinkLost, OutOfRange
+from drivers.errors import LinkLost, NotAllowed, OutOfRange, Rejected
 from drivers.link import Address, CyclicSignal
 from drivers.virtual.wires.can_wire import CanWire
 from drivers.virtual.wires.slcan import SlcanSide
@@ -338,3 +339,29 @@ async def test_a_halt_that_nobody_receives_does_not_say_that_it_was_received() -
     assert loop.halted == [3], "for when it is back"
     loop.bus_lost = False
     await cyclic.halt(3)
+
+
+def test_a_fixed_mapping_is_told_as_such_and_leaves_nothing_behind() -> None:
+    """The put-back of what never changed was refused as well, and hid the reason."""
+    objects = {
+        (0x1800, 1): (0x40000185).to_bytes(4, "little"), (0x1800, 2): b"\xff",
+        (0x1A00, 0): b"\x01", (0x1A00, 1): (0x60410010).to_bytes(4, "little"),
+    }  # fmt: skip
+    before = dict(objects)
+
+    def read(_station: int, index: int, subindex: int) -> bytes:
+        if (index, subindex) not in objects:
+            raise Rejected("the drive has no such object", code=0x06020000)
+        return objects[index, subindex]
+
+    def write(_station: int, index: int, subindex: int, data: bytes) -> None:
+        if index == 0x1A00:
+            raise Rejected("the object can only be read", code=0x06010002)
+        objects[index, subindex] = data
+
+    setup = DriveSetup(read, write, own_id=127)
+    signal = CyclicSignal(5, Address(0x6064, 0, "INT32"), "position")
+    with pytest.raises(NotAllowed, match="does not let 6064:00 be mapped to PDO 1"):
+        setup.map_pdos([PdoPlan(5, "tx", 0, (signal,))])
+    setup.undo()
+    assert objects == before
