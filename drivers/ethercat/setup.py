@@ -30,6 +30,11 @@ _PROCESS_MEMORY = 0x1000
 _DC_SYSTEM_TIME, _DC_OFFSET, _DC_DELAY = 0x910, 0x920, 0x928
 _DC_CONTROL, _DC_ACTIVATE, _DC_START, _DC_CYCLE = 0x980, 0x981, 0x990, 0x9A0
 _ASSIGN = {"rx": 0x1C12, "tx": 0x1C13}
+_READ_ONLY = 0x06010002
+_FIXED = (
+    "its process data are fixed: import the maker's ESI file, which tells them (Connect page, My"
+    " drive is not listed)"
+)
 _SETPOINTS = {0x6040, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2}
 _SYNC_LEAD_NS = 100_000_000
 _SYNC_ACTIVE, _SYNC_TRY_S = 0x03, 3.0
@@ -85,7 +90,7 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
             raise NotAllowed(
                 f"station {station.number} does not take these process data: {error.message}",
                 parameter=error.parameter,
-                remedy=error.remedy,
+                remedy=_FIXED if error.code == _READ_ONLY else error.remedy,
             ) from error
     value, exponent = interpolation_period(setup.cycle_ns)
     for index, sub, data in (
@@ -105,9 +110,15 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
 
 def _write_pdo(station: Station, assign: int, pdo: Pdo) -> Steps[None]:
     box = station.box
+    before = yield from coe.upload(box, assign, 0)
     yield from coe.download(box, assign, 0, b"\0")
     if pdo.write and pdo.entries:
-        yield from coe.download(box, pdo.index, 0, b"\0")
+        try:
+            yield from coe.download(box, pdo.index, 0, b"\0")
+        except Rejected:
+            # Its mapping is fixed: nothing has changed but the assignment, which is put back.
+            yield from coe.download(box, assign, 0, before[:1])
+            raise
         for number, entry in enumerate(pdo.entries, start=1):
             yield from coe.download(box, pdo.index, number, struct.pack("<I", entry.word))
         yield from coe.download(box, pdo.index, 0, bytes([len(pdo.entries)]))

@@ -12,6 +12,7 @@ imports nothing of servodeck, and its slaves have the oddities that real ones ha
 ``bare``     a drive whose EEPROM has a wrong checksum and no category: no strings, no general part,
              no FMMUs, sync managers or PDOs. Its dictionary is told in fragments that end in the
              middle of a number, and with names longer than its mailbox
+``fixed``    a servo whose PDOs can be assigned, and whose mapping can only be read
 ``hasty``    a servo whose sync managers the first search does not get to read, as when frames of
              the search are lost
 """
@@ -140,6 +141,7 @@ class Outputs(Slave):
 class Servo(Slave):
     product, name = 0x0402, b"ODD-1"
     outputs_at, inputs_at = 0x1300, 0x1200
+    only_read: tuple[int, ...] = (0x1C12, 0x1C13, 0x1600, 0x1A00)
     body = (
         category(30, bytes([0, 0, 0, 1, 0, 0x01]) + bytes(26))
         + category(41, struct.pack("<HHBBBB", OUT_BOX, BOX, 0x26, 0, 1, 1)
@@ -249,7 +251,7 @@ class Servo(Slave):
             self.abort(mux, 0x06090011 if (index, 0) in self.objects else 0x06020000)
         elif command & 0xE0 == 0x40:
             self.upload(mux, known)
-        elif index in (0x1C12, 0x1C13, 0x1600, 0x1A00):
+        elif index in self.only_read:
             self.abort(mux, 0x06010002)
         else:
             self.objects[index, sub] = payload[6 : 6 + len(known)]
@@ -332,6 +334,11 @@ class Bare(Servo):
             self.post(struct.pack("<HBBH", 0x8000, opcode | more, 0, left) + part)
 
 
+class Fixed(Servo):
+    product = 0x0404
+    only_read = (0x1600, 0x1A00)
+
+
 class Hasty(Servo):
     product = 0x0403
     managers_at = 2 * 0x52  # behind the general category
@@ -354,7 +361,8 @@ class Hasty(Servo):
         return written
 
 
-KINDS = {"coupler": Coupler, "outputs": Outputs, "servo": Servo, "bare": Bare, "hasty": Hasty}
+KINDS = {"coupler": Coupler, "outputs": Outputs, "servo": Servo, "bare": Bare, "fixed": Fixed,
+         "hasty": Hasty}  # fmt: skip
 
 
 def station(slave: Slave) -> int:

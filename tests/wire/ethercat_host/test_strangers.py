@@ -29,15 +29,15 @@ from tests.wire.ethercat_host.plain_slaves import LONG, Coupler, Servo, Slave, c
 from tests.wire.ethercat_host.servo_device import servo_profile
 
 HERE = Path(__file__).parent
-SERVO, BARE = 3, 4
+SERVO, BARE, FIXED = 3, 4, 5
 RECORD = [Address(0x2000, 0, "UINT8"), Address(0x2000, 1, "UINT16"), Address(0x2000, 2, "UINT16")]
 
 
 @pytest.fixture(scope="module")
 def wire(namespace: Namespace) -> Iterator[Namespace]:
-    """Coupler, digital outputs, a servo drive behind them, and one with a bare EEPROM."""
+    """Coupler, digital outputs, and three servo drives behind them."""
     process = namespace.popen(
-        [sys.executable, str(HERE / "plain_slaves.py"), "ec0s", "coupler,outputs,servo,bare"],
+        [sys.executable, str(HERE / "plain_slaves.py"), "ec0s", "coupler,outputs,servo,bare,fixed"],
         stdout=subprocess.PIPE,
     )
     assert process.stdout is not None
@@ -72,7 +72,7 @@ def odd_profile() -> Profile:
 async def test_couplers_and_plain_slaves_share_the_segment_with_a_drive(bus: Bus) -> None:
     await bus.link.open()
     try:
-        coupler, outputs, servo, _ = await bus.link.scan(lambda _s, _t: None)
+        coupler, outputs, servo, *_ = await bus.link.scan(lambda _s, _t: None)
         assert [f.vendor_id for f in (coupler, outputs, servo)] == [0xBAD] * 3
         for plain in (coupler, outputs):
             assert any("no mailbox" in note for note in plain.notes)
@@ -160,6 +160,24 @@ async def test_a_drive_with_a_bare_eeprom_is_read_whole_and_moved_by_nobody(bus:
                 [CyclicSignal(BARE, Address(0x607A, 0, "INT32"), "target")],
                 0.004,
             )
+    finally:
+        await bus.link.close()
+
+
+async def test_a_mapping_that_can_only_be_read_is_told_and_left_assigned(bus: Bus) -> None:
+    await bus.link.open()
+    try:
+        await bus.link.scan(lambda _s, _t: None)
+        bus.link.know(FIXED, servo_profile(remappable=True, dc=False))
+        position = CyclicSignal(FIXED, Address(0x6064, 0, "INT32"), "position")
+        speed = CyclicSignal(FIXED, Address(0x606C, 0, "INT32"), "speed")
+        target = CyclicSignal(FIXED, Address(0x607A, 0, "INT32"), "target")
+        with pytest.raises(NotAllowed, match="1A00:00") as refused:
+            await bus.link.process_data.configure([position, speed], [target], 0.004)
+        assert "ESI" in (refused.value.remedy or "")
+        assigned = [Address(0x1C12, 0, "UINT8"), Address(0x1C12, 1, "UINT16")]
+        assert await bus.link.read_many(FIXED, assigned) == [b"\x01", b"\x00\x1a"]
+        await bus.link.process_data.configure([position], [target], 0.004)  # what it has anyway
     finally:
         await bus.link.close()
 
