@@ -28,8 +28,9 @@ from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.link import Trajectory
 from drivers.virtual.mechanics import MechanicsSpec
+from tests.virtual.tools.can_rig import CanBench
 from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import WIDE, mechanics, settings_of, silent
+from tests.virtual.tools.rig import WIDE, Bench, mechanics, settings_of, silent
 
 #: From the trouble to the end of the work: the loop's second without samples, the braking, and one
 #: cleanup after the other that gives up after five seconds.
@@ -111,7 +112,9 @@ async def measured(drive: str, spec: MechanicsSpec, *, tune: bool = False) -> Kn
         return Known(outcome, await sweep(b.axis, b.session, SweepSettings(WIDE), silent()))
 
 
-async def work(b: DirectBench, part: str, known: Known | None, progress: Progress) -> object:
+async def work(
+    b: DirectBench | Bench | CanBench, part: str, known: Known | None, progress: Progress
+) -> object:
     """One part of a tuning as the whole does it."""
     axis, session, name = b.axis, b.session, b.axis.drive.profile.drive
     settings = AutotuneSettings(WIDE, motor_inertia_kgm2=ROTOR[name])
