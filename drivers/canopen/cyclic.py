@@ -75,6 +75,11 @@ class CanopenCyclic:
         self._loop: SyncLoop | None = None
         self._consumers: list[Callable[[ScopeBlock], None]] = []
         self._tell: Callable[[LinkEvent], None] = lambda _event: None
+        self._heard: Callable[[int], bool] = lambda _node: False
+
+    def know_nodes_by(self, heard: Callable[[int], bool]) -> None:
+        """How to tell whether a node of this number is on the bus."""
+        self._heard = heard
 
     def tell_events_to(self, tell: Callable[[LinkEvent], None]) -> None:
         """Where events of the loop go (any thread)."""
@@ -356,8 +361,21 @@ class CanopenCyclic:
         for station in stations:
             self._port.send(Frame(frames.NMT, bytes([command, station])))
 
+    def _require_own_number(self) -> None:
+        """Raises NotAllowed where a node's heartbeat could stand for ours."""
+        own = self._settings.own_id
+        if self._heard(own):
+            raise NotAllowed(
+                f"node {own} is on this bus, and {own} is the number under which this computer"
+                " sends its heartbeat: the drives would not notice if the computer fell silent",
+                value=own,
+                remedy="add own_id= with a number that no node has to the address of the bus",
+            )
+
     def _prepare(self, configured: _Configured, images: Images) -> None:
         """Map, guard, and begin with the drives' present values, so nothing changes at first."""
+        if images.outputs:
+            self._require_own_number()
         self._nmt(frames.NMT_PREOPERATIONAL, images.stations)
         self._setup.map_pdos(configured.pdos)
         unguarded = set()

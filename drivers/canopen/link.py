@@ -83,6 +83,7 @@ class CanopenLink:
             self._port, self._settings, self._sdo_read, self._sdo_write, self._in_worker, clock
         )
         self._cyclic.tell_events_to(self._announce)
+        self._cyclic.know_nodes_by(self._watch.is_there)
         self.cyclic: Cyclic | None = self._cyclic
 
     async def open(self) -> None:

@@ -100,6 +100,11 @@ class NodeWatch:
         """The record of ``node``, made on first use."""
         return self.nodes.setdefault(node, NodeRecord(node))
 
+    def is_there(self, node: int) -> bool:
+        """Whether this node was heard, or is asked by us."""
+        record = self.nodes.get(node)
+        return record is not None and (record.last_heartbeat_s is not None or record.in_use)
+
     def observe(self, frame: Frame, now_s: float) -> list[LinkEvent]:
         """Take in one received frame (not our own) and return what is worth telling."""
         function, node = frame.cob_id & 0x780, frame.cob_id & 0x7F

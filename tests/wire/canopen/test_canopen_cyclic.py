@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import time
 
 import numpy as np
 import pytest
+from canopen_small_device import SmallDevice
 from conftest import Bench, until
 
 from drivers.canopen.busload import bus_load
@@ -22,6 +24,7 @@ from drivers.link import (
     ScopeBlock,
     Trajectory,
 )
+from drivers.virtual.wires.canopen import CanopenNode
 
 CONTROL = CyclicSignal(5, Address(0x6040, 0, "UINT16"), "control")
 TARGET = CyclicSignal(5, Address(0x607A, 0, "INT32"), "target")
@@ -69,6 +72,26 @@ async def test_samples_come_with_their_times(link: CanopenLink) -> None:
         assert after.sequence == before.sequence + 1
         gap = after.t0_s - before.t0_s - (len(before.samples) + after.dropped) * before.dt_s
         assert abs(gap) < 1e-9
+
+
+@pytest.mark.parametrize("option", ["", "&own_id=126"])
+async def test_no_node_may_have_the_number_of_our_heartbeat(bench: Bench, option: str) -> None:
+    """Drives that watch for 127 would go on for as long as that node lives."""
+    link = CanopenLink(bench.url + option)
+    await link.open()
+    try:
+        node = CanopenNode(SmallDevice(), 127, time.monotonic_ns)
+        bench.wire.do(lambda: bench.wire.nodes.append(node))
+        await until(lambda: link._watch.is_there(127))
+        await _cyclic(link).configure([STATUS], [CONTROL, TARGET], 0.002)
+        if option:
+            await _cyclic(link).start()
+        else:
+            with pytest.raises(NotAllowed, match="node 127 is on this bus"):
+                await _cyclic(link).start()
+            await _run(link, [])
+    finally:
+        await link.close()
 
 
 async def test_the_loop_owns_the_power_state(bench: Bench, link: CanopenLink) -> None:
