@@ -96,6 +96,7 @@ class Owed:
         for key, raw in values.items():
             known = self._debts.get(key)
             left = self._sent.get(key, frozenset())
+            raw = self.original(key, raw)  # noqa: PLW2901
             self._debts[key] = Debt(key, raw, left | (known.left if known else left), unapplied)
         if values:
             self._changed()
@@ -112,6 +113,10 @@ class Owed:
             self._debts[key] = replace(debt, left=frozenset())
         if debt is not None or key in self._lent:
             self._note()
+
+    def original(self, key: str, raw: Raw) -> Raw:
+        """What it was before all motions that have changed it; ``raw`` where none has."""
+        return self._lent[key][0] if key in self._lent else raw
 
     def lends(self, key: str) -> bool:
         """A motion has changed this for its length, and puts it back."""

@@ -57,7 +57,8 @@ async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException
         await _to_its_end(lambda: _restore(drive, before), CLEANUP_TIMEOUT_S, name)
     except DriveError as error:
         if not isinstance(error, RestoreFailed):
-            values = ", ".join(f"{key} (was {raw})" for key, raw in before.items())
+            was = {key: drive.owed.original(key, raw) for key, raw in before.items()}
+            values = ", ".join(f"{key} (was {raw})" for key, raw in was.items())
             error = RestoreFailed(
                 f"{name}: perhaps not restored: {values}: {error.message}",
                 drive=name,
@@ -82,7 +83,7 @@ async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
                     await drive.write(key, raw)
                 del left[key]
             except DriveError as error:
-                failed.append(f"{key} (was {raw}): {error.message}")
+                failed.append(f"{key} (was {drive.owed.original(key, raw)}): {error.message}")
     finally:
         drive.owed.add(left)
     if failed:

@@ -80,7 +80,7 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
                     changed = True
                 del left[key]
             except DriveError as error:
-                failed.append(f"{key} (was {raw}): {error.message}")
+                failed.append(f"{key} (was {drive.owed.original(key, raw)}): {error.message}")
     finally:
         # When this is cut off in the middle, too, it is known what is missing.
         drive.owed.add(left)
@@ -113,8 +113,8 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
     try:
         await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, drive.name)
     except LinkTimeout as error:
-        owed = {debt.key for debt in drive.owed.debts}
-        left = ", ".join(f"{key} (was {raw})" for key, raw in before.items() if key in owed)
+        owed = {debt.key: debt.raw for debt in drive.owed.debts}
+        left = ", ".join(f"{key} (was {owed[key]})" for key in before if key in owed)
         raise RestoreFailed(
             f"{error.message}; not restored: {left}",
             drive=drive.name,

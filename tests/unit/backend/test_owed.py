@@ -74,6 +74,41 @@ async def test_a_line_too_slow_for_putting_back_names_what_is_left(
     assert [debt.key for debt in x.drive.owed.debts] == [SPEED]
 
 
+async def motion_in_a_motion(x: Member, servo: Servo, *, again: bool) -> RestoreFailed:
+    """Both change the same value for their length; the line may come back between the cleanups."""
+
+    async def motion() -> None:
+        async with x.axis.restoring(TORQUE):
+            await x.drive.write(TORQUE, 2000)
+            try:
+                async with x.axis.restoring(TORQUE):
+                    await x.drive.write(TORQUE, 800)
+                    servo.mute = True
+            finally:
+                servo.mute = not again
+
+    with pytest.raises(RestoreFailed) as told:
+        await motion()
+    return told.value
+
+
+async def test_a_value_that_two_motions_lent_is_named_as_it_was_before_both(
+    x: Member, servo: Servo
+) -> None:
+    told = await motion_in_a_motion(x, servo, again=False)
+    assert f"{TORQUE} (was {WAS[TORQUE]})" in told.message
+    assert f"{TORQUE} (was 2000)" not in told.message, "nobody should write that by hand"
+    assert [debt.raw for debt in x.drive.owed.debts] == [WAS[TORQUE]]
+
+
+async def test_what_the_outer_of_two_motions_put_back_is_owed_no_more(
+    x: Member, servo: Servo
+) -> None:
+    await motion_in_a_motion(x, servo, again=True)
+    assert held(servo) == WAS
+    assert not x.drive.owed
+
+
 async def back(bench: Bench, servo: Servo) -> None:
     """The drive answers again, and everything that this brings about is over."""
     servo.mute = False
