@@ -270,28 +270,39 @@ class _Free:
     """The sequence after so many that were too fast; nothing where there is one alone."""
     _plain: ComplexArray | None = None
     _sign: int = 1
+    _lessened: int = 0
 
     async def plain(self, told: Callable[[float], None]) -> float:
-        """How fast the axis becomes depends on how its load swings: smaller where too fast."""
-        for attempt in range(1, ATTEMPTS + 1):
-            try:
-                self._plain = await self._torque(told)
-                break
-            except NotAllowed as error:
-                if self.smaller is None or attempt == ATTEMPTS or not too_fast(error):
-                    raise
-                try:
-                    self.sequence = await asyncio.to_thread(self.smaller, attempt)
-                except NotAllowed:
-                    raise error from None
-            await quiet(self.axis)
-            await go_back(self.axis, self.session, self.home, self.envelope, self.facts)
+        self._plain = await self._by_sent(told)
         return 0.0
 
     async def notched(self, told: Callable[[float], None]) -> NotchEffect:
         assert self._plain is not None
-        seen = await self._torque(told)
+        seen = await self._by_sent(told)
         return fit_effect(self.sequence.excitation.line_hz, seen / self._plain, self.path)
+
+    async def _by_sent(self, told: Callable[[float], None]) -> ComplexArray:
+        """Reported torque over the one sent, at the lines; smaller where the axis is too fast.
+
+        How fast it becomes depends on how its load swings. What a notch does is the same at any
+        size.
+        """
+        while True:
+            try:
+                torque = await self._torque(told)
+                break
+            except NotAllowed as error:
+                if self.smaller is None or self._lessened == ATTEMPTS or not too_fast(error):
+                    raise
+                self._lessened += 1
+                try:
+                    self.sequence = await asyncio.to_thread(self.smaller, self._lessened)
+                except NotAllowed:
+                    raise error from None
+            await quiet(self.axis)
+            await go_back(self.axis, self.session, self.home, self.envelope, self.facts)
+        e = self.sequence.excitation
+        return np.asarray(torque / np.fft.rfft(e.one_period)[e.lines])
 
     async def _torque(self, told: Callable[[float], None]) -> ComplexArray:
         """Spectrum of the reported torque at the lines, over the whole periods.
