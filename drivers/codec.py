@@ -62,6 +62,16 @@ def _octets(raw: Raw) -> bytes:
         ) from error
 
 
+def text_of(data: bytes) -> str:
+    """A drive's text, which ends with its bytes or with a zero byte before."""
+    text = data.split(b"\0", 1)[0]
+    try:
+        return text.decode("utf-8").strip()
+    except UnicodeDecodeError:
+        # CiA 301 knows only ASCII; makers write their own code page. No letter must be lost.
+        return text.decode("latin-1").strip()
+
+
 def decode(data_type: DataType, data: bytes) -> Raw:
     """Bytes to raw value.
 
@@ -69,12 +79,7 @@ def decode(data_type: DataType, data: bytes) -> Raw:
         ProtocolError: the length does not fit the type.
     """
     if data_type == "STRING":
-        text = data.split(b"\0", 1)[0]
-        try:
-            return text.decode("utf-8").strip()
-        except UnicodeDecodeError:
-            # CiA 301 knows only ASCII; makers write their own code page. No letter must be lost.
-            return text.decode("latin-1").strip()
+        return text_of(data)
     if data_type == "OCTETS":
         return data.hex(" ")
     form = _FORMAT[data_type]

@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 
 from drivers.canopen.channel import SdoChannel
+from drivers.codec import text_of
 from drivers.errors import DriveError, LinkLost
 from drivers.link import Found
 
@@ -88,7 +89,6 @@ def _read(channel: SdoChannel, index: int, subindex: int, timeout_s: float) -> b
 
 def readable(data: bytes) -> str:
     """Text as sent, or the number where a drive keeps versions as numbers (DS_C, 003:421)."""
-    stripped = data.rstrip(b"\0 ")
     if 0 < len(data) <= 4 and not all(0x20 <= byte < 0x7F for byte in data):
         return str(int.from_bytes(data, "little"))
-    return stripped.decode("utf-8", "replace").strip()
+    return text_of(data)

@@ -6,6 +6,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from drivers.codec import text_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError, Rejected
 from drivers.ethercat import coe, esc, sii
 from drivers.ethercat.al_status import ERROR_BIT, AlState, al_status_text, state_name
@@ -227,8 +228,7 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         for key, index in (("name", 0x1008), ("hardware", 0x1009), ("firmware", 0x100A)):
             text = yield from _try_read(station, index, 0)
             if text is not None:
-                words = text.split(b"\0", 1)[0].decode("utf-8", "replace").strip()
-                setattr(station, key, words or getattr(station, key))
+                setattr(station, key, text_of(text) or getattr(station, key))
         yield from _compare_identity(station)
     except DriveError as error:
         station.notes.append(error.message)

@@ -314,6 +314,7 @@ def test_padding_is_cut_and_other_bytes_are_kept() -> None:
 def test_version_numbers_and_texts() -> None:
     assert readable(b"V1.2\0\0") == "V1.2"
     assert readable(b"\x65\x00") == "101"
+    assert readable(b"M\xfcller 90\xb0\0rest") == "Müller 90°", "as the parameter itself is shown"
 
 
 class LoopOnADeadBus:
