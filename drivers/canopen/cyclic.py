@@ -311,7 +311,11 @@ class CanopenCyclic:
         """A loss or restart ends setpoints: they must not go on by themselves afterwards."""
         if self._loop is None:
             return
-        if event.kind in ("lost", "boot") or (event.kind == "fault" and event.station is None):
+        own = self._settings.own_id
+        if (event.kind, event.station) == ("boot", own) and self._loop.images.outputs:
+            # From now on its heartbeat stands for ours: see `_require_own_number`.
+            self._loop.halt(None, f"node {own}, the number of this computer's heartbeat, started")
+        elif event.kind in ("lost", "boot") or (event.kind == "fault" and event.station is None):
             self._loop.abandon(event.station, event.text)
         elif event.kind == "fault":
             self._loop.halt(event.station, event.text)

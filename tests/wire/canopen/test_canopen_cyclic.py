@@ -198,6 +198,21 @@ async def test_halt_brakes_and_leaves_operation(bench: Bench, link: CanopenLink)
     assert bench.device.value(0x60FF) == 0
 
 
+async def test_a_node_that_starts_with_our_number_halts_the_axes(
+    bench: Bench, link: CanopenLink
+) -> None:
+    await _run(link, [CONTROL, SPEED_TARGET, MODE])
+    await _enable(link, CSV)
+    values = np.full(5000, 800, dtype=np.int64)
+    trajectory = Trajectory(5, SPEED_TARGET.address, values, Envelope(), renew_s=99)
+    await _cyclic(link).play([trajectory])
+    await until(lambda: bench.device.value(0x60FF) == 800)
+    node = CanopenNode(SmallDevice(), 127, time.monotonic_ns)
+    bench.wire.do(lambda: bench.wire.nodes.append(node))
+    await until(lambda: bench.device.value(0x6041) == 0x0231)
+    assert bench.device.value(0x60FF) == 0
+
+
 async def test_stop_puts_the_drive_back(bench: Bench, link: CanopenLink) -> None:
     keys = [(0x1800, 1), (0x1800, 2), (0x1A00, 0), (0x1A00, 1), (0x1400, 1), (0x1600, 1)]
     keys += [(0x1016, 1), (0x1801, 1), (0x1A01, 0)]
