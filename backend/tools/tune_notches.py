@@ -37,7 +37,9 @@ async def learn_notches(
     outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
     progress: Progress,
 ) -> str:  # fmt: skip
-    """Measure what no manual prints, where it is worth it: beside the loop where a load pulls.
+    """Measure what no manual prints, where it is worth it: beside the loop where one is needed.
+
+    A load that pulls needs one, and an axis whose mechanics were measured beside one.
 
     Returns why the design goes without notches; empty where it does not.
     """
@@ -50,6 +52,8 @@ async def learn_notches(
     found = outcome.result
     home = await axis.position_raw()
     held = abs(found.gravity_nm.value) > PULLED * facts.rated_torque_nm
+    # Where friction rules, a torque that is off by little makes a speed that is off by much.
+    held = held or (how.scheme == "free" and mechanics.loop != "none")
     try:
         if held or how.loop not in ("auto", "none"):
             meaning = await measure_meaning_in_loop(

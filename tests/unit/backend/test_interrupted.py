@@ -136,11 +136,13 @@ async def test_tuning_goes_on_without_notches_only_where_the_axis_kept_them_back
     monkeypatch.setattr(tune_notches, "meaning_of", lambda _drive: None)
     monkeypatch.setattr("backend.tools.notch_effect.unknown", lambda _drive: True)
     axis: Any = Axis()
-    resonant: Any = SimpleNamespace(resonances=[SimpleNamespace(kind="resonance")], model=object())
+    resonant: Any = SimpleNamespace(
+        resonances=[SimpleNamespace(kind="resonance")], model=object(), loop="none"
+    )
     found: Any = SimpleNamespace(
         result=SimpleNamespace(gravity_nm=SimpleNamespace(value=0.0))
     )  # fmt: skip
-    how: Any = SimpleNamespace(loop="auto", envelope=None)
+    how: Any = SimpleNamespace(loop="auto", envelope=None, scheme="free")
     facts: Any = SimpleNamespace(rated_torque_nm=1.27)
     nothing: Any = None
     learned = tune_notches.learn_notches(

@@ -1,14 +1,19 @@
-"""What a design without notches is told to be for."""
+"""What a design without notches is told to be for, and beside which loop notches are tried."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from backend.analysis.frf import Frf
 from backend.analysis.mechanical_model import MechanicalModel, Mode
+from backend.jobs import Progress
+from backend.tools import tune_notches
+from backend.tools.notch_meaning import NotchMeaning
 from backend.tools.sweep_evaluation import SweepResult
 from backend.tools.tune_notches import out_of_sight
 
@@ -37,3 +42,51 @@ def test_what_shows_and_what_hardly_rises_bounds_nothing_unseen(
 ) -> None:
     assert out_of_sight(measured(*modes)) == ""
     assert out_of_sight(replace(measured(*modes), model=None)) == ""
+
+
+@pytest.mark.parametrize(
+    ("loop", "scheme", "gravity_nm", "beside"),
+    [
+        ("none", "free", 0.0, False),
+        ("none", "free", 0.2, True),
+        # Friction ruled, so that its mechanics were measured beside a loop.
+        ("speed", "free", 0.0, True),
+        # It trembles where it stands; the loop was closed for its travel alone.
+        ("speed", "limited", 0.0, False),
+    ],
+)
+async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
+    loop: str, scheme: str, gravity_nm: float, beside: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ways: list[bool] = []
+
+    async def in_loop(*_: Any) -> NotchMeaning:
+        ways.append(True)
+        return NotchMeaning(120.0)
+
+    async def free(*_: Any) -> NotchMeaning:
+        ways.append(False)
+        return NotchMeaning(120.0)
+
+    monkeypatch.setattr(tune_notches, "measure_meaning_in_loop", in_loop)
+    monkeypatch.setattr(tune_notches, "_learn_free", free)
+    monkeypatch.setattr(tune_notches, "meaning_of", lambda _drive: None)
+    monkeypatch.setattr(tune_notches, "remember", lambda *_: None)
+    monkeypatch.setattr("backend.tools.notch_effect.unknown", lambda _drive: True)
+
+    async def stands() -> int:
+        return 0
+
+    axis: Any = SimpleNamespace(drive=SimpleNamespace(name="X"), position_raw=stands)
+    value = SimpleNamespace(value=gravity_nm)
+    outcome: Any = SimpleNamespace(result=SimpleNamespace(gravity_nm=value, inertia_kgm2=value))
+    mechanics: Any = SimpleNamespace(
+        resonances=[SimpleNamespace(kind="resonance")], model=object(), loop=loop
+    )
+    how: Any = SimpleNamespace(loop="auto", envelope=None, scheme=scheme)
+    facts: Any = SimpleNamespace(rated_torque_nm=1.27)
+    said = await tune_notches.learn_notches(
+        axis, cast(Any, None), how, facts, outcome, mechanics, Progress(lambda: None)
+    )
+    assert said == ""
+    assert ways == [beside]

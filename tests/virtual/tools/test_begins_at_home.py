@@ -61,7 +61,11 @@ async def test_after_a_notch_that_could_not_be_learned(monkeypatch: pytest.Monke
             result=SimpleNamespace(gravity_nm=value, inertia_kgm2=value, coulomb_nm=value),
         )
         found: Any = SimpleNamespace(
-            resonances=[SimpleNamespace(kind="resonance")], model="one", hold=None, delay_s=0.0
+            resonances=[SimpleNamespace(kind="resonance")],
+            model="one",
+            hold=None,
+            delay_s=0.0,
+            loop="none",
         )
         how = tune_notches.Learning(WIDE, "auto", "free")
         facts = await read_facts(b.axis)
