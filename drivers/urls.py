@@ -27,7 +27,12 @@ from drivers.modbus.port import STANDARD_SILENCE_S, LineSettings, Parity
 SCHEMES: tuple[Literal["ethercat", "canopen", "modbus", "mlink"], ...] = (
     "ethercat", "canopen", "modbus", "mlink",
 )  # fmt: skip
-_EXAMPLE = "write it like mlink:///dev/ttyUSB0?baudrate=2500000&parity=E"
+_EXAMPLES = {
+    "ethercat": "ethercat://eth0",
+    "canopen": "canopen://socketcan/can0?bitrate=1000000",
+    "modbus": "modbus:///dev/ttyUSB0?baudrate=115200&parity=N",
+    "mlink": "mlink:///dev/ttyUSB0?baudrate=2500000&parity=E",
+}
 
 #: Defaults of an MMS7 on MLink: 004:1457-1464.
 _MLINK = LineSettings("", baudrate=2_500_000, parity="E")
@@ -70,14 +75,14 @@ def parse_url(text: str) -> BusUrl:
             f"{text!r} is no bus URL: it must start with "
             + ", ".join(f"{known}://" for known in SCHEMES),
             value=text,
-            remedy=_EXAMPLE,
+            remedy=_like(*SCHEMES),
         )
     place = match[2]
     if not place.strip("/"):
-        raise OutOfRange(f"{text!r} names no adapter", value=text, remedy=_EXAMPLE)
+        raise OutOfRange(f"{text!r} names no adapter", value=text, remedy=_like(scheme))
     options = parse_qsl(match[3] or "", keep_blank_values=True)
     if len(dict(options)) != len(options):
-        raise OutOfRange(f"{text!r} gives an option twice", value=text, remedy=_EXAMPLE)
+        raise OutOfRange(f"{text!r} gives an option twice", value=text, remedy=_like(scheme))
     return BusUrl(scheme, place, tuple(options))
 
 
@@ -95,23 +100,27 @@ def line_settings(url: BusUrl) -> LineSettings:
     silence_s: float | None = None
     for name, text in url.options:
         if name == "baudrate":
-            settings = replace(settings, baudrate=_number(name, text, 300, 12_000_000))
+            settings = replace(settings, baudrate=_number(url.scheme, name, text, 300, 12_000_000))
         elif name == "parity":
-            settings = replace(settings, parity=_parity(text))
+            settings = replace(settings, parity=_parity(url.scheme, text))
         elif name == "stopbits":
-            settings = replace(settings, stopbits=2 if _number(name, text, 1, 2) == 2 else 1)
+            settings = replace(
+                settings, stopbits=2 if _number(url.scheme, name, text, 1, 2) == 2 else 1
+            )
         elif name == "timeout_ms":
-            settings = replace(settings, timeout_s=_number(name, text, 1, 60_000) / 1000)
+            settings = replace(
+                settings, timeout_s=_number(url.scheme, name, text, 1, 60_000) / 1000
+            )
         elif name == "retries":
-            settings = replace(settings, retries=_number(name, text, 0, 10))
+            settings = replace(settings, retries=_number(url.scheme, name, text, 0, 10))
         elif name == "silence_us":
-            silence_s = _number(name, text, 0, 1_000_000) / 1e6
+            silence_s = _number(url.scheme, name, text, 0, 1_000_000) / 1e6
         else:
             raise OutOfRange(
                 f"{url.scheme} URLs have no option {name!r}",
                 value=name,
                 limit="baudrate, parity, stopbits, timeout_ms, silence_us, retries",
-                remedy=_EXAMPLE,
+                remedy=_like(url.scheme),
             )
     if silence_s is None and url.scheme == "modbus" and settings.baudrate > 19_200:
         silence_s = STANDARD_SILENCE_S
@@ -149,22 +158,27 @@ def link_for(url: str | BusUrl) -> Link:
     return EthercatLink(text)
 
 
-def _number(name: str, text: str, low: int, high: int) -> int:
+def _like(*schemes: str) -> str:
+    """How URLs of these kinds are written."""
+    return "write it like " + " or ".join(_EXAMPLES[scheme] for scheme in schemes)
+
+
+def _number(scheme: str, name: str, text: str, low: int, high: int) -> int:
     if not re.fullmatch(r"\d{1,9}", text) or not low <= int(text) <= high:
         raise OutOfRange(
             f"{name}={text} must be a whole number from {low} to {high}",
             value=text,
             limit=f"{low}…{high}",
-            remedy=_EXAMPLE,
+            remedy=_like(scheme),
         )
     return int(text)
 
 
-def _parity(text: str) -> Parity:
+def _parity(scheme: str, text: str) -> Parity:
     for parity in ("N", "E", "O"):
         if text.upper() == parity:
             return parity
     raise OutOfRange(
         f"parity={text} must be N (none), E (even) or O (odd)",
-        value=text, limit="N, E, O", remedy=_EXAMPLE,
+        value=text, limit="N, E, O", remedy=_like(scheme),
     )  # fmt: skip

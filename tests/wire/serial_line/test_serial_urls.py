@@ -66,6 +66,22 @@ def test_bad_urls(text: str, complaint: str) -> None:
         link_for(text)
 
 
+@pytest.mark.parametrize(("text", "kinds"), [
+    ("http://x", ["ethercat", "canopen", "modbus", "mlink"]), ("modbus:///x?speed=1", ["modbus"]),
+    ("mlink:///x?stopbits=3", ["mlink"]), ("ethercat://", ["ethercat"]),
+])  # fmt: skip
+def test_the_remedy_is_an_example_of_that_bus(text: str, kinds: list[str]) -> None:
+    with pytest.raises(OutOfRange) as refused:
+        link_for(text)
+    told = refused.value.remedy
+    assert [kind for kind in ("ethercat", "canopen", "modbus", "mlink") if f"{kind}:" in told] == (
+        kinds
+    )
+    # An example that would be refused itself were no help.
+    for example in told.removeprefix("write it like ").split(" or "):
+        parse_url(example)
+
+
 def test_virtual_wires_need_a_demo() -> None:
     with pytest.raises(NotAllowed, match="only a running demo has"):
         link_for("mlink://virtual0")
