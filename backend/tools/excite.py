@@ -241,11 +241,12 @@ def loop_reference(
     base: bool = True,
     waveform: Waveform = "multisine",
     corner_hz: float | None = None,
+    weight: npt.NDArray[np.floating] | None = None,
 ) -> tuple[Sequence, ...]:
     """An excitation on the reference of the closed loop itself, ``amplitude`` in rad/s or rad.
 
     Amplitudes fall with frequency, from ``corner_hz`` on, so that the torque they ask for does not
-    grow without end.
+    grow without end. ``weight`` [lines] comes on top of that; a stepped sine has none.
 
     Raises:
         ValueError: the room does not suffice.
@@ -253,7 +254,8 @@ def loop_reference(
     corner = corner_hz or (20.0 if position else 40.0)
 
     def size(f: FloatArray) -> FloatArray:
-        return np.asarray(1.0 / np.hypot(1.0, f / corner))
+        falling = np.asarray(1.0 / np.hypot(1.0, f / corner))
+        return falling if weight is None or waveform == "stepped" else falling * weight
 
     return tuple(
         Sequence(scaled(e, amplitude, step), reference)

@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.frf import Record
+from backend.analysis.frf import Record, estimate_periodic
+from backend.analysis.line_spectra import good_periods, period_spectra
 from backend.analysis.path_fit import reference_gain
-from backend.analysis.sampling import SignalPath
+from backend.analysis.sampling import SignalPath, delay_response
 from backend.tools import excite
 from backend.tools.recording import Recording
 from backend.tools.speed_integral import integral_hz as found_integral_hz
@@ -24,33 +25,88 @@ from backend.tools.waveform import Band, Waveform
 _TURN = 2 * np.pi
 #: Peak of the first trial in rad/s: even a high gain makes little torque of it.
 FIRST_RAD_S = 0.3
-#: Share of the permitted speed for the excitation.
-_SPEED_SHARE = 0.15
+#: Shares of the permitted speed: for what the axis makes of the excitation, and for the highest
+#: set-point, which is what an unwatched drive goes on with when the computer falls silent.
+_SPEED_SHARE, _REFERENCE_SHARE = 0.15, 0.5
+#: Share of the permitted torque for excitation and base motion together, and what is left of the
+#: base motion at least.
+_TORQUE_SHARE, _LEAST_BASE = 0.7, 0.4
+#: Deviations of lines are taken to differ by so much, relative to the median; and the power of it.
+_WEIGHTS, _BY_DOUBT = (0.1, 4.0), 0.5
+#: Peak of what the axis makes of it over its deviation: mechanics turn the phases that make it low.
+_PEAK_OVER_RMS = 2.5
+#: Deviation of the reference over its peak.
+_RMS_OVER_PEAK = 0.7
+#: Cycles by which the torque may follow the reference.
+_CYCLES = np.arange(0.0, 4.01, 0.125)
 #: Only above this share of the lines does the reference alone make the torque.
 _UPPER = 0.75
 
 
 def sequences(
     rate: float, band: Band, room: excite.Room, amplitude_rad_s: float, realisations: int,
-    waveform: Waveform, *, base: bool,
+    waveform: Waveform, *, base: bool, weight: FloatArray | None = None,
 ) -> tuple[excite.Sequence, ...]:  # fmt: skip
     """All lines alike: above the loop's bandwidth that is a torque that is alike, too.
+
+    ``weight`` [lines] makes them unlike each other, as `telling_weight` finds it.
 
     Raises:
         ValueError: the room does not suffice.
     """
     return excite.loop_reference(
         rate, band, room, 0.0, amplitude=amplitude_rad_s, realisations=realisations,
-        position=False, base=base, waveform=waveform, corner_hz=np.inf,
+        position=False, base=base, waveform=waveform, corner_hz=np.inf, weight=weight,
     )  # fmt: skip
 
 
-def fitting_amplitude(
+@dataclass(frozen=True)
+class Size:
+    """Peaks of the excitation and of the base motion beside it, in rad/s."""
+
+    peak_rad_s: float
+    base_rad_s: float
+
+
+def fitting_size(
     sequence: excite.Sequence, recording: Recording, room: excite.Room, torque_nm: float
-) -> float:
-    """Peak in rad/s whose torque peaks at ``torque_nm``, as far as the trial tells."""
-    gain = _rough_gain(_record(sequence, recording))
-    return float(min(torque_nm / gain, _SPEED_SHARE * room.speed_rad_s))
+) -> Size:
+    """What makes a torque that peaks at ``torque_nm``, as far as the trial tells.
+
+    A soft loop makes little speed of its reference, so that the axis' own speed counts; the
+    set-points stay within a share, too. Such a loop may answer the base motion with much torque,
+    as that lies near its resonance: the base motion gets what the excitation leaves.
+    """
+    record = _record(sequence, recording)
+    gain = _rough_gain(record)
+    by_torque = torque_nm / gain
+    base = 0.0 if sequence.base is None else float(np.max(np.abs(sequence.base)))
+    least = _SPEED_SHARE * room.speed_rad_s
+    moves = _speed_over_peak(record, gain) if base else 1.0
+    by_speed = least / (_PEAK_OVER_RMS * moves)
+    most = min(by_speed, _REFERENCE_SHARE * room.speed_rad_s - base)
+    peak = min(by_torque, max(most, least))
+    left_nm = _TORQUE_SHARE * room.torque_nm - torque_nm * peak / by_torque
+    taken_nm = float(np.max(np.abs(recording.torque_nm)))
+    return Size(peak, base * float(np.clip(left_nm / taken_nm, _LEAST_BASE, 1.0)))
+
+
+def telling_weight(
+    records: tuple[tuple[excite.Sequence, Recording], ...], rate: float
+) -> FloatArray:
+    """Weights of the lines [n] for further realisations: more where the first ones tell less.
+
+    Where one amplitude has the deviation d, the sum of all variances is least with amplitudes of
+    √d. Lines that nothing will show, and those that are known, keep a share.
+
+    Raises:
+        ValueError: every period has a gap.
+    """
+    taken = tuple(_record(s, r) for s, r in records)
+    told = estimate_periodic(taken, SignalPath(rate), "closed_loop", position=True)
+    doubt = np.nan_to_num(told.std_db, nan=1.0)
+    relative = doubt / float(np.median(doubt))
+    return np.asarray(np.clip(relative, *_WEIGHTS) ** _BY_DOUBT)
 
 
 @dataclass(frozen=True)
@@ -113,15 +169,16 @@ def _scaled(sequence: excite.Sequence, gain: float) -> excite.Sequence:
 
 def _record(sequence: excite.Sequence, recording: Recording) -> Record:
     return Record(
-        sequence.excitation, recording.velocity_rad_s, recording.torque_nm, recording.valid
-    )
+        sequence.excitation, recording.velocity_rad_s, recording.torque_nm, recording.valid,
+        recording.position_rad,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _Upper:
-    """The upper lines of the last period: bins, frequencies, and which samples."""
+    """The upper lines of the last two periods: bins, frequencies, and which samples."""
 
-    cut: slice
+    cuts: tuple[slice, ...]
     bins: npt.NDArray[np.int64]
     f: FloatArray
 
@@ -132,22 +189,54 @@ class _Upper:
             # From rest to rest: the whole of it is one period of a longer signal.
             length = e.samples.size
             ends = np.round(e.line_hz[[0, -1]] * (length / e.sample_rate_hz)).astype(np.int64)
-            cut, bins = slice(0, length), np.arange(ends[0], ends[1])
+            cuts, bins = [slice(0, length)], np.arange(ends[0], ends[1])
         else:
-            first = e.first_sample + (e.periods - 1) * e.period_samples
             length, bins = e.period_samples, e.lines
-            cut = slice(first, first + length)
+            begins = [e.first_sample + n * length for n in range(max(e.periods - 2, 0), e.periods)]
+            cuts = [slice(first, first + length) for first in begins]
         upper = bins[int(_UPPER * bins.size) :]
-        return _Upper(cut, upper, np.asarray(upper * (e.sample_rate_hz / length), np.float64))
+        return _Upper(
+            tuple(cuts), upper, np.asarray(upper * (e.sample_rate_hz / length), np.float64)
+        )
 
-    def spectrum(self, signal: FloatArray) -> ComplexArray:
-        """Of these lines."""
-        return np.asarray(np.fft.rfft(signal[self.cut])[self.bins])
+    def spectra(self, signal: FloatArray) -> ComplexArray:
+        """Of these lines [periods, lines]."""
+        return np.array([np.fft.rfft(signal[cut])[self.bins] for cut in self.cuts])
 
 
 def _rough_gain(record: Record) -> float:
-    """Nm per rad/s, for scaling an amplitude."""
+    """Nm per rad/s, for scaling an amplitude: rather one deviation too large than too small.
+
+    By what of the torque follows the reference with some delay: a coarse encoder makes more torque
+    of its steps than a small trial does.
+    """
     assert record.torque is not None
     lines = _Upper.of(record)
-    sent, torque = lines.spectrum(record.excitation.samples), lines.spectrum(record.torque)
-    return float(np.linalg.norm(torque) / max(float(np.linalg.norm(sent)), 1e-12))
+    sent = lines.spectra(record.excitation.samples)[-1]
+    torques = lines.spectra(record.torque)
+    torque = np.mean(torques, axis=0)
+    late = delay_response(lines.f, 1.0 / record.excitation.sample_rate_hz)
+    follows = [torque @ (sent * late**cycles).conj() for cycles in _CYCLES]
+    size = max(float(np.linalg.norm(sent)), 1e-12)
+    noise = float(np.sqrt(np.mean(np.abs(torques - torque) ** 2)))
+    return (float(max(part.real for part in follows)) / size + noise) / size
+
+
+def _speed_over_peak(record: Record, gain_nms: float) -> float:
+    """Deviation of the excited speed over the peak of the excitation; 1 where nothing tells.
+
+    The trial itself is too small for a coarse encoder. The base motion tells the inertia: friction
+    takes torque in step with the speed, inertia a quarter of a turn before it.
+    """
+    e = record.excitation
+    good, _ = good_periods(record)
+    if record.torque is None or e.segments or not good:
+        return 1.0
+    base = replace(e, lines=np.array([1]))
+    torque, speed = (
+        period_spectra(signal, base, good).mean() for signal in (record.torque, record.response)
+    )
+    turning = _TURN * e.line_hz
+    inertia = float((torque / speed).imag) / (_TURN * e.sample_rate_hz / e.period_samples)
+    follows = 1.0 / np.hypot(1.0, turning * max(inertia, 0.0) / gain_nms)
+    return _RMS_OVER_PEAK * float(np.sqrt(np.mean(follows**2)))

@@ -31,7 +31,8 @@ from backend.tools.sweep_plan import (
     sequences_of,
     setup_of,
 )
-from backend.tools.sweep_play import MODE_OF, Records, play_fitting, scaled_by_speed
+from backend.tools.sweep_play import MODE_OF, Records, scaled_by_speed
+from backend.tools.sweep_telling import play_telling
 from backend.tools.temporary import stopping_hard, temporary
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
@@ -128,7 +129,7 @@ class _Sweep:
             )
         # A stepped sine takes too long for a second time.
         spare = 0 if settings.excitation == "stepped" else len(sequences)
-        return setup, await play_fitting(
+        return setup, await play_telling(
             axis, session, settings, setup, sequences, home, progress, spare
         )  # fmt: skip
 

@@ -38,6 +38,10 @@ _LOWEST_MODE_HZ = 15.0
 _WEAK_DB, _LEAST_DB, _LEAST_SHARE = 3.0, 1.0, 0.2
 #: A mode whose part in the response is not known to this (logarithm, one deviation) may be none.
 _UNSURE = 1.0 / 3.0
+#: What is charged to all lines where a speed loop's reference is the excitation, one deviation:
+#: size (logarithm), as the integral rises between two samples of the torque, and delay in s, as
+#: the loop's own torque hides part of what tells the current loop.
+_BY_REFERENCE, _BY_REFERENCE_S = 0.012, 15e-6
 #: Deviations to either side that hold 95 of 100 cases.
 _CI95 = 1.96
 
@@ -156,6 +160,11 @@ def evaluate(
         direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
         found = replace(found, direct=direct, corrected=corrected)
         warnings += (_COMMANDED,)
+    if by_speed:
+        lines = found.direct.frequency_hz
+        doubt = np.asarray(_BY_REFERENCE + 2j * np.pi * lines * _BY_REFERENCE_S)
+        direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
+        found = replace(found, direct=direct, corrected=corrected)
     return SweepResult(
         kind="mechanics",
         loop=loop,

@@ -45,9 +45,21 @@ async def scaled_by_speed(
         axis, session, settings, setup, sequences[:1], home, trial
     )
     share_nm = settings.share * setup.room.torque_nm
-    peak = speed_injection.fitting_amplitude(sent, recording, setup.room, share_nm)
-    factor = peak / speed_injection.FIRST_RAD_S
-    return tuple(replace(s, excitation=scaled(s.excitation, factor)) for s in sequences)
+    size = speed_injection.fitting_size(sent, recording, setup.room, share_nm)
+    return sized(sequences, size.peak_rad_s / speed_injection.FIRST_RAD_S, size.base_rad_s)
+
+
+def sized(
+    sequences: tuple[excite.Sequence, ...], factor: float, base_rad_s: float
+) -> tuple[excite.Sequence, ...]:
+    """The same with excitations so many times as large and this peak of the base motion."""
+    made = []
+    for s in sequences:
+        base = s.base
+        if base is not None and np.any(base):
+            base = base * (base_rad_s / float(np.max(np.abs(base))))
+        made.append(replace(s, excitation=scaled(s.excitation, factor), base=base))
+    return tuple(made)
 
 
 async def _play_all(
@@ -59,13 +71,15 @@ async def _play_all(
     home_raw: int,
     progress: Progress,
     spare: int,
+    place: tuple[int, int] | None,
 ) -> Records:
     """Every realisation, from the same place as far as the travel asks for it.
 
     One that lost samples is played again, ``spare`` times over all of them; the best one counts.
     """
     records: list[Recorded] = []
-    played = 0
+    before, count = place or (0, len(sequences))
+    played = before
 
     async def one(sequence: excite.Sequence, told: Callable[[float], None]) -> Recorded:
         nonlocal played
@@ -74,9 +88,9 @@ async def _play_all(
         played += 1
         return await _play_one(axis, session, settings, setup, sequence, home_raw, told)
 
-    for number, sequence in enumerate(sequences):
-        low, high = (0.1 + 0.85 * part / len(sequences) for part in (number, number + 1))
-        step = f"measuring, realisation {number + 1} of {len(sequences)}"
+    for number, sequence in enumerate(sequences, before):
+        low, high = (0.1 + 0.85 * part / count for part in (number, number + 1))
+        step = f"measuring, realisation {number + 1} of {count}"
         tries = [await one(sequence, share(progress, low, high, step))]
         while spare > 0 and len(tries) <= _AGAIN and not _whole(*tries[-1]):
             spare -= 1
@@ -135,11 +149,13 @@ def _whole(sequence: excite.Sequence, recording: Recording) -> bool:
 async def play_fitting(
     axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
     sequences: tuple[excite.Sequence, ...], home_raw: int, progress: Progress, spare: int = 0,
+    place: tuple[int, int] | None = None,
 ) -> Records:  # fmt: skip
     """As `_play_all`; where the axis comes to its envelope the excitation becomes smaller.
 
     How much torque a closed loop takes depends on its gains, and how fast an axis without a loop
-    becomes on how its load swings: both are what is measured.
+    becomes on how its load swings: both are what is measured. ``place`` is how many were played
+    before, and how many there are.
 
     Raises:
         NotAllowed: something else ended it, or even the smallest excitation is too much.
@@ -147,7 +163,7 @@ async def play_fitting(
     for attempt in range(1, _ATTEMPTS + 1):
         try:
             return await _play_all(
-                axis, session, settings, setup, sequences, home_raw, progress, spare
+                axis, session, settings, setup, sequences, home_raw, progress, spare, place
             )  # fmt: skip
         except NotAllowed as error:
             if attempt == _ATTEMPTS or not _too_much(error, setup):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from backend.tools import sweep as sweep_tool
-from backend.tools import sweep_play
+from backend.tools import sweep_telling
 from backend.tools.sweep_evaluation import SweepSettings
 from drivers.cia402 import State
 from tests.virtual.tools.direct import direct
@@ -22,7 +22,7 @@ SWINGING = mechanics(
 
 
 async def test_the_second_excitation_is_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
-    played = sweep_play.play_fitting
+    played = sweep_telling.play_telling
     first: list[float] = []
     ended: list[int] = []
 
@@ -34,7 +34,7 @@ async def test_the_second_excitation_is_smaller(monkeypatch: pytest.MonkeyPatch)
         ended.append(len(records))
         return records
 
-    monkeypatch.setattr(sweep_tool, "play_fitting", noted)
+    monkeypatch.setattr(sweep_tool, "play_telling", noted)
     monkeypatch.setattr(sweep_tool, "evaluate", evaluate)
     async with direct(SWINGING, drive="r6l") as b:
         units, home = await b.axis.units(), await b.axis.position_raw()

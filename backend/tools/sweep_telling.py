@@ -1,0 +1,66 @@
+"""A speed loop's realisations, each pair as the one before shows that it tells most.
+
+A soft loop moves a heavy axis little at high frequencies, and a coarse encoder hides what it does.
+What noise leaves open after the first pair gets the energy of those that follow.
+"""
+
+from __future__ import annotations
+
+import asyncio
+
+import numpy as np
+
+from backend.axis import Axis
+from backend.cyclic import CyclicSession
+from backend.jobs import Progress
+from backend.tools import excite, speed_injection
+from backend.tools.sweep_evaluation import SweepSettings
+from backend.tools.sweep_plan import Setup
+from backend.tools.sweep_play import Records, play_fitting, sized
+
+#: Realisations with the same phases, of opposite sign.
+_PAIR = 2
+
+
+async def play_telling(
+    axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
+    sequences: tuple[excite.Sequence, ...], home: int, progress: Progress, spare: int = 0,
+) -> Records:  # fmt: skip
+    """As `play_fitting`; where a reference is played, the lines after the first pair differ.
+
+    Raises:
+        NotAllowed: as `play_fitting`.
+    """
+    count = len(sequences)
+    if not setup.by_speed or count <= _PAIR or settings.excitation == "stepped":
+        return await play_fitting(
+            axis, session, settings, setup, sequences, home, progress, spare
+        )  # fmt: skip
+    pair = sequences[:_PAIR]
+    first = await play_fitting(
+        axis, session, settings, setup, pair, home, progress, min(spare, _PAIR), (0, count)
+    )
+    further = await asyncio.to_thread(_more_telling, first, sequences[_PAIR:], settings, setup)
+    return first + await play_fitting(
+        axis, session, settings, setup, further, home, progress, min(spare, count - _PAIR),
+        (_PAIR, count),
+    )  # fmt: skip
+
+
+def _more_telling(
+    first: Records, further: tuple[excite.Sequence, ...], settings: SweepSettings, setup: Setup
+) -> tuple[excite.Sequence, ...]:
+    """Further realisations, as large as the first pair became, with weights that it tells."""
+    sent = first[0][0]
+    base = np.zeros(1) if sent.base is None else sent.base
+    peak = float(np.max(np.abs(sent.excitation.samples - base)))
+    try:
+        weight = speed_injection.telling_weight(first, setup.rate)
+    except ValueError:
+        return further
+    band = excite.band_for(setup.rate, settings.f_min_hz, settings.f_max_hz)
+    shaped = speed_injection.sequences(
+        setup.rate, band, setup.room, peak, settings.realisations, settings.excitation,
+        base=settings.base_motion, weight=weight,
+    )  # fmt: skip
+    return sized(shaped[_PAIR:], 1.0, float(np.max(np.abs(base))))
