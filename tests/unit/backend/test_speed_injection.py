@@ -12,6 +12,8 @@ from backend.tools import excite, speed_injection
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.recording import Recording
 from backend.tools.sweep_evaluation import SweepSettings, evaluate
+from backend.tools.sweep_plan import Setup
+from backend.tools.sweep_telling import _more_telling
 from backend.tools.waveform import Band
 
 RATE, BAND = 1000.0, Band(5.0, 400.0)
@@ -112,3 +114,19 @@ def test_size_by_a_reference_is_not_known_better_than_its_loop() -> None:
     found = evaluate(records, RATE, facts, settings, "speed", dc=False, by_speed=True)
     assert float(np.min(found.frf.std_db)) > 0.1
     assert float(np.min(found.direct.std_db)) > 0.1
+
+
+def test_the_second_pair_is_as_large_as_the_first_became_and_has_other_lines() -> None:
+    facts = AxisFacts(1.27, True, 3000.0, None, None, None, None, False)
+    setup = Setup(RATE, facts, "speed", ROOM, excite.Rigid(1.5e-3), 1e-3, by_speed=True)
+    settings = SweepSettings(Envelope(4.0, 1500.0, 100.0, 60.0))
+    first = tuple((s, played(s, 1.5e-3)) for s in sequences(30.0))
+    further = _more_telling(first, (), settings, setup)
+    assert [s.excitation.realisation for s in further] == [1, 1]
+    for s in further:
+        assert np.max(np.abs(s.excitation.samples)) == pytest.approx(30.0, rel=0.1)
+        assert s.base is not None
+        assert np.max(np.abs(s.base)) == pytest.approx(20.0, rel=0.01)
+    e = further[0].excitation
+    lines = np.abs(np.fft.rfft(e.one_period)[e.lines])
+    assert float(np.max(lines) / np.min(lines)) > 2.0
