@@ -49,21 +49,38 @@ class Bench:
     def wait_moving(self) -> None:
         until(self.moves, HANG_S, "the axis moves")
 
-    def press(self, press: Callable[[], None], let_go: Callable[[], None]) -> None:
-        """Hold a jog button until the axis moves; after a stall once more, as people do."""
+    def press(
+        self,
+        press: Callable[[], None],
+        let_go: Callable[[], None],
+        turned_down: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Hold a jog button until the axis moves; after a stall once more, as people do.
+
+        ``turned_down``: whether the page says that the press began nothing.
+        """
         for _ in range(8):
             before = {job["id"] for job in self._jogs()}
             press()
-            until(lambda known=before: self.moves() or self._ended(known), HANG_S, "the axis moves")
-            if not self._ended(before):
+            until(
+                lambda known=before: self.moves() or self._ended(known) or turned_down(),
+                HANG_S,
+                "the axis moves",
+            )
+            if not self._ended(before) and not turned_down():
                 return
             let_go()
         raise AssertionError("this machine stalls too often")
 
-    def jog(self, press: Callable[[], None], let_go: Callable[[], None]) -> str:
+    def jog(
+        self,
+        press: Callable[[], None],
+        let_go: Callable[[], None],
+        turned_down: Callable[[], bool] = lambda: False,
+    ) -> str:
         """Hold a jog button until the axis moves, and let go; returns why the jog ended."""
         for _ in range(8):
-            self.press(press, let_go)
+            self.press(press, let_go, turned_down)
             let_go()
             self.wait_standing()
             reason = str(self.jog_job()["result"]["reason"])
@@ -94,6 +111,11 @@ class Bench:
     def jog_job(self) -> Any:
         """The jog that began last."""
         return self._jogs()[-1]
+
+
+def says_no(page: Page) -> Callable[[], bool]:
+    """Whether the page says that a press began nothing."""
+    return page.locator(".not-begun").is_visible
 
 
 def open_axis(page: Page, drive: str, name: str) -> None:

@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Dialog, Locator, Page, expect
 from backend.people.rights import Right, Role
 from backend.people.station import People
 from tests.browser.conftest import HERE, LAPTOP, PATIENCE_MS
-from tests.browser.driving import TOLD_MS, Bench, open_axis
+from tests.browser.driving import TOLD_MS, Bench, open_axis, says_no
 from tests.browser.test_motion import PLUS, _centre
 from tests.support.guarded import CHEAP, NAMES, PASSWORD
 from tests.support.machine import OwnTime, within
@@ -160,7 +160,7 @@ def test_a_viewer_moves_nothing_and_can_stop(opened: Open, bench: Bench) -> None
     expect(vera.get_by_text("Vera may not do this")).to_be_visible()
     vera.mouse.up()
     olaf.mouse.move(*_centre(olaf, PLUS))
-    bench.press(olaf.mouse.down, olaf.mouse.up)
+    bench.press(olaf.mouse.down, olaf.mouse.up, says_no(olaf))
     vera.keyboard.press("Escape")
     bench.wait_standing()
     # Who stopped it is told where it was moved from, and not on the page that pressed.
@@ -410,3 +410,27 @@ def test_a_page_on_site_that_goes_away_stops_the_guest(opened: Open, bench: Benc
     bench.wait_standing()
     anna = person(opened, bench, Role.ADMINISTRATOR)
     end_visit(anna)
+
+
+def test_a_guest_whose_browser_closes_stops_the_axis(opened: Open, bench: Bench) -> None:
+    olaf = person(opened, bench, Role.OPERATOR)
+    guest = invited(olaf, opened, bench, "move")
+    granted(olaf, guest)
+    move_together(olaf, guest, bench)
+    assert standstill_s(bench, guest.context.close) < 2
+    olaf.mouse.up()
+    bench.wait_standing()
+    end_visit(olaf)
+
+
+def test_a_guest_who_may_only_look_can_stop(opened: Open, bench: Bench) -> None:
+    olaf = person(opened, bench, Role.OPERATOR)
+    guest = invited(olaf, opened, bench)
+    open_axis(olaf, bench.drive, "motion")
+    olaf.mouse.move(*_centre(olaf, PLUS))
+    bench.press(olaf.mouse.down, olaf.mouse.up, says_no(olaf))
+    guest.get_by_role("button", name="Stop all axes (Esc)").click()
+    bench.wait_standing()
+    expect(olaf.get_by_text("pressed STOP.")).to_be_visible(timeout=TOLD_MS)
+    olaf.mouse.up()
+    end_visit(olaf)

@@ -5,11 +5,13 @@ import { StrictMode } from 'react'
 import { createRoot } from 'react-dom/client'
 import { whenUnknown } from './api/client'
 import { App } from './app/App'
+import { keepPresses } from './app/press'
 import { checkSession } from './app/session'
 import { listenForEscape } from './app/stop'
 import * as live from './live/live'
 
 listenForEscape()
+keepPresses()
 whenUnknown(() => void checkSession())
 live.whenRefused(() => void checkSession())
 createRoot(document.getElementById('root') as HTMLElement).render(

@@ -46,9 +46,14 @@ export function Late({ page, children }: { page: string; children: ReactNode }) 
     }
     const observer = new ResizeObserver(resized)
     observer.observe(box)
+    // Before the next event: a press that is taken before the page is drawn again would otherwise
+    // meet what has moved under it, which nobody has seen yet.
+    const changed = new MutationObserver(resized)
+    changed.observe(box, { childList: true, subtree: true, characterData: true, attributes: true })
     main.addEventListener('scroll', scrolled, { passive: true })
     return () => {
       observer.disconnect()
+      changed.disconnect()
       main.removeEventListener('scroll', scrolled)
     }
   }, [])

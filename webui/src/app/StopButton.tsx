@@ -1,6 +1,7 @@
 import { useEffect } from 'react'
 import { createPortal } from 'react-dom'
 import { useT } from '../i18n'
+import { said } from '../i18n/said'
 import { useDrives, useStore } from '../live/store'
 import { Icon } from '../widgets/Icon'
 import { currentReport, dismissReport, stopEverything } from './stop'
@@ -70,7 +71,7 @@ function StopReportNote() {
       )}
       {failed.map(([id, why]) => (
         <p key={id}>
-          <strong>{t('stop.failed', { name: name(id) })}</strong> {why}. {t('stop.useHardware')}
+          <strong>{t('stop.failed', { name: name(id) })}</strong> {said(t, why)}. {t('stop.useHardware')}
         </p>
       ))}
       {!good && (

@@ -136,6 +136,35 @@ export const axis = {
     '页面 200 毫秒无响应。网络慢或设备繁忙？请重新按住',
   ],
   'reason.cancelled': ['stopped', '已停止'],
+  'start.not': ['Not begun.', '未开始。'],
+  'start.noConnection': [
+    'There is no connection to the server. It comes back by itself; then press again.',
+    '与服务器的连接已断开，会自动恢复；恢复后请再按一次。',
+  ],
+  'start.noAnswer': [
+    'The drive did not answer when the button was pressed. Press again once it does; look at cable and supply if it stays away.',
+    '按下时驱动器无应答。恢复应答后请再按一次；若一直无应答，请检查电缆和供电。',
+  ],
+  'start.incomplete': [
+    'A field above is empty or holds a value that is not allowed. Fill it in.',
+    '上方有字段为空或数值不允许，请填写。',
+  ],
+  'start.limits': [
+    'A limit is empty or not allowed. Fill in the limits under “Before anything moves”.',
+    '有限值为空或不允许。请填写“运动之前”中的限值。',
+  ],
+  'start.agree': [
+    'This is done only with your consent. Read what stands above and tick the box there.',
+    '需要您的同意才能执行。请阅读上方说明并勾选。',
+  ],
+  'start.noExchange': [
+    'The cyclic exchange of this bus does not run. Start it on the page Connect.',
+    '此总线的周期通信未运行。请在“连接”页面启动。',
+  ],
+  'start.unfocused': [
+    'The browser window was not in front when the button was pressed. Press again.',
+    '按下时浏览器窗口不在最前。请再按一次。',
+  ],
   'move.title': ['Move', '移动'],
   'move.mode.PP': ['Position', '位置'],
   'move.mode.PV': ['Speed', '速度'],

@@ -334,8 +334,8 @@ export const tuning = {
   ],
   'tune.ok.exchange': ['The cyclic exchange runs.', '周期通信正在运行。'],
   'tune.no.exchange': [
-    'The cyclic exchange does not run. A measurement starts it with 1 ms and ends it afterwards; start it here to choose another cycle or to keep it.',
-    '周期通信未运行。测量时会以 1 ms 启动并在之后结束；也可在此选择周期并保持运行。',
+    'The cyclic exchange does not run. A measurement starts it with {ms} ms and ends it afterwards; start it here to choose another cycle or to keep it.',
+    '周期通信未运行。测量时会以 {ms} ms 启动并在之后结束；也可在此选择周期并保持运行。',
   ],
   'tune.limits': ['Limits of every movement', '所有运动的限制'],
   'tune.limitsHelp': [

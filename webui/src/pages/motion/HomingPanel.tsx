@@ -1,13 +1,15 @@
-import { Button, NativeSelect } from '@mantine/core'
+import { NativeSelect } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
-import type { AxisState, HomingMethodInfo } from '../../api/schema'
+import type { HomingMethodInfo } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setJob, useLink } from '../../live/store'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
+import { useObstacle } from '../../widgets/useObstacle'
 import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
 import { HomingPicture } from './HomingPicture'
 import { useRemembered } from './remembered'
@@ -15,12 +17,10 @@ import { placeIn, startIn, type TravelUnit } from './travelUnit'
 
 export function HomingPanel({
   drive,
-  state,
   unit,
   onStarted,
 }: {
   drive: string
-  state: AxisState | null
   unit: TravelUnit
   onStarted: (job: string) => void
 }) {
@@ -42,6 +42,7 @@ export function HomingPanel({
   const [time, setTime] = useRemembered(drive, 'home.time', 60)
   const load = useAction()
   const start = useAction()
+  const obstacle = useObstacle(drive)
   useEffect(() => {
     if (!open) return
     void load.run(async () => {
@@ -57,6 +58,7 @@ export function HomingPanel({
     })
   }, [drive, open, load.run])
   const method = methods.find((each) => each.method === number) ?? null
+  const complete = method !== null && travel !== null && torque !== null && time !== null
   const go = () =>
     start.run(async () => {
       if (number === null || travel === null || torque === null || time === null) return
@@ -122,21 +124,13 @@ export function HomingPanel({
         />
       </div>
       <p className="dim">{t('homing.empty')}</p>
-      <Button
-        variant="filled"
-        disabled={
-          method === null ||
-          travel === null ||
-          torque === null ||
-          time === null ||
-          state?.moving_job != null ||
-          !state?.fresh
-        }
-        loading={start.busy}
-        onClick={() => void go()}
+      <StartButton
+        obstacle={obstacle ?? (complete ? null : t('start.incomplete'))}
+        busy={start.busy}
+        onStart={() => void go()}
       >
         {t('homing.start')}
-      </Button>
+      </StartButton>
       <ProblemNote problem={start.problem} onClose={start.clear} />
     </Panel>
   )

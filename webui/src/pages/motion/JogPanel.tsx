@@ -1,16 +1,20 @@
-import { type KeyboardEvent, type PointerEvent, useRef } from 'react'
+import { type KeyboardEvent, type PointerEvent, useEffect, useRef, useState } from 'react'
 import type { AxisState } from '../../api/schema'
 import { known, useT } from '../../i18n'
 import { said } from '../../i18n/said'
-import { useJob, useLink } from '../../live/store'
+import { useJob } from '../../live/store'
 import { quantity } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { useObstacle } from '../../widgets/useObstacle'
 import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
 import type { TravelUnit } from './travelUnit'
 import { type JogSettings, useJog } from './useJog'
 import { useMotionNumbers } from './useMotionNumbers'
+
+/** How long it is told why a press began nothing. */
+const TOLD_MS = 12000
 
 /** Hold to run: by mouse, finger or arrow key; whatever ends the hold stops the axis. */
 export function JogPanel({
@@ -23,7 +27,6 @@ export function JogPanel({
   unit: TravelUnit
 }) {
   const t = useT()
-  const link = useLink()
   const { units } = unit
   const numbers = useMotionNumbers(drive, unit, 'jog', 5)
   const [speed, acceleration] = [numbers.speed.value, numbers.acceleration.value]
@@ -36,7 +39,25 @@ export function JogPanel({
   const running = direction !== null
   const taken = !running && state?.moving_job != null
   const job = useJob(state?.moving_job ?? null)
-  const ready = settings !== null && link.open && (state?.fresh ?? false) && !taken
+  const inTheWay = useObstacle(drive)
+  const obstacle = running
+    ? null
+    : taken && ending
+      ? t('jog.ending')
+      : (inTheWay ?? (settings ? null : t('jog.invalid')))
+  const [told, setTold] = useState<string | null>(null)
+  useEffect(() => {
+    if (told === null) return
+    const timer = setTimeout(() => setTold(null), TOLD_MS)
+    return () => clearTimeout(timer)
+  }, [told])
+  /** A press that begins nothing says why: a lost answer of the drive is soon over and unseen. */
+  const begin = (towards: -1 | 1): boolean => {
+    if (hold.held !== null) return press(towards) // which ends it
+    const begun = obstacle === null && press(towards)
+    setTold(begun ? null : (obstacle ?? t('start.unfocused')))
+    return begun
+  }
   const pad = useRef<HTMLDivElement>(null)
   const keys: Record<string, -1 | 1> = { ArrowLeft: -1, ArrowRight: 1 }
   const keyDown = (event: KeyboardEvent) => {
@@ -47,7 +68,7 @@ export function JogPanel({
     }
     event.preventDefault()
     if (event.repeat || event.ctrlKey || event.altKey || event.metaKey || event.shiftKey) return
-    if (ready) press(towards)
+    begin(towards)
   }
   const keyUp = (event: KeyboardEvent) => {
     if (keys[event.key] !== undefined) hold.release('released')
@@ -74,8 +95,8 @@ export function JogPanel({
         <JogButton
           towards={-1}
           held={direction}
-          disabled={!ready}
-          press={press}
+          disabled={obstacle !== null}
+          press={begin}
           hold={hold}
           pad={pad}
         />
@@ -97,8 +118,8 @@ export function JogPanel({
         <JogButton
           towards={1}
           held={direction}
-          disabled={!ready}
-          press={press}
+          disabled={obstacle !== null}
+          press={begin}
           hold={hold}
           pad={pad}
         />
@@ -111,6 +132,11 @@ export function JogPanel({
         </p>
       )}
       {!settings && <p className="warn-text">{t('jog.invalid')}</p>}
+      {told !== null && !running && (
+        <p className="note warn not-begun" role="alert">
+          <strong>{t('start.not')}</strong> {told}
+        </p>
+      )}
       {ended && !ended.problem && (
         <p className="note" role="status">
           {t('jog.ended', { reason: known(t, 'reason', ended.reason) })}
@@ -148,7 +174,10 @@ function JogButton({
       hold.release('pointer cancelled')
       return
     }
-    if (disabled) return
+    if (disabled) {
+      press(towards)
+      return
+    }
     // The captured pointer's end comes here wherever the finger has slid to.
     event.currentTarget.setPointerCapture(event.pointerId)
     pad.current?.focus({ preventScroll: true })

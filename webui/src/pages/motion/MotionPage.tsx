@@ -71,9 +71,7 @@ export function MotionPage({ drive }: { drive: string }) {
             {tab === 'signal' && (
               <SignalPanel drive={summary} {...{ state, unit }} onStarted={started} />
             )}
-            {tab === 'homing' && (
-              <HomingPanel drive={drive} {...{ state, unit }} onStarted={started} />
-            )}
+            {tab === 'homing' && <HomingPanel drive={drive} unit={unit} onStarted={started} />}
           </Fragment>
           {tab === 'settings' && <SettingsPanel drive={drive} />}
           {moving && moving.id !== mine && moving.kind !== 'jog' && <JobNote id={moving.id} />}
@@ -121,10 +119,11 @@ function Power({ drive }: { drive: string }) {
           {t('motion.enable')}
         </Button>
         <Button
+          // Taking the power off is also tried where the drive missed an answer.
           disabled={
-            !goals.includes('Switch on disabled') ||
-            state?.state === 'Switch on disabled' ||
-            act.busy
+            act.busy ||
+            (state?.fresh === true &&
+              (!goals.includes('Switch on disabled') || state.state === 'Switch on disabled'))
           }
           onClick={() => void goTo('Switch on disabled')}
         >

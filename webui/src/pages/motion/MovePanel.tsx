@@ -1,4 +1,4 @@
-import { Button, Checkbox, SegmentedControl } from '@mantine/core'
+import { Checkbox, SegmentedControl } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AxisState, DriveSummary } from '../../api/schema'
@@ -7,7 +7,9 @@ import { setJob } from '../../live/store'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
+import { useObstacle } from '../../widgets/useObstacle'
 import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
 import { useRemembered } from './remembered'
 import type { TravelUnit } from './travelUnit'
@@ -39,6 +41,7 @@ export function MovePanel({
   const [travel, torque] = [numbers.travel.value, numbers.torque.value]
   const [time, setTime] = useRemembered(drive.id, 'move.time', 10)
   const start = useAction()
+  const obstacle = useObstacle(drive.id)
   const key = `${drive.id} ${mode}`
   useEffect(() => {
     // A target or consent of another axis or mode is never carried over.
@@ -54,8 +57,7 @@ export function MovePanel({
     torque !== null &&
     time !== null &&
     acceleration !== null &&
-    (mode === 'PV' || speed !== null) &&
-    (!unwatched || consent)
+    (mode === 'PV' || speed !== null)
   const go = () =>
     start.run(async () => {
       if (target === null || travel === null || torque === null || time === null) return
@@ -137,14 +139,16 @@ export function MovePanel({
           />
         </div>
       )}
-      <Button
-        variant="filled"
-        disabled={!complete || state?.moving_job != null || !state?.fresh}
-        loading={start.busy}
-        onClick={() => void go()}
+      <StartButton
+        obstacle={
+          obstacle ??
+          (!complete ? t('start.incomplete') : unwatched && !consent ? t('start.agree') : null)
+        }
+        busy={start.busy}
+        onStart={() => void go()}
       >
         {t('move.start')}
-      </Button>
+      </StartButton>
       <ProblemNote problem={start.problem} onClose={start.clear} />
     </Panel>
   )

@@ -7,7 +7,9 @@ import { setJob } from '../../live/store'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
+import { useObstacle } from '../../widgets/useObstacle'
 import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
 import { useRemembered } from './remembered'
 import type { TravelUnit } from './travelUnit'
@@ -35,6 +37,7 @@ export function SequencePanel({
   const [speed, acceleration] = [numbers.speed.value, numbers.acceleration.value]
   const [travel, torque] = [numbers.travel.value, numbers.torque.value]
   const start = useAction()
+  const obstacle = useObstacle(drive)
   useEffect(() => {
     // Positions of another axis are never carried over.
     if (drive) {
@@ -124,14 +127,13 @@ export function SequencePanel({
         <TravelLimit units={units} {...numbers.travel} />
         <TorqueLimit {...numbers.torque} />
       </div>
-      <Button
-        variant="filled"
-        disabled={values.includes(null) || state?.moving_job != null || !state?.fresh}
-        loading={start.busy}
-        onClick={() => void go()}
+      <StartButton
+        obstacle={obstacle ?? (values.includes(null) ? t('start.incomplete') : null)}
+        busy={start.busy}
+        onStart={() => void go()}
       >
         {t('sequence.start')}
-      </Button>
+      </StartButton>
       <ProblemNote problem={start.problem} onClose={start.clear} />
     </Panel>
   )

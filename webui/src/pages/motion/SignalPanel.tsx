@@ -1,4 +1,4 @@
-import { Button, NativeSelect, SegmentedControl } from '@mantine/core'
+import { NativeSelect, SegmentedControl } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AxisState, DriveSummary, GenerateRequest } from '../../api/schema'
@@ -7,7 +7,9 @@ import { setJob } from '../../live/store'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
+import { useObstacle } from '../../widgets/useObstacle'
 import { Speed, TorqueLimit, TravelLimit } from './fields'
 import { useBuses } from '../connect/useBuses'
 import { useRemembered } from './remembered'
@@ -76,6 +78,7 @@ export function SignalPanel({
   )
   const [torque, setTorque] = useRemembered(drive.id, 'signal.torque', 50)
   const start = useAction()
+  const obstacle = useObstacle(drive.id)
   const key = `${drive.id} ${mode}`
   useEffect(() => {
     // An amplitude of another axis or mode is never carried over.
@@ -185,19 +188,20 @@ export function SignalPanel({
         <Speed units={units} label={t('move.speedLimit')} value={speed} onChange={setSpeed} />
         <TorqueLimit value={torque} onChange={setTorque} />
       </div>
-      <Button
-        variant="filled"
-        disabled={
-          values.includes(null) ||
-          !bus?.cyclic?.running ||
-          state?.moving_job != null ||
-          !state?.fresh
+      <StartButton
+        obstacle={
+          obstacle ??
+          (!bus?.cyclic?.running
+            ? t('start.noExchange')
+            : values.includes(null)
+              ? t('start.incomplete')
+              : null)
         }
-        loading={start.busy}
-        onClick={() => void go()}
+        busy={start.busy}
+        onStart={() => void go()}
       >
         {t('signal.start')}
-      </Button>
+      </StartButton>
       <ProblemNote problem={start.problem} onClose={start.clear} />
     </Panel>
   )

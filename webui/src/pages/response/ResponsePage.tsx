@@ -53,7 +53,7 @@ export function ResponsePage({ drive }: { drive: string }) {
       {state && !way.possible && <p className="note info">{t('tune.needsCyclic')}</p>}
       <div className="response-columns">
         <div className="stack">
-          {way.possible && <SweepForm drive={drive} state={state} way={way} />}
+          {way.possible && <SweepForm drive={drive} way={way} />}
           <JobNote id={note} onClose={dismiss} />
           <MeasurementList
             list={measured.list}

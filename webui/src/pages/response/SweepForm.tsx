@@ -1,13 +1,15 @@
-import { Button, Checkbox, NativeSelect, useComputedColorScheme } from '@mantine/core'
+import { Checkbox, NativeSelect, useComputedColorScheme } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
-import type { AxisState, SweepRequest } from '../../api/schema'
+import type { SweepRequest } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setJob } from '../../live/store'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
+import { useObstacle } from '../../widgets/useObstacle'
 import { useRemembered } from '../motion/remembered'
 import { ExcitationPreview } from './ExcitationPreview'
 import { LimitFields, useLimits } from './limits'
@@ -18,15 +20,7 @@ const LOOPS = ['auto', 'none', 'speed', 'position'] as const
 const SIGNALS = ['multisine', 'chirp', 'prbs', 'stepped'] as const
 
 /** What to measure, within which limits, and what will move. */
-export function SweepForm({
-  drive,
-  state,
-  way,
-}: {
-  drive: string
-  state: AxisState | null
-  way: Measurable
-}) {
+export function SweepForm({ drive, way }: { drive: string; way: Measurable }) {
   const t = useT()
   const [kind, setKind] = useState<SweepRequest['kind']>('mechanics')
   const [loop, setLoop] = useState<SweepRequest['loop']>('auto')
@@ -39,6 +33,7 @@ export function SweepForm({
   const stepped = signal === 'stepped'
   const limits = useLimits(drive)
   const start = useAction()
+  const obstacle = useObstacle(drive)
   const dark = useComputedColorScheme('light') === 'dark'
   const [previewed, setPreviewed] = useState(false)
   const request: SweepRequest | null =
@@ -176,14 +171,15 @@ export function SweepForm({
           })}
         </p>
       )}
-      <Button
-        variant="filled"
-        disabled={!request || !limits.agreed || state?.moving_job != null || !state?.fresh}
-        loading={start.busy}
-        onClick={() => void go()}
+      <StartButton
+        obstacle={
+          obstacle ?? (!request ? t('start.incomplete') : !limits.agreed ? t('start.agree') : null)
+        }
+        busy={start.busy}
+        onStart={() => void go()}
       >
         {t('sweep.start')}
-      </Button>
+      </StartButton>
       <ProblemNote problem={start.problem} onClose={start.clear} />
     </Panel>
   )

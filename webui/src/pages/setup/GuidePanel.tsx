@@ -9,9 +9,11 @@ import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ParameterFields } from '../../widgets/ParameterFields'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { StartButton } from '../../widgets/StartButton'
 import { ProcedureDialog, useProcedures } from '../../widgets/Procedures'
 import { useAction } from '../../widgets/useAction'
 import { useFunctions } from '../../widgets/useFunctions'
+import { useObstacle } from '../../widgets/useObstacle'
 import { useRemembered } from '../motion/remembered'
 
 /** A course of the drive's manual, step by step, with the parameters and procedures of each. */
@@ -72,6 +74,7 @@ export function GuidePanel({ drive, guide }: { drive: string; guide: Guide }) {
 function Identify({ drive, onStarted }: { drive: string; onStarted: (job: string) => void }) {
   const t = useT()
   const state = useAxisState(drive)
+  const obstacle = useObstacle(drive)
   const spec = useFunctions(drive)?.identification
   const [travel, setTravel] = useRemembered(drive, 'identify.travel', null)
   const [time, setTime] = useRemembered(drive, 'identify.time', 120)
@@ -116,16 +119,20 @@ function Identify({ drive, onStarted }: { drive: string; onStarted: (job: string
         checked={agreed}
         onChange={(event) => setAgreed(event.currentTarget.checked)}
       />
-      <Button
-        variant="filled"
-        disabled={
-          !agreed || travel === null || time === null || !state?.fresh || state.moving_job !== null
+      <StartButton
+        obstacle={
+          obstacle ??
+          (travel === null || time === null
+            ? t('start.incomplete')
+            : agreed
+              ? null
+              : t('start.agree'))
         }
-        loading={act.busy}
-        onClick={() => void start()}
+        busy={act.busy}
+        onStart={() => void start()}
       >
         {t('identify.start')}
-      </Button>
+      </StartButton>
       <ProblemNote problem={act.problem} onClose={act.clear} />
     </>
   )

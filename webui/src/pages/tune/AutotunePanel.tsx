@@ -1,4 +1,4 @@
-import { Button, Checkbox, NativeSelect, SegmentedControl } from '@mantine/core'
+import { Checkbox, NativeSelect, SegmentedControl } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AutotuneRequest, AxisState } from '../../api/schema'
@@ -8,6 +8,7 @@ import { JobNote } from '../../widgets/JobNote'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
 import type { Limits } from '../response/limits'
 import { asAutotune } from '../response/results'
@@ -25,14 +26,17 @@ export function AutotunePanel({
   drive,
   state,
   limits,
-  able,
+  obstacle,
+  cycleMs,
   now,
   onChanged,
 }: {
   drive: string
   state: AxisState | null
   limits: Limits | null
-  able: boolean
+  /** What is in the way of a measurement, in words. */
+  obstacle: string | null
+  cycleMs: number
   /** Gains that the drive holds now, raw. */
   now: Record<string, number> | null
   onChanged: () => void
@@ -52,7 +56,7 @@ export function AutotunePanel({
       if (!limits) return
       const body: AutotuneRequest = {
         ...limits,
-        cycle_ms: 1,
+        cycle_ms: cycleMs,
         mark,
         load: load === 'auto' ? null : load,
         loop: 'auto',
@@ -110,14 +114,13 @@ export function AutotunePanel({
           })}
         </p>
       )}
-      <Button
-        variant="filled"
-        disabled={!able || limits === null || !scheme.complete}
-        loading={start.busy}
-        onClick={() => void go()}
+      <StartButton
+        obstacle={obstacle ?? (scheme.complete ? null : t('start.incomplete'))}
+        busy={start.busy}
+        onStart={() => void go()}
       >
         {t('autotune.start')}
-      </Button>
+      </StartButton>
       <ProblemNote problem={start.problem} onClose={start.clear} />
       {job?.state === 'running' && (
         <ol className="steps">

@@ -1,4 +1,3 @@
-import { Button } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AxisState } from '../../api/schema'
@@ -8,6 +7,7 @@ import { JobNote } from '../../widgets/JobNote'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
 import { fixed } from '../response/bode'
 import type { Limits } from '../response/limits'
@@ -21,12 +21,15 @@ export function InertiaPanel({
   drive,
   state,
   limits,
-  able,
+  obstacle,
+  cycleMs,
 }: {
   drive: string
   state: AxisState | null
   limits: Limits | null
-  able: boolean
+  /** What is in the way of a measurement, in words. */
+  obstacle: string | null
+  cycleMs: number
 }) {
   const t = useT()
   const scheme = useScheme()
@@ -52,7 +55,7 @@ export function InertiaPanel({
             params: { path: { drive_id: drive } },
             body: {
               ...limits,
-              cycle_ms: 1,
+              cycle_ms: cycleMs,
               scheme: scheme.scheme,
               ends_rev: scheme.ends,
               search_torque: searchTorque,
@@ -106,14 +109,13 @@ export function InertiaPanel({
           help={t('inertia.motorHelp')}
         />
       </div>
-      <Button
-        variant="filled"
-        disabled={!complete || !able}
-        loading={start.busy}
-        onClick={() => void go()}
+      <StartButton
+        obstacle={obstacle ?? (complete ? null : t('start.incomplete'))}
+        busy={start.busy}
+        onStart={() => void go()}
       >
         {t('inertia.start')}
-      </Button>
+      </StartButton>
       <ProblemNote problem={start.problem} onClose={start.clear} />
       <JobNote id={note} onClose={dismiss} />
       {result && <InertiaResult result={result} />}

@@ -14,12 +14,15 @@ export function PreChecks({
   checks,
   bus,
   limits,
+  cycleMs,
   onChange,
 }: {
   drive: DriveSummary
   checks: Check[]
   bus: Bus | null
   limits: ReturnType<typeof useLimits>
+  /** Cycle of the exchange that a measurement starts where none runs. */
+  cycleMs: number
   onChange: () => Promise<void>
 }) {
   const t = useT()
@@ -36,7 +39,7 @@ export function PreChecks({
               <Icon name={check.ok ? 'check' : check.optional ? 'clock' : 'cross'} />
             </span>
             <span className="grow">
-              {t(check.ok ? `tune.ok.${check.name}` : `tune.no.${check.name}`)}
+              {t(check.ok ? `tune.ok.${check.name}` : `tune.no.${check.name}`, { ms: cycleMs })}
               {!check.ok && check.detail && <strong> {check.detail}</strong>}
             </span>
             {!check.ok && check.name === 'faults' && (

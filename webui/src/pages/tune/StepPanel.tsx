@@ -1,4 +1,4 @@
-import { Button, NativeSelect, SegmentedControl } from '@mantine/core'
+import { NativeSelect, SegmentedControl } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { MeasurementInfo } from '../../api/schema'
@@ -9,6 +9,7 @@ import { JobNote, useJobEnd } from '../../widgets/JobNote'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
 import type { Limits } from '../response/limits'
 import { asStep, filesOf } from '../response/results'
@@ -20,12 +21,15 @@ import { StepNumbers } from './StepNumbers'
 export function StepPanel({
   drive,
   limits,
-  able,
+  obstacle,
+  cycleMs,
   stored,
 }: {
   drive: string
   limits: Limits | null
-  able: boolean
+  /** What is in the way of a measurement, in words. */
+  obstacle: string | null
+  cycleMs: number
   /** Earlier steps of this axis, newest first. */
   stored: MeasurementInfo[]
 }) {
@@ -60,7 +64,7 @@ export function StepPanel({
         await ask(
           api.POST('/api/v1/drives/{drive_id}/jobs/step', {
             params: { path: { drive_id: drive } },
-            body: { ...limits, cycle_ms: 1, kind, size, hold_s: 0.25, speed, acceleration },
+            body: { ...limits, cycle_ms: cycleMs, kind, size, hold_s: 0.25, speed, acceleration },
           }),
         ),
       )
@@ -110,14 +114,16 @@ export function StepPanel({
           {t('step.moves', { travel: limits.travel_limit, torque: limits.torque_limit })}
         </p>
       )}
-      <Button
-        variant="filled"
-        disabled={!able || !limits || !size || speed === null || acceleration === null}
-        loading={start.busy}
-        onClick={() => void go()}
+      <StartButton
+        obstacle={
+          obstacle ??
+          (!size || speed === null || acceleration === null ? t('start.incomplete') : null)
+        }
+        busy={start.busy}
+        onStart={() => void go()}
       >
         {t('step.start')}
-      </Button>
+      </StartButton>
       <ProblemNote problem={start.problem} onClose={start.clear} />
       <JobNote id={note} onClose={dismiss} />
       {stored.length > 0 && (

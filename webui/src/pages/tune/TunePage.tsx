@@ -1,6 +1,7 @@
 import { href } from '../../app/router'
 import { useT } from '../../i18n'
-import { useAxisState, useDrive } from '../../live/store'
+import { said } from '../../i18n/said'
+import { useAxisState, useDrive, useLink } from '../../live/store'
 import { useJobEnd } from '../../widgets/JobNote'
 import { Panel } from '../../widgets/Panel'
 import { useBuses } from '../connect/useBuses'
@@ -29,7 +30,8 @@ export function TunePage({ drive }: { drive: string }) {
   const summary = useDrive(drive)
   const state = useAxisState(drive)
   const { buses, refresh } = useBuses()
-  const { possible } = useMeasurable(summary, state)
+  const { possible, cycleMs } = useMeasurable(summary, state)
+  const { open } = useLink()
   const limits = useLimits(drive)
   const gains = useGains(drive)
   const measured = useMeasurements('')
@@ -52,6 +54,16 @@ export function TunePage({ drive }: { drive: string }) {
     ) ?? null
   const checks = preChecks(summary, state, { possible, running: bus?.cyclic?.running ?? false })
   const able = ready(checks)
+  const missing = checks.find((each) => !each.ok && !each.optional)
+  const obstacle = !open
+    ? t('start.noConnection')
+    : missing
+      ? [t(`tune.no.${missing.name}`), said(t, missing.detail)].join(' ').trim()
+      : !limits.limits
+        ? t('start.limits')
+        : limits.agreed
+          ? null
+          : t('start.agree')
   const found = asInertia(inertiaJob?.result) ?? tuned?.inertia ?? null
   const si = found?.identifiable && found.unit === 'SI' ? found.inertia_kgm2 : null
   const designable = gains.gains !== null && gains.gains.convention !== 'unit'
@@ -88,6 +100,7 @@ export function TunePage({ drive }: { drive: string }) {
               checks={checks}
               bus={bus}
               limits={limits}
+              cycleMs={cycleMs}
               onChange={refresh}
             />
           </div>
@@ -97,7 +110,8 @@ export function TunePage({ drive }: { drive: string }) {
                 drive={drive}
                 state={state}
                 limits={limits.agreed ? limits.limits : null}
-                able={able}
+                obstacle={obstacle}
+                cycleMs={cycleMs}
               />
             </div>
           )}
@@ -111,7 +125,8 @@ export function TunePage({ drive }: { drive: string }) {
               drive={drive}
               state={state}
               limits={limits.agreed ? limits.limits : null}
-              able={able}
+              obstacle={obstacle}
+              cycleMs={cycleMs}
               now={gains.gains?.raw ?? null}
               onChanged={() => void gains.read()}
             />
@@ -127,7 +142,8 @@ export function TunePage({ drive }: { drive: string }) {
             <StepPanel
               drive={drive}
               limits={limits.agreed ? limits.limits : null}
-              able={able}
+              obstacle={obstacle}
+              cycleMs={cycleMs}
               stored={ours.filter((each) => each.kind === 'step')}
             />
           )}

@@ -21,6 +21,12 @@ describe('pre-checks', () => {
   ])('fail with %s', (_why, d, s, c) => {
     expect(ready(preChecks(d as DriveSummary, s as AxisState | null, c))).toBe(false)
   })
+  it('speak of no exchange on a bus that can have none', () => {
+    const names = (possible: boolean) =>
+      preChecks(drive, state, { possible, running: false }).map((each) => each.name)
+    expect(names(false)).not.toContain('exchange')
+    expect(names(true)).toContain('exchange')
+  })
   it('let a warning pass', () => {
     const warned = { ...state, faults: [{ kind: 'warning', name: 'hot' }] } as unknown as AxisState
     expect(ready(preChecks(drive, warned, cyclic))).toBe(true)

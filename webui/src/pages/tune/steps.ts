@@ -32,7 +32,10 @@ export function preChecks(
       detail: drive.pending ? String(drive.pending) : '',
     },
     { name: 'cyclic', ok: cyclic.possible, detail: '' },
-    { name: 'exchange', ok: cyclic.running, detail: '', optional: true },
+    // Where there can be no exchange, none could be started either.
+    ...(cyclic.possible
+      ? [{ name: 'exchange' as const, ok: cyclic.running, detail: '', optional: true }]
+      : []),
   ]
 }
 

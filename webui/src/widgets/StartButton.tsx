@@ -1,0 +1,52 @@
+import { Button } from '@mantine/core'
+import { type ReactNode, useEffect, useState } from 'react'
+import { useT } from '../i18n'
+
+const TOLD_MS = 12000
+
+/**
+ * Starts what moves an axis. What is in the way, in words, or null: the button is then dim, and a
+ * press says why nothing began. A drive that misses one answer would otherwise swallow a press
+ * unseen.
+ */
+export function StartButton({
+  obstacle,
+  busy,
+  onStart,
+  children,
+}: {
+  obstacle: string | null
+  busy: boolean
+  onStart: () => void
+  children: ReactNode
+}) {
+  const t = useT()
+  const [told, setTold] = useState<string | null>(null)
+  useEffect(() => {
+    if (told === null) return
+    if (busy) setTold(null)
+    const timer = setTimeout(() => setTold(null), TOLD_MS)
+    return () => clearTimeout(timer)
+  }, [told, busy])
+  return (
+    <>
+      <Button
+        variant="filled"
+        {...(obstacle !== null ? { 'data-disabled': true } : {})}
+        aria-disabled={obstacle !== null}
+        loading={busy}
+        onClick={() => {
+          setTold(obstacle)
+          if (obstacle === null) onStart()
+        }}
+      >
+        {children}
+      </Button>
+      {told !== null && (
+        <p className="note warn not-begun" role="alert">
+          <strong>{t('start.not')}</strong> {told}
+        </p>
+      )}
+    </>
+  )
+}

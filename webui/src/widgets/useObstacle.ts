@@ -1,0 +1,25 @@
+import type { AxisState } from '../api/schema'
+import { type T, useT } from '../i18n'
+import { said } from '../i18n/said'
+import { useAxisState, useJob, useLink } from '../live/store'
+
+/** What keeps every motion of an axis from being started now, in words; null: nothing. */
+export function useObstacle(drive: string): string | null {
+  const t = useT()
+  const { open } = useLink()
+  const state = useAxisState(drive)
+  const job = useJob(state?.moving_job ?? null)
+  return obstacleOf(t, open, state, job?.title ?? '…')
+}
+
+export function obstacleOf(
+  t: T,
+  open: boolean,
+  state: AxisState | null,
+  title: string,
+): string | null {
+  if (!open) return t('start.noConnection')
+  if (!state?.fresh) return [t('start.noAnswer'), said(t, state?.problem ?? '')].join(' ').trim()
+  if (state.moving_job !== null) return t('jog.taken', { title: said(t, title) })
+  return null
+}
