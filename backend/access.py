@@ -168,7 +168,10 @@ class Leases:
             )
         if time_s is not None and not 1.0 <= time_s <= LONGEST_HAND_OVER_S:
             raise NotAllowed(
-                "a hand-over lasts 1 s to 8 h", value=time_s, limit=f"{LONGEST_HAND_OVER_S:.0f} s"
+                "a hand-over lasts 1 s to 8 h",
+                value=time_s,
+                limit=f"{LONGEST_HAND_OVER_S:.0f} s",
+                remedy="choose a time within the limit",
             )
         if to == connection:
             return

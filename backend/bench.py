@@ -131,7 +131,9 @@ class Bench:
             raise Busy(f"{url} is used by {', '.join(users)}", remedy="remove these drives first")
         link = self.links.pop(url, None)
         if link is None:
-            raise NotAllowed(f"{url} is not open", value=url)
+            raise NotAllowed(
+                f"{url} is not open", value=url, remedy="open the bus on the page Connect"
+            )
         await link.close()
         self.drives_changed()
 
@@ -387,7 +389,11 @@ class Bench:
 
     def _require_stays(self, member: Member) -> None:
         if member.drive.id in self._parting:
-            raise Busy(f"{member.drive.name} is being taken off the bench", drive=member.drive.name)
+            raise Busy(
+                f"{member.drive.name} is being taken off the bench",
+                drive=member.drive.name,
+                remedy="wait until it is gone, then add it again if it is still needed",
+            )
 
     async def let_go(self, drive_id: str) -> None:
         """Take the power off an axis that was enabled here and left so; never raises."""

@@ -75,7 +75,10 @@ class CyclicSession:
             Busy: it runs already.
         """
         if self.state is not None:
-            raise Busy(f"{self.link.url}: the cyclic exchange runs already")
+            raise Busy(
+                f"{self.link.url}: the cyclic exchange runs already",
+                remedy="stop the exchange first to choose another cycle",
+            )
         inputs, outputs = [], []
         for drive in self.drives:
             port = self._port(drive)

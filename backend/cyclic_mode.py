@@ -81,7 +81,11 @@ async def _choose(axis: Axis, session: CyclicSession, key: str, mode: int) -> No
     drive, power = axis.drive, session.power()
     # An EP3E may trip over a mode that changes while its motor turns (001:487).
     if await axis.state() is State.OPERATION_ENABLED or not await axis.standstill(_STANDS_S):
-        raise NotAllowed(f"{drive.name} is enabled or turns", drive=drive.name)
+        raise NotAllowed(
+            f"{drive.name} is enabled or turns",
+            drive=drive.name,
+            remedy="disable the axis and wait until it stands",
+        )
     if power is None or not session.running:
         # The link may have been lost meanwhile, and another drive be there now.
         await drive.confirm_identity()
@@ -91,5 +95,9 @@ async def _choose(axis: Axis, session: CyclicSession, key: str, mode: int) -> No
     deadline = time.monotonic() + _TAKEN_S
     while await drive.raw(key) != mode:
         if time.monotonic() > deadline:
-            raise LinkTimeout(f"{drive.name} does not take its mode back", drive=drive.name)
+            raise LinkTimeout(
+                f"{drive.name} does not take its mode back",
+                drive=drive.name,
+                remedy="set its mode of operation by hand before the axis is enabled again",
+            )
         await asyncio.sleep(_POLL_S)

@@ -351,6 +351,7 @@ def require_forcing(drive: Drive, name: str) -> Forcing:
             drive=drive.name,
             value=name,
             limit=", ".join(each.name for each in found) or "none",
+            remedy="choose one of the terminals within the limit",
         )
     for place in (spec.enable, spec.value):
         if place is not None and (why := drive.unreachable_why(drive.parameter(place.key))):

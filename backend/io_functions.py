@@ -130,7 +130,9 @@ async def set_probe(drive: Drive, number: int, settings: ProbeSettings) -> Readi
     probe = functions_of(drive.profile).probe
     if probe is None or not 1 <= number <= len(probe.probes):
         raise NotAllowed(
-            f"{drive.name}: {drive.profile.title} has no touch probe {number}", drive=drive.name
+            f"{drive.name}: {drive.profile.title} has no touch probe {number}",
+            drive=drive.name,
+            remedy="choose a touch probe that the drive has",
         )
     sources = probe.probes[number - 1].sources
     if settings.source not in sources:
@@ -139,6 +141,7 @@ async def set_probe(drive: Drive, number: int, settings: ProbeSettings) -> Readi
             drive=drive.name,
             value=settings.source,
             limit=", ".join(f"{code} ({text})" for code, text in sources.items()),
+            remedy="choose one of the sources within the limit",
         )
     if settings.on and not (settings.rising or settings.falling):
         raise OutOfRange(

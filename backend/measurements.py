@@ -230,7 +230,11 @@ class MeasurementStore:
         try:
             return path.read_bytes()
         except FileNotFoundError as error:
-            raise NotAllowed(f"there is no measurement {path.name}", value=path.name) from error
+            raise NotAllowed(
+                f"there is no measurement {path.name}",
+                value=path.name,
+                remedy="choose one of the list; another person may have deleted it",
+            ) from error
 
     def load(self, name: str) -> Measurement:
         """Read and parse.

@@ -110,7 +110,11 @@ class PowerState:
         if goal is State.OPERATION_ENABLED:
             await self.require_stop_delivered()
         if self.stopped and goal is State.OPERATION_ENABLED:
-            raise NotAllowed(f"{self.drive.name}: STOP was pressed", drive=self.drive.name)
+            raise NotAllowed(
+                f"{self.drive.name}: STOP was pressed",
+                drive=self.drive.name,
+                remedy="start a new motion when it is safe",
+            )
         station = session.station(self.drive)
         if goal is State.OPERATION_ENABLED and await self.state() is State.FAULT:
             raise await self._refused(State.FAULT, goal)

@@ -27,6 +27,8 @@ class DriveError(Exception):
     """
 
     kind = "drive-error"
+    #: What helps against this kind of error where `remedy` says nothing nearer.
+    usual_remedy: str | None = None
 
     def __init__(
         self,
@@ -46,6 +48,13 @@ class DriveError(Exception):
         self.limit = limit
         self.remedy = remedy
 
+    @property
+    def advice(self) -> str | None:
+        """What to do next: the nearest remedy that is known."""
+        if self.remedy or self.usual_remedy:
+            return self.remedy or self.usual_remedy
+        return "choose a value within the limit" if self.limit else None
+
     def at(self, drive: str | None = None, parameter: str | None = None) -> DriveError:
         """The same error with the drive or parameter filled in where it was not known below."""
         self.drive = self.drive or drive
@@ -57,6 +66,7 @@ class LinkTimeout(DriveError):
     """No answer in time. A timed-out write has an unknown outcome and must be read back."""
 
     kind = "link-timeout"
+    usual_remedy = "check supply and cable, then try again; read back what was being written"
 
 
 class NotAsked(LinkTimeout):
@@ -67,12 +77,16 @@ class LinkLost(DriveError):
     """The wire or the adapter is gone."""
 
     kind = "link-lost"
+    usual_remedy = (
+        "check the cable and the adapter or interface; the link is taken up again by itself"
+    )
 
 
 class ProtocolError(DriveError):
     """An answer that the protocol does not allow: bad CRC, wrong length, wrong toggle bit."""
 
     kind = "protocol-error"
+    usual_remedy = "try again; if it stays, check shield, termination and the line's settings"
 
 
 class Rejected(DriveError):

@@ -100,7 +100,7 @@ def problem_of(error: Exception) -> Problem:
         parameter=error.parameter,
         value=value,
         limit=error.limit,
-        remedy=error.remedy,
+        remedy=error.advice,
         code=error.code if isinstance(error, Rejected) else None,
     )
 

@@ -315,7 +315,10 @@ class Connection:
             request = from_page.validate_json(text)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
-            problem = DriveError(f"not a message of this interface: {first['msg']}")
+            problem = DriveError(
+                f"not a message of this interface: {first['msg']}",
+                remedy="reload the page: it is of another version than the server",
+            )
             self.send(Refused(request="?", problem=problem_of(problem)))
             return
         try:
@@ -360,7 +363,11 @@ class Connection:
         self._bench.journal.add("STOP", level="warning", drive=request.drive)
         for drive, text in problems.items():
             if text:
-                failure = DriveError(f"STOP did not reach it: {text}", drive=drive)
+                failure = DriveError(
+                    f"STOP did not reach it: {text}",
+                    drive=drive,
+                    remedy="use the hardware stop, then look at its supply and cable",
+                )
                 self.send(Refused(request="stop", problem=problem_of(failure)))
 
     def _lease(self, request: LeaseTake) -> None:

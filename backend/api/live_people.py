@@ -298,7 +298,11 @@ class PeopleLive:
             case LeaseHand():
                 to = self._pages.get(request.to)
                 if to is None:
-                    raise NotAllowed("this person is not here any more", drive=drive)
+                    raise NotAllowed(
+                        "this person is not here any more",
+                        drive=drive,
+                        remedy="take control yourself if it is free",
+                    )
                 require_control(self._people, to.identity, drive)
                 page.release(drive, "control was handed over")
                 leases.hand(drive, page.id, to.id, to.identity.person, request.time_s)

@@ -138,7 +138,11 @@ async def read_gains(member: TheMember) -> GainInfo:
 async def write_gains(bench: TheBench, member: Controlled, request: GainWrite) -> Undo:
     """Write gains or a stiffness level and make them act; saving is another step."""
     if (request.gains is None) == (request.level is None):
-        raise OutOfRange("give either gains or a level", drive=member.drive.name)
+        raise OutOfRange(
+            "give either gains or a level",
+            drive=member.drive.name,
+            remedy="give one of the two",
+        )
     if request.gains is not None:
         g = request.gains
         wanted = _gains(g.speed_bandwidth_hz, g.integral_hz, g.position_1_s, g.inertia_kgm2)

@@ -88,7 +88,12 @@ async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> Eth
 async def ethercat_permissions(url: Annotated[str, Query()]) -> EthercatPermissions:
     """What is missing to use an interface that need not be opened yet."""
     if not url.startswith(_SCHEME):
-        raise OutOfRange(f"{url} is no EtherCAT bus", value=url, limit=f"{_SCHEME}INTERFACE")
+        raise OutOfRange(
+            f"{url} is no EtherCAT bus",
+            value=url,
+            limit=f"{_SCHEME}INTERFACE",
+            remedy="choose a bus whose address begins with ethercat://",
+        )
     return _permissions(permissions.check(url.removeprefix(_SCHEME)))
 
 
@@ -105,7 +110,9 @@ async def clear_counters(
     chosen = [s.station for s in seen if request.station in (None, s.station) and not s.lost]
     if request.station is not None and not chosen:
         raise NotAllowed(
-            f"station {request.station} of {request.url} does not answer", value=request.station
+            f"station {request.station} of {request.url} does not answer",
+            value=request.station,
+            remedy="check its supply and cable, then scan the segment again",
         )
     for station in chosen:
         await link.clear_port_counters(station)
@@ -226,6 +233,7 @@ async def _body(request: Request, file: str) -> bytes:
             raise OutOfRange(
                 f"{file} is larger than {_MAX_FIRMWARE_BYTES >> 20} MiB",
                 limit=f"{_MAX_FIRMWARE_BYTES} bytes",
+                remedy="is this the right file? The firmware of a drive is smaller",
             )
     if not data:
         raise OutOfRange(f"{file} is empty", remedy="choose the maker's firmware file")

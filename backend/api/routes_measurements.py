@@ -123,7 +123,12 @@ async def upload_measurement(
     """Take a file of another computer; the body is the file."""
     data = await request.body()
     if len(data) > _MAX_BYTES:
-        raise OutOfRange(f"{name} is too large", value=len(data), limit=f"{_MAX_BYTES} bytes")
+        raise OutOfRange(
+            f"{name} is too large",
+            value=len(data),
+            limit=f"{_MAX_BYTES} bytes",
+            remedy="import one measurement at a time, as this program exported it",
+        )
     whole = name.removesuffix(SUFFIX) + SUFFIX
     stored = await asyncio.to_thread(bench.measurements.store, whole, data)
     return _info(stored, bench.measurements.head(stored))

@@ -32,7 +32,7 @@ def reported(code: int = 1) -> Iterator[None]:
     try:
         yield
     except DriveError as error:
-        raise _told(error.message, error.remedy, code) from error
+        raise _told(error.message, error.advice, code) from error
     except ProfileError as error:
         raise _told(str(error), "see `servodeck profile check`", code) from error
     except OSError as error:

@@ -200,7 +200,11 @@ class Library:
             NotInLibrary: no such entry. NotAllowed: too long or too many.
         """
         if notes is not None and len(notes) > MAX_NOTES:
-            raise NotAllowed("the notes are too long", limit=f"{MAX_NOTES} characters")
+            raise NotAllowed(
+                "the notes are too long",
+                limit=f"{MAX_NOTES} characters",
+                remedy="shorten the notes",
+            )
         if tags is not None:
             tags = _clean(tags)
         with self.store.writing() as session:

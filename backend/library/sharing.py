@@ -75,7 +75,11 @@ def fetch(library: Library, index: Index, entry: Entry) -> str:
             remedy="share it on its station first",
         )
     if Path(entry.name).name != entry.name or not entry.name.endswith(folder.suffixes):
-        raise NotAllowed(f"{entry.name!r} is no file name of this kind", value=entry.name)
+        raise NotAllowed(
+            f"{entry.name!r} is no file name of this kind",
+            value=entry.name,
+            remedy="give the file the ending of its kind",
+        )
     path = folder.path / entry.name
     data = library.content(entry.id)
     if path.exists():

@@ -246,7 +246,11 @@ class Accounts:
         require_good(password, name)
         await self._load()
         if self._find(name) is not None:
-            raise NotAllowed(f"there is an account {name} already", value=name)
+            raise NotAllowed(
+                f"there is an account {name} already",
+                value=name,
+                remedy="choose another name, or change that account",
+            )
         kept = await self._hash(password)
         now = self._now()
 
@@ -425,6 +429,7 @@ class Accounts:
             raise NotAllowed(
                 "a token lives at least a minute and at most a year",
                 limit=f"{LONGEST_TOKEN.days} days",
+                remedy="choose a time within the limit",
             )
         secret, now = new_secret(TOKEN_PREFIX), self._now()
         token = Token(digest(secret), account_id, name, scopes, now, now + lifetime)

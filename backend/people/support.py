@@ -129,10 +129,13 @@ class Support:
                 "an invitation lasts a minute to a day",
                 value=lifetime_s,
                 limit=f"60 to {LONGEST_INVITATION_S:.0f} s",
+                remedy="choose a time within the limit",
             )
         if beyond := allowed - GRANTABLE:
             raise NotAllowed(
-                f"no guest may have {', '.join(sorted(beyond))}", limit=", ".join(sorted(GRANTABLE))
+                f"no guest may have {', '.join(sorted(beyond))}",
+                limit=", ".join(sorted(GRANTABLE)),
+                remedy="leave these rights out; whoever needs them needs an account",
             )
         if sum(i.state != "ended" for i in self._invitations.values()) >= MOST_OPEN:
             raise NotAllowed(
@@ -266,6 +269,7 @@ class Support:
                 "a grant names a right and lasts 10 s to 8 h",
                 value=time_s,
                 limit=f"10 to {LONGEST_GRANT_S:.0f} s",
+                remedy="choose a time within the limit",
             )
         found.grant = Grant(rights, self._ticks() + time_s, drive, by)
         self._changed()
@@ -351,7 +355,11 @@ class Support:
         """
         text = text.strip()
         if not 1 <= len(text) <= CHAT_LENGTH:
-            raise NotAllowed("a line has 1 to 500 signs", limit=f"{CHAT_LENGTH} signs")
+            raise NotAllowed(
+                "a line has 1 to 500 signs",
+                limit=f"{CHAT_LENGTH} signs",
+                remedy="write it in several lines",
+            )
         self._said += 1
         said = Said(self._said, time.time(), identity.person, identity.is_guest, text)
         self._chat.append(said)

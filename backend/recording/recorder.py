@@ -303,7 +303,11 @@ class Recorder:
             NotAllowed: it does not wait.
         """
         if self.phase != "waiting":
-            raise NotAllowed(f"{self.name} does not wait for a trigger", value=self.phase)
+            raise NotAllowed(
+                f"{self.name} does not wait for a trigger",
+                value=self.phase,
+                remedy="nothing needs to be done: look at the state of the recording",
+            )
         self._begin("triggered")
 
     # --- end --------------------------------------------------------------------------

@@ -68,7 +68,11 @@ class ReportStore:
         try:
             return path.read_bytes()
         except FileNotFoundError as error:
-            raise NotAllowed(f"there is no report {path.name}", value=path.name) from error
+            raise NotAllowed(
+                f"there is no report {path.name}",
+                value=path.name,
+                remedy="choose one of the list; another person may have deleted it",
+            ) from error
 
     def delete(self, name: str) -> None:
         """Delete a file.

@@ -235,7 +235,11 @@ def plan_level(drive: Drive, level: int) -> dict[str, int]:
     """
     table = _table(drive)
     if table is None:
-        raise NotAllowed(f"{drive.name} has no stiffness levels", drive=drive.name)
+        raise NotAllowed(
+            f"{drive.name} has no stiffness levels",
+            drive=drive.name,
+            remedy="write the gains themselves",
+        )
     raw = {table.level_key: level}
     if table.mode_key is not None and table.table_raw is not None:
         raw[table.mode_key] = table.table_raw

@@ -112,7 +112,7 @@ def _check(settings: InertiaSettings) -> None:
         raise OutOfRange("the taught scheme needs both ends", remedy="jog to each end and take it")
     if not 1 <= settings.repetitions <= 10:
         raise OutOfRange("1 to 10 repetitions are possible", value=settings.repetitions,
-                         limit="1…10")  # fmt: skip
+                         limit="1…10", remedy="choose a number within the limit")  # fmt: skip
 
 
 def _where(

@@ -83,7 +83,10 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
     """
     drive, units = axis.drive, await axis.units()
     if settings.direction not in (-1, 1):
-        raise OutOfRange(f"direction {settings.direction} is neither 1 nor -1")
+        raise OutOfRange(
+            f"direction {settings.direction} is neither 1 nor -1",
+            remedy="give 1 or -1 as the direction",
+        )
     require_scale(axis, units, settings)
     envelope = Envelope(settings.travel_rev, settings.speed_rpm, settings.torque_percent, 3600.0)
     ramps = {drive.require("profile_velocity"): units.velocity_raw(settings.speed_rpm)}

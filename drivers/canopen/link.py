@@ -250,7 +250,10 @@ class CanopenLink:
         channel = self._channels.get(station)
         if channel is None:
             raise NotAllowed(
-                f"{station} is not a CANopen node number", value=station, limit="1…127"
+                f"{station} is not a CANopen node number",
+                value=station,
+                limit="1…127",
+                remedy="choose the node number that is set in the drive",
             )
         return channel
 

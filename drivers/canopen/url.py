@@ -53,7 +53,11 @@ def parse_canopen_url(url: str) -> CanUrl:
     """
     parts = urlsplit(url)
     if parts.scheme != "canopen":
-        raise OutOfRange(f"{url!r} is not a canopen:// address", value=url)
+        raise OutOfRange(
+            f"{url!r} is not a canopen:// address",
+            value=url,
+            remedy="write it as canopen://CHANNEL, such as canopen://can0?bitrate=500000",
+        )
     interface = parts.netloc
     if interface not in INTERFACES:
         raise OutOfRange(
@@ -73,7 +77,10 @@ def parse_canopen_url(url: str) -> CanUrl:
     unknown = sorted(set(options) - set(_OPTIONS))
     if unknown:
         raise OutOfRange(
-            f"{url!r}: unknown option {', '.join(unknown)}", value=url, limit=", ".join(_OPTIONS)
+            f"{url!r}: unknown option {', '.join(unknown)}",
+            value=url,
+            limit=", ".join(_OPTIONS),
+            remedy="use only the options within the limit",
         )
     bitrate = _number(options, "bitrate", 1_000_000.0, 1, 1_000_000)
     if int(bitrate) not in BITRATES:
@@ -81,6 +88,7 @@ def parse_canopen_url(url: str) -> CanUrl:
             f"{int(bitrate)} bit/s is not a CANopen bit rate",
             value=int(bitrate),
             limit=", ".join(map(str, BITRATES)),
+            remedy="choose the bit rate that is set in the drives",
         )
     return CanUrl(
         url=url,

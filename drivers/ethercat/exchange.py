@@ -75,9 +75,14 @@ class Exchange:
     def start(self, done: Done) -> None:
         """Exchange process data and bring every configured station to OP."""
         if not self._images:
-            raise NotAllowed("configure the cyclic data first")
+            raise NotAllowed(
+                "configure the cyclic data first", remedy="start the exchange on the page Connect"
+            )
         if self.loop is not None:
-            raise NotAllowed("the cyclic exchange runs already")
+            raise NotAllowed(
+                "the cyclic exchange runs already",
+                remedy="stop the exchange first to choose another cycle",
+            )
         listening = [s for s in self._stations if s.number not in self.setups]
         loop = CyclicLoop(
             self._segment,
@@ -256,9 +261,15 @@ class Exchange:
         for image in self.loop.images:
             if image.station == number:
                 if image.lost:
-                    raise NotAllowed(f"station {number} does not answer at present")
+                    raise NotAllowed(
+                        f"station {number} does not answer at present",
+                        remedy="check its supply and cable; it is taken up again by itself",
+                    )
                 return image.axis
-        raise NotAllowed(f"station {number} has no cyclic data")
+        raise NotAllowed(
+            f"station {number} has no cyclic data",
+            remedy="stop the exchange and start it again: all axes then take part",
+        )
 
     def play(self, trajectories: Sequence[Message]) -> int:
         """Begin trajectories together in the next cycle; returns its number.

@@ -88,7 +88,10 @@ def _until_acknowledged(box: Mailbox, mail: bytes, packet: int, timeout_s: float
             raise ProtocolError(f"unexpected FoE answer {code}")
         waited += 0.05
         if waited > timeout_s:
-            raise DriveError(f"the drive has been busy for {timeout_s:g} s with packet {packet}")
+            raise DriveError(
+                f"the drive has been busy for {timeout_s:g} s with packet {packet}",
+                remedy="leave the drive switched on and load the file again",
+            )
         yield Pause(0.05)
 
 

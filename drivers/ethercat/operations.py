@@ -276,13 +276,21 @@ class Operations:
         station = self._calm_station(message)
         alias = int(message["alias"])
         if not 0 <= alias <= 0xFFFF:
-            raise OutOfRange(f"{alias} is no alias", value=alias, limit="0…65535")
+            raise OutOfRange(
+                f"{alias} is no alias",
+                value=alias,
+                limit="0…65535",
+                remedy="choose a number within the limit",
+            )
         if self.loop is not None:
             raise Busy("the segment is busy", remedy="stop the cyclic exchange first")
 
         def ended(told: int | None, error: DriveError | None) -> None:
             if error is None and told != alias:
-                error = ProtocolError(f"the alias reads back as {told}, {alias} was written")
+                error = ProtocolError(
+                    f"the alias reads back as {told}, {alias} was written",
+                    remedy="write it again; if it stays, its memory is protected or defective",
+                )
             if error is None:
                 self.roster.new_aliases.add(station.number)
             done({"alias": told}, error)
@@ -348,7 +356,8 @@ class Operations:
         for number in message["stations"]:
             if not 1 <= number <= len(self.roster.stations):
                 raise LinkLost(
-                    f"there is no station {number}: {len(self.roster.stations)} were found"
+                    f"there is no station {number}: {len(self.roster.stations)} were found",
+                    remedy="check its supply and cable, then scan the segment again",
                 )
         self.roster.exchange.prepare(self.roster.stations)
         for number in message["stations"]:

@@ -147,7 +147,10 @@ class AxisLoop:
                 )
             self.halted = ""
         if mode is not None and self.phase is not Phase.IDLE:
-            raise NotAllowed(f"station {self.station} moves: its mode cannot be changed now")
+            raise NotAllowed(
+                f"station {self.station} moves: its mode cannot be changed now",
+                remedy="disable the axis and wait until it stands",
+            )
         if mode is not None and _MODE in self._out:
             self.outputs[self._out[_MODE]] = self._dialect.mode(mode)
         if (

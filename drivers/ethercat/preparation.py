@@ -72,7 +72,9 @@ class Preparation:
         cycle_ns = int(message["cycle_ns"])
         if not CYCLE_NS[0] <= cycle_ns <= CYCLE_NS[1]:
             raise NotAllowed(
-                f"a cycle of {cycle_ns / 1000:g} µs is not possible", limit="250 µs to 10 ms"
+                f"a cycle of {cycle_ns / 1000:g} µs is not possible",
+                limit="250 µs to 10 ms",
+                remedy="choose a cycle within the limit",
             )
         setup_.interpolation_period(cycle_ns)
         self._stations = stations
@@ -236,7 +238,10 @@ class Preparation:
         while len(results) + len(errors) < len(jobs):
             if time.monotonic() > deadline:
                 self._lanes.drop(f"{doing} takes longer than {_SETUP_S:g} s")
-                raise LinkTimeout(f"{doing} takes longer than {_SETUP_S:g} s")
+                raise LinkTimeout(
+                    f"{doing} takes longer than {_SETUP_S:g} s",
+                    remedy="check supply and cables of all stations, then start the exchange again",
+                )
             if not self._lanes.step():
                 time.sleep(0.0002)
         for number, error in errors.items():

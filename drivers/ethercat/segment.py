@@ -301,7 +301,8 @@ class Segment:
     def _check_interface(self) -> None:
         if not 0 < len(self.interface.encode()) <= _NAME_LIMIT:
             raise LinkLost(
-                f"{self.interface!r} cannot be an interface: names have 1 to {_NAME_LIMIT} letters"
+                f"{self.interface!r} cannot be an interface: names have 1 to {_NAME_LIMIT} letters",
+                remedy="choose one of the interfaces that the page Connect lists",
             )
         report = permissions.check(self.interface)
         if not report.exists or not report.up:

@@ -153,7 +153,10 @@ def interpolation_period(cycle_ns: int) -> tuple[int, int]:
         unit_ns = 10 ** (9 + exponent)
         if cycle_ns % unit_ns == 0 and cycle_ns // unit_ns <= 255:
             return cycle_ns // unit_ns, exponent
-    raise NotAllowed(f"a cycle of {cycle_ns / 1000:g} µs cannot be told to the drive")
+    raise NotAllowed(
+        f"a cycle of {cycle_ns / 1000:g} µs cannot be told to the drive",
+        remedy="choose another cycle, such as 1 ms",
+    )
 
 
 def reads_whole(station: Station) -> Steps[bool]:
@@ -227,7 +230,10 @@ def arm_watchdog(station: Station, setup: StationSetup) -> Steps[None]:
     unit_ns = 40 * (int.from_bytes(divider, "little") + 2)
     ticks = round(milliseconds * 1e6 / unit_ns)
     if not 0 < ticks <= 0xFFFF:
-        raise NotAllowed(f"a watchdog of {milliseconds:g} ms does not fit station {station.number}")
+        raise NotAllowed(
+            f"a watchdog of {milliseconds:g} ms does not fit station {station.number}",
+            remedy="choose a watchdog time nearer to the cycle",
+        )
     yield Write(WATCHDOG_TIME, struct.pack("<H", ticks))
     told = yield from read_again(WATCHDOG_TIME, 2)
     watched = yield from _watch_outputs()

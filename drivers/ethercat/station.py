@@ -79,7 +79,10 @@ class Station:
                 remedy="the segment is searched again by itself as soon as no axis is moved by it",
             )
         if self.mailbox is None:
-            raise NotAllowed(f"station {self.number} ({self.name}) has no mailbox: no parameters")
+            raise NotAllowed(
+                f"station {self.number} ({self.name}) has no mailbox: no parameters",
+                remedy="it has inputs and outputs only; look at them on the page Connect",
+            )
         return self.mailbox
 
     def require_parameters(self) -> None:

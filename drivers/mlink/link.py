@@ -64,7 +64,10 @@ class MlinkLayout:
     def place(self, station: int, address: Address) -> Place:
         """See `drivers.modbus.layout.Layout.place`."""
         if address.index is None:
-            raise NotAllowed(f"{address} is no object: MLink reaches objects only")
+            raise NotAllowed(
+                f"{address} is no object: MLink reaches objects only",
+                remedy="name the object by index and subindex",
+            )
         rival = self._rivals.get(station, {}).get((address.index, address.subindex))
         if rival:
             raise NotAllowed(

@@ -124,6 +124,7 @@ def _check(station: int, start: int, count: int, longest: int) -> None:
         raise OutOfRange(
             f"station {station} is outside the addresses 1 to 247 of Modbus RTU",
             value=station, limit="1…247",
+            remedy="choose the station number that is set in the drive",
         )  # fmt: skip
     if not 1 <= count <= longest or start < 0 or start + count > 0x10000:
         raise OutOfRange(
