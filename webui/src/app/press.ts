@@ -6,6 +6,8 @@ export interface Press<Thing> {
   y: number
 }
 
+/** A click comes within this time after the release, also that of a finger. */
+const CLICK_MS = 700
 /** Farther than this the pointer was moved on purpose: the press was called off. */
 const STAYED_PX = 12
 
@@ -40,6 +42,13 @@ export function keepPresses(): void {
       ? { on: pressable(event.target), x: event.clientX, y: event.clientY }
       : null
   }
+  const up = () => {
+    // A press that slid away has no click; the next one may come without a pointer.
+    const ended = press
+    setTimeout(() => {
+      if (press === ended) press = null
+    }, CLICK_MS)
+  }
   const click = (event: MouseEvent) => {
     // Keys and scripts click without a place; what a label passes on comes after its own click.
     if (!event.isTrusted || event.detail === 0) return
@@ -52,6 +61,7 @@ export function keepPresses(): void {
     if (act === 'what was pressed' && begun?.on?.isConnected) begun.on.click()
   }
   window.addEventListener('pointerdown', down, { capture: true })
+  window.addEventListener('pointerup', up, { capture: true })
   window.addEventListener('pointercancel', () => (press = null), { capture: true })
   window.addEventListener('click', click, { capture: true })
 }
