@@ -56,7 +56,7 @@ def parse_canopen_url(url: str) -> CanUrl:
         raise OutOfRange(
             f"{url!r} is not a canopen:// address",
             value=url,
-            remedy="write it as canopen://CHANNEL, such as canopen://can0?bitrate=500000",
+            remedy="write canopen://INTERFACE/CHANNEL, for example canopen://socketcan/can0",
         )
     interface = parts.netloc
     if interface not in INTERFACES:

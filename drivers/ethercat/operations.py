@@ -289,7 +289,7 @@ class Operations:
             if error is None and told != alias:
                 error = ProtocolError(
                     f"the alias reads back as {told}, {alias} was written",
-                    remedy="write it again; if it stays, its memory is protected or defective",
+                    remedy="write it again; if it stays, its memory may be protected or defective",
                 )
             if error is None:
                 self.roster.new_aliases.add(station.number)

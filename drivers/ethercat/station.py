@@ -81,7 +81,7 @@ class Station:
         if self.mailbox is None:
             raise NotAllowed(
                 f"station {self.number} ({self.name}) has no mailbox: no parameters",
-                remedy="it has inputs and outputs only; look at them on the page Connect",
+                remedy="only its inputs and outputs can be used, in the cyclic exchange",
             )
         return self.mailbox
 
