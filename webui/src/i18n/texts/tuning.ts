@@ -408,11 +408,16 @@ export const tuning = {
   'inertia.coulomb': ['Coulomb friction', '库仑摩擦'],
   'inertia.viscous': ['Viscous friction', '粘性摩擦'],
   'inertia.gravity': ['Gravity', '重力'],
-  'inertia.place': [
-    'Torque by place (spring, arm, imbalance), ±',
-    '随位置变化的转矩（弹簧、摆臂、不平衡），±',
+  'inertia.place': ['Torque by place, ±', '随位置变化的转矩，±'],
+  'inertia.placeHelp': [
+    'Torque by place: a spring, an arm or a load out of balance.',
+    '随位置变化的转矩：弹簧、摆臂或不平衡负载。',
   ],
-  'inertia.fan': ['Torque of a fan or pump, at most', '风机或泵类转矩，最大'],
+  'inertia.fan': ['Torque of a fan, max.', '风机类转矩，最大'],
+  'inertia.fanHelp': [
+    'Torque of a fan: it grows with the square of the speed, as that of a pump does.',
+    '风机类转矩：随转速的平方增大，泵类亦然。',
+  ],
   'inertia.perRated': [
     'The drive does not tell its rated torque: torques are shares of it.',
     '驱动器未提供额定转矩：转矩以其比例表示。',

@@ -133,15 +133,16 @@ const ROWS = [
 
 /** What few machines have: shown where it was found. */
 const BESIDE = [
-  { name: 'place_nm', text: 'inertia.place', unit: 'N·m' },
-  { name: 'fan_nm', text: 'inertia.fan', unit: 'N·m' },
+  { name: 'place_nm', text: 'inertia.place', help: 'inertia.placeHelp', unit: 'N·m' },
+  { name: 'fan_nm', text: 'inertia.fan', help: 'inertia.fanHelp', unit: 'N·m' },
 ] as const
 
 /** What was found, how sure it is, and whether the data support it at all. */
 export function InertiaResult({ result }: { result: Inertia }) {
   const t = useT()
   const si = result.unit === 'SI'
-  const rows = [...ROWS, ...BESIDE.filter(({ name }) => result[name] != null)]
+  const beside = BESIDE.filter(({ name }) => result[name] != null)
+  const rows = [...ROWS, ...beside]
   return (
     <>
       <p className={`note ${result.identifiable ? 'good' : 'warn'}`}>
@@ -149,7 +150,7 @@ export function InertiaResult({ result }: { result: Inertia }) {
         {result.verdict !== 'ok' && result.verdict}
       </p>
       <div className="scroll-table">
-        <table aria-label={t('inertia.title')}>
+        <table className="quantities" aria-label={t('inertia.title')}>
           <thead>
             <tr>
               <th>{t('inertia.quantity')}</th>
@@ -174,6 +175,7 @@ export function InertiaResult({ result }: { result: Inertia }) {
         {t('inertia.fit', { r2: fixed(result.r2, 4) })}
         {result.load_ratio_against &&
           ` ${t('inertia.against', { what: result.load_ratio_against })}`}
+        {beside.map(({ help }) => ` ${t(help)}`)}
       </p>
     </>
   )
