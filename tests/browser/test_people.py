@@ -433,4 +433,5 @@ def test_a_guest_who_may_only_look_can_stop(opened: Open, bench: Bench) -> None:
     bench.wait_standing()
     expect(olaf.get_by_text("pressed STOP.")).to_be_visible(timeout=TOLD_MS)
     olaf.mouse.up()
+    button(olaf.locator(".stop-report"), "Close").click()
     end_visit(olaf)
