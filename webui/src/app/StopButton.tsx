@@ -71,7 +71,8 @@ function StopReportNote() {
       )}
       {failed.map(([id, why]) => (
         <p key={id}>
-          <strong>{t('stop.failed', { name: name(id) })}</strong> {said(t, why)}. {t('stop.useHardware')}
+          <strong>{t('stop.failed', { name: name(id) })}</strong> {said(t, why)}.{' '}
+          {t('stop.useHardware')}
         </p>
       ))}
       {!good && (
