@@ -26,7 +26,7 @@ _TURN = 2 * np.pi
 MODE_OF = {"none": Mode.CST, "speed": Mode.CSV, "position": Mode.CSP}
 #: Share of the travel from home beyond which nothing more begins.
 _AWAY = 0.15
-#: A sequence that lost samples is played again, so many times at most.
+#: A sequence that lost samples is played again, so many times at most, where no period is whole.
 _AGAIN = 2
 #: What came to the envelope is played again, this much smaller and with so much less base motion.
 _ATTEMPTS, _WEAKER, _SLOWER = 4, 0.4, 0.7
@@ -92,7 +92,7 @@ async def _play_all(
         low, high = (0.1 + 0.85 * part / count for part in (number, number + 1))
         step = f"measuring, realisation {number + 1} of {count}"
         tries = [await one(sequence, share(progress, low, high, step))]
-        while spare > 0 and len(tries) <= _AGAIN and not _whole(*tries[-1]):
+        while spare > 0 and _worth_another(tries):
             spare -= 1
             again = share(progress, low, high, f"{step}: once more, since samples were lost")
             tries.append(await one(sequence, again))
@@ -121,6 +121,13 @@ async def _play_one(
         sent = await _to_raw(axis, sequence, setup, settings, start)
         recording = await play(axis, session, sent, limits, setup.facts.rated_torque_nm, told)
     return await _as_sent(axis, sequence, settings, setup, sent, start), recording
+
+
+def _worth_another(tries: list[Recorded]) -> bool:
+    """Whether another try may bring more: one that has a whole period already gets one more."""
+    if len(tries) > _AGAIN or _whole(*tries[-1]):
+        return False
+    return len(tries) == 1 or all(_kept(*each)[0] == 0 for each in tries)
 
 
 def _kept(sequence: excite.Sequence, recording: Recording) -> tuple[int, int]:

@@ -132,3 +132,16 @@ async def test_a_bus_that_loses_samples_all_the_time_ends_in_bounded_time(
         e = sequence.excitation
         last = recording.valid[e.first_sample + 2 * e.period_samples :][: e.period_samples]
         assert np.all(last), "one period is whole"
+
+
+async def test_what_is_played_again_is_shared_where_a_period_is_whole_already(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sweep_tool, "evaluate", lambda records, *_: records)
+    steps: list[str] = []
+    progress = Progress(lambda: steps.append(progress.step))
+    async with direct(ONE, drive="r6l") as b:
+        late = Late(b, set(range(100)))
+        await sweep(b.axis, b.session, SweepSettings(WIDE, realisations=1), progress)
+    assert len(late.long) == 4
+    assert "measuring, realisation 2 of 2: once more, since samples were lost" in steps
