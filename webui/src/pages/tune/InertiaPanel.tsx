@@ -150,7 +150,7 @@ export function InertiaResult({ result }: { result: Inertia }) {
         {result.verdict !== 'ok' && result.verdict}
       </p>
       <div className="scroll-table">
-        <table className="quantities" aria-label={t('inertia.title')}>
+        <table className="told-values" aria-label={t('inertia.title')}>
           <thead>
             <tr>
               <th>{t('inertia.quantity')}</th>
