@@ -181,6 +181,9 @@ def _stale(facts: Facts, words: Words) -> list[Note]:
         return []
     shown = [m for m in facts.measured if _is_loop(m) or isinstance(m.view, StepView)]
     old = [m for m in shown if m.saved < last]
+    if not facts.changes and not old:
+        # What was tried and taken back needs no proof.
+        return []
     if not any(_is_loop(m) and m.saved >= last for m in shown):
         return [Note(words("warn.unverified"), "warn")]
     return [Note(words("warn.stale", kind=words(f"kind.{m.kind}")), "warn") for m in old]

@@ -190,6 +190,11 @@ def test_a_measurement_from_before_the_change_proves_nothing(facts: Facts) -> No
     old = replace(loop, saved=at(4))
     assert "no loop was measured afterwards" in warned(replace(facts, measured=(old,)))
     assert "no loop was measured" not in warned(replace(facts, measured=(old,), last_change=None))
+    # What was written and taken back again leaves nothing to be verified, but the loop that was
+    # measured meanwhile is of other settings.
+    back = replace(facts, changes=(), measured=())
+    assert "no loop was measured" not in warned(back)
+    assert "no loop was measured afterwards" in warned(replace(back, measured=(old,)))
 
 
 def test_what_is_not_in_order_is_told(facts: Facts) -> None:
