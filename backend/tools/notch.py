@@ -151,6 +151,7 @@ def off_raw(profile: Profile, frequency_key: str) -> int:
     raise NotAllowed(
         f"{parameter.key} {parameter.name}: the manual does not say how this notch is switched off",
         parameter=parameter.key,
+        remedy="leave it as it is, or give it a frequency far above the loop's bandwidth",
     )
 
 

@@ -146,8 +146,10 @@ async def tried_with(
     drive = axis.drive
     spec = drive.profile.notch
     if spec is None or not unknown(drive):
-        raise NotAllowed(f"{drive.name}: what its notches do is printed in the manual",
-                         drive=drive.name)  # fmt: skip
+        raise NotAllowed(
+            f"{drive.name}: what its notches do is printed in the manual",
+            drive=drive.name, remedy="write them: nothing has to be measured",
+        )  # fmt: skip
     slot = spec.slots[0]
     units, home = await axis.units(), await axis.position_raw()
     off = await plan_notches(drive, [])

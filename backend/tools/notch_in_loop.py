@@ -117,7 +117,10 @@ class _Beside:
                 ((sent, recording),), path, setup.integral_hz, hold_known=False
             )
         except ValueError as error:
-            raise NotAllowed(f"{name}: {error}", drive=name) from error
+            raise NotAllowed(
+                f"{name}: {error}", drive=name,
+                remedy="permit more torque and speed, or free the computer if samples were lost",
+            ) from error  # fmt: skip
         corner = _TURN * found.integral_hz
         self._loop = LoopModel(found.gain_nms, found.gain_nms * corner)
         self._path = found.path

@@ -101,7 +101,11 @@ async def _learn_free(
         at_rev = (await axis.units()).position(await axis.position_raw())
         envelope = notch_effect.room_to_tremble(how.envelope, at_rev, outcome.ends_rev)
     if envelope is None:
-        raise NotAllowed("it stands too near to an end to measure what its notches do")
+        raise NotAllowed(
+            f"{axis.drive.name} stands too near to an end to measure what its notches do",
+            drive=axis.drive.name, value=round(at_rev, 4),
+            remedy="jog it away from the end, then tune again",
+        )  # fmt: skip
     found = outcome.result
     rigid = excite.Rigid(found.inertia_kgm2.value, found.coulomb_nm.value)
     rate = 1.0 / cycle_s(session)
