@@ -99,25 +99,12 @@ def widened(frf: Frf, factor: ComplexArray, share: float, doubt: ComplexArray) -
     )
 
 
-def _with_doubt(coherence: FloatArray, variance: FloatArray, periods: int) -> FloatArray:
-    """The coherence of lines that are as little known, by noise, as they are with this doubt.
-
-    ``variance`` is that of the logarithm, in size or in phase. Noise of so much coherence leaves
-    (1 - γ²)/(2·γ²·n) of it after n periods (Bendat & Piersol, *Random Data*, 2010, section 9.2).
-    """
-    noise = (1.0 - coherence) / np.maximum(coherence, 1e-12)
-    return np.asarray(1.0 / (1.0 + noise + 2.0 * max(periods, 1) * variance))
-
-
 def without_images(direct: Frf, factor: ComplexArray, jitter_s: float, doubt: ComplexArray) -> Frf:
     """The lines without what sampling folds back, and the band that is left to them."""
     # The correction is as uncertain as the model; beside its doubt a part of it stays in the band.
-    image = _IMAGES_LEFT * np.log(factor)
-    unsure = 0.5 * (np.abs(image) ** 2 + np.abs(doubt) ** 2)
     return replace(
         widened(direct, factor, _IMAGES_LEFT, doubt),
         response=np.asarray(direct.response / factor),
-        coherence=_with_doubt(direct.coherence, unsure, direct.periods_used),
         valid_band_hz=valid_band_hz(
             float(direct.frequency_hz[0]), direct.sample_rate_hz, model=True, jitter_s=jitter_s
         ),

@@ -9,12 +9,11 @@ from measured_axes import HEAVY, NAMED, ONE, RIGID, STIFF, THREE, TWO, VERTICAL,
 
 from backend.analysis.chirp import chirp
 from backend.analysis.excitation import choose_lines, multisine, scaled
-from backend.analysis.frf import Frf, estimate_periodic, valid_band_hz
+from backend.analysis.frf import estimate_periodic, valid_band_hz
 from backend.analysis.frf_stepped import estimate_stepped
 from backend.analysis.identify import identify_mechanics
 from backend.analysis.line_spectra import Record
 from backend.analysis.sampling import SignalPath, hold_response, sampled_command
-from backend.analysis.stated_band import without_images
 from backend.analysis.stepped_sine import stepped_sine
 
 
@@ -296,17 +295,3 @@ def test_named_axes_are_what_they_claim():
     assert z == pytest.approx(d / 2 * np.sqrt((1 / j1 + 1 / j2) / k), rel=0.05)
     assert ONE.modes()[1][0][0] == pytest.approx(np.sqrt(k / j2) / TURN, rel=1e-6)
     assert NAMED["rigid"] == Mechanics()
-
-
-def test_what_images_leave_open_counts_as_what_is_not_coherent():
-    """A doubt of 5.3 degrees is that of noise with a coherence of 0.9 after eight periods."""
-    known = np.zeros(3, np.complex128)
-    doubt = np.radians(5.3) * np.array([0.0, 1.0 + 1.0j, 4.0 + 4.0j])
-    lines = Frf(
-        np.array([10.0, 20.0, 30.0]), np.ones(3, np.complex128), *(np.full(3, 0.1),) * 2,
-        np.array([0.99, 1.0, 1.0]), *(np.zeros(3),) * 2, 1000.0, (10.0, 250.0), 8, 0,
-    )  # fmt: skip
-    got = without_images(lines, np.exp(known), 0.0, doubt)
-    assert got.coherence[0] == pytest.approx(0.99)
-    assert got.coherence[1] == pytest.approx(0.9, abs=0.03)
-    assert got.coherence[2] < 0.5
