@@ -239,8 +239,8 @@ def _told(tool: str, answer: dict[str, object]) -> list[str]:
 def _told_beside(answer: dict[str, object]) -> list[str]:
     """Torques beside inertia and friction, where some are found."""
     words = {
-        "place_nm": "the torque depends on the place (spring, arm, imbalance)",
-        "fan_nm": "a torque grows with the square of the speed (fan, pump)",
+        "place_nm": "position-dependent torque (spring, arm, imbalance)",
+        "fan_nm": "torque by the square of the speed (fan, pump)",
     }
     return [
         f"{text}: up to {_shown(answer[key])} Nm"

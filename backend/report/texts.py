@@ -77,10 +77,10 @@ TEXTS: dict[str, tuple[str, str]] = {
     "viscous": ("Viscous friction", "粘性摩擦"),
     "gravity": ("Gravity", "重力"),
     "place": (
-        "Torque by place (spring, arm, imbalance), ±",
+        "Position-dependent torque (spring, arm, imbalance), ±",
         "随位置变化的转矩（弹簧、摆臂、不平衡），±",
     ),
-    "fan": ("Torque of a fan or pump, at most", "风机或泵类转矩，最大"),
+    "fan": ("Fan or pump torque, at most", "风机或泵类转矩，最大"),
     "identified": (
         "The data support these values (R² {r2}).",
         "数据支持这些值（R² {r2}）。",

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import pytest
 
+from backend.commands.measure import _told
 from backend.tools.autotune import AutotuneResult, AutotuneSettings, autotune
 from backend.tools.inertia import inertia
-from backend.tools.inertia_evaluation import InertiaSettings
+from backend.tools.inertia_evaluation import InertiaSettings, as_json
 from backend.tools.notch_meaning import meaning_of
 from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import SweepSettings
@@ -136,8 +137,14 @@ def _limits(b: DirectBench) -> list[str]:
 async def test_a_load_that_pulls_by_its_place_is_no_inertia(drive: str, place: PlaceSpec) -> None:
     spec = ONE.model_copy(update={"place": place})
     async with direct(spec, drive=drive) as b:
-        found = (await inertia(b.axis, b.session, InertiaSettings(WIDE), silent())).result
+        outcome = await inertia(b.axis, b.session, InertiaSettings(WIDE), silent())
+    found, answer = outcome.result, as_json(outcome)
     assert found.verdict == "ok"
     assert found.inertia_kgm2.value == pytest.approx(spec.total_inertia_kgm2, rel=0.02)
     assert found.coulomb_nm.value == pytest.approx(spec.friction.coulomb_nm, rel=0.1)
     assert found.beside.place_nm > 0.02
+    assert answer["place_nm"] == found.beside.place_nm
+    assert answer["fan_nm"] is None
+    told = _told("inertia", answer)
+    assert any("position-dependent torque" in line for line in told)
+    assert not any("fan, pump" in line for line in told)

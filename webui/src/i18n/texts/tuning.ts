@@ -408,14 +408,14 @@ export const tuning = {
   'inertia.coulomb': ['Coulomb friction', '库仑摩擦'],
   'inertia.viscous': ['Viscous friction', '粘性摩擦'],
   'inertia.gravity': ['Gravity', '重力'],
-  'inertia.place': ['Torque by place, ±', '随位置变化的转矩，±'],
+  'inertia.place': ['Position-dependent torque, ±', '随位置变化的转矩，±'],
   'inertia.placeHelp': [
-    'Torque by place: a spring, an arm or a load out of balance.',
+    'Position-dependent torque: a spring, an arm or an unbalanced load.',
     '随位置变化的转矩：弹簧、摆臂或不平衡负载。',
   ],
-  'inertia.fan': ['Torque of a fan, max.', '风机类转矩，最大'],
+  'inertia.fan': ['Fan torque, max.', '风机类转矩，最大'],
   'inertia.fanHelp': [
-    'Torque of a fan: it grows with the square of the speed, as that of a pump does.',
+    'Fan torque: it grows with the square of the speed, as that of a pump does.',
     '风机类转矩：随转速的平方增大，泵类亦然。',
   ],
   'inertia.perRated': [
