@@ -13,7 +13,7 @@ import sys
 import time
 
 from drivers.virtual.firmware import VirtualServo, make_device
-from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.mechanics import EncoderSpec, FrictionSpec, LoadSpec, MechanicsSpec, MotorSpec
 from profiles.loader import load_profile
 

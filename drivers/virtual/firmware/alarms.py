@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.families.base import FaultInfo
+from drivers.virtual.firmware.kernel import layout as k
 from profiles.schema import Fault, Profile
 
 

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.families.base import SwingKeys
+from drivers.virtual.firmware.kernel import layout as k
 from profiles.loader import load_profile
 
 _LOWEST_HZ = 80.0

@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import expm
 
-from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware import loop_parameters
+from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.kernel.loop import run
 from drivers.virtual.firmware.settings import (
     GainSet,
     ImpedanceSettings,
     LoopSettings,
     MotorData,
     ProtectionSettings,
-    SwingFilter,
 )
 from drivers.virtual.mechanics import MechanicsSpec
 from drivers.virtual.mechanics.chain import FIRST_LOAD, discretise
-
-TURN: Final = 2 * math.pi
-
-
-def low_pass(cutoff_hz: float) -> float:
-    """Coefficient of an exactly sampled first-order low pass; 1 passes everything."""
-    return 1.0 if math.isinf(cutoff_hz) else 1.0 - math.exp(-TURN * cutoff_hz * k.STEP_S)
 
 
 class VirtualAxis:
@@ -48,7 +40,10 @@ class VirtualAxis:
         self._loops: LoopSettings | None = None
         self._homing = False
         self._braked = self._brake_released = False
-        self._set_physics(spec)
+        loop_parameters.write_physics(self.p, spec, self.motor)
+        self.p[k.P_EVENT_MASK] = k.EV_FAULT | k.EV_STOPPED
+        self.s[k.S_VOLTAGE] = spec.supply.voltage_v
+        self.s[k.S_TEMPERATURE] = spec.supply.ambient_c
         self.set_current_loop(1000.0)
         self.apply_protections(ProtectionSettings())
         self.apply_windows(0.0, 0.0, 0.0, math.inf)
@@ -59,46 +54,12 @@ class VirtualAxis:
         self.apply_loops(LoopSettings(first=gains, second=gains, homing=None))
         self.power_off()
 
-    def _set_physics(self, spec: MechanicsSpec) -> None:
-        p, motor, turn = self.p, self.motor, TURN
-        p[k.P_COUNTS_PER_RAD] = spec.encoder.counts_per_rev / turn
-        p[k.P_NOISE] = spec.encoder.noise_counts
-        p[k.P_COULOMB] = spec.friction.coulomb_nm
-        p[k.P_STICTION] = max(spec.friction.static_nm - spec.friction.coulomb_nm, 0.0)
-        p[k.P_STRIBECK] = spec.friction.stribeck_rad_s
-        p[k.P_GRAVITY] = spec.friction.gravity_nm
-        p[k.P_PLACE_NM] = spec.place.torque_nm
-        p[k.P_PLACE_PER_RAD] = 1.0 / spec.place.period_rev
-        p[k.P_PLACE_AT] = spec.place.at_rev * 2.0 * math.pi
-        p[k.P_FAN] = spec.friction.fan_nms2
-        p[k.P_STOP_MIN] = spec.travel.min_rev * turn
-        p[k.P_STOP_MAX] = spec.travel.max_rev * turn
-        negative, positive = spec.limit_switches_rev
-        p[k.P_LIMIT_NEGATIVE], p[k.P_LIMIT_POSITIVE] = negative * turn, positive * turn
-        p[k.P_HOME_FROM] = spec.switches.home_from_rev * turn
-        p[k.P_HOME_TO] = spec.switches.home_to_rev * turn
-        p[k.P_INDEX_RAD] = turn
-        p[k.P_KT], p[k.P_RESISTANCE] = motor.torque_constant, motor.resistance_ohm
-        p[k.P_RATED_NM] = motor.rated_torque_nm
-        p[k.P_POWER_LIMIT_V] = 1 / math.sqrt(6)
-        p[k.P_SUPPLY_V], p[k.P_SUPPLY_R] = spec.supply.voltage_v, spec.supply.resistance_ohm
-        p[k.P_SUPPLY_C], p[k.P_SUPPLY_SINKS] = spec.supply.capacitance_f, spec.supply.sinks
-        p[k.P_BRAKE_R] = 25.0  # built-in braking resistor, 004:2235-2241
-        rated_loss = 3 * motor.resistance_ohm * motor.rated_current_a**2
-        p[k.P_THERMAL_K_PER_W] = 35.0 / rated_loss
-        p[k.P_THERMAL_S] = 120.0
-        p[k.P_AMBIENT] = spec.supply.ambient_c
-        p[k.P_LOAD_RATIO_S] = 1.0
-        p[k.P_EVENT_MASK] = k.EV_FAULT | k.EV_STOPPED
-        self.s[k.S_VOLTAGE] = spec.supply.voltage_v
-        self.s[k.S_TEMPERATURE] = spec.supply.ambient_c
-
     # --- running ---------------------------------------------------------------------------
     def run(self, steps: int) -> int:
         """Advance by up to ``steps`` of 50 µs; returns how many were done before an event."""
         self.s[k.S_EVENTS] = 0.0
         chain = self._chain
-        done: int = k.run(
+        done: int = run(
             steps, self.p, self.s, self._x, chain.a, chain.b, chain.gap_state,
             chain.half_gap_rad, self._scratch, self._random,
         )  # fmt: skip
@@ -125,69 +86,17 @@ class VirtualAxis:
         """Bandwidth of the first-order current loop."""
         if bandwidth_hz != self._current_loop_hz:
             self._current_loop_hz = bandwidth_hz
-            self._chain = discretise(self.spec, TURN * bandwidth_hz, k.STEP_S)
+            self._chain = discretise(self.spec, loop_parameters.TURN * bandwidth_hz, k.STEP_S)
 
     def apply_loops(self, loops: LoopSettings) -> None:
         """Gains, filters, feed-forward and notches."""
         self._loops = loops
         self.set_current_loop(loops.current_loop_hz)
-        p = self.p
         first, second = loops.first, loops.second
         if self._homing and loops.homing is not None:
             first = second = loops.homing
-        p[k.P_KP_POSITION_1], p[k.P_KP_POSITION_2] = first.position_per_s, second.position_per_s
-        p[k.P_KP_SPEED_1], p[k.P_KP_SPEED_2] = first.speed_nms, second.speed_nms
-        p[k.P_KI_SPEED_1], p[k.P_KI_SPEED_2] = first.integral_nm, second.integral_nm
-        switching = loops.switching
-        p[k.P_SWITCH_KIND], p[k.P_SWITCH_LEVEL] = switching.kind, switching.level
-        p[k.P_SWITCH_HYSTERESIS] = switching.hysteresis
-        p[k.P_SWITCH_DELAY], p[k.P_SWITCH_TIME] = switching.delay_s, switching.ramp_s
-        p[k.P_SPEED_OUT_LIMIT] = loops.speed_output_nm
-        p[k.P_POSITION_OUT_LIMIT] = loops.position_output_rad_s
-        p[k.P_TORQUE_SPEED_LIMIT] = loops.torque_mode_speed_rad_s
-        p[k.P_FF_SPEED] = loops.speed_feed_forward
-        p[k.P_FF_SPEED_COEFFICIENT] = _lag(loops.speed_feed_forward_s)
-        p[k.P_FF_TORQUE] = loops.torque_feed_forward * loops.inertia_kgm2
-        p[k.P_FF_TORQUE_COEFFICIENT] = _lag(loops.torque_feed_forward_s)
-        p[k.P_POSITION_FILTER] = low_pass(loops.position_filter_hz)
-        p[k.P_SPEED_FILTER] = low_pass(loops.speed_filter_hz)
-        p[k.P_SPEED_SOURCE] = loops.use_observer
-        p[k.P_OBSERVER_GAIN] = low_pass(loops.observer_hz)
-        p[k.P_OBSERVER_INERTIA] = loops.inertia_kgm2
-        p[k.P_OBSERVER_VISCOUS] = loops.viscous_nms
-        p[k.P_OBSERVER_COULOMB] = loops.coulomb_nm
-        p[k.P_STOP_SPEED], p[k.P_STOP_TORQUE] = loops.brake_speed_rad_s, loops.brake_torque_nm
-        p[k.P_TORQUE_FILTER] = _lag(loops.torque_filter_s)
-        second_s = loops.torque_filter_2_s
-        p[k.P_TORQUE_FILTER_2] = _lag(loops.torque_filter_s if second_s is None else second_s)
-        compensation = loops.compensation
-        p[k.P_TORQUE_BIAS], p[k.P_FRICTION_VISCOUS] = compensation.bias_nm, compensation.viscous_nms
-        p[k.P_FRICTION_POSITIVE] = compensation.positive_nm
-        p[k.P_FRICTION_NEGATIVE] = compensation.negative_nm
-        self._apply_extras(loops)
-        p[k.P_NOTCH_COUNT] = len(loops.notches)
-        for i, notch in enumerate(loops.notches):
-            start = k.P_NOTCHES + 4 * i
-            p[start : start + 4] = notch.a1, notch.a2, notch.b1, notch.b2
-
-    def _apply_extras(self, loops: LoopSettings) -> None:
-        """Third gains, command notch and quadrant compensation of the families that have them."""
-        p, third, swing = self.p, loops.third, loops.swing
-        p[k.P_THIRD_GAINS] = third is not None
-        if third is not None:
-            p[k.P_THIRD_DELAY] = third.delay_s
-            p[k.P_KP_POSITION_3] = third.gains.position_per_s
-            p[k.P_KP_SPEED_3] = third.gains.speed_nms
-            p[k.P_KI_SPEED_3] = third.gains.integral_nm
-        p[k.P_SHAPE_ON] = swing is not None
-        if swing is not None:
-            first = k.P_SHAPE_A11
-            p[first : first + 6] = _swing_coefficients(swing)
-        quadrant = loops.quadrant
-        p[k.P_QUADRANT_POSITIVE] = quadrant.positive_nm
-        p[k.P_QUADRANT_NEGATIVE] = quadrant.negative_nm
-        p[k.P_QUADRANT_DELAY], p[k.P_QUADRANT_ANGLE] = quadrant.delay_s, quadrant.angle_rad
-        p[k.P_QUADRANT_FILTER] = _lag(quadrant.filter_s)
+        loop_parameters.write_gains(self.p, first, second)
+        loop_parameters.write_loops(self.p, loops)
 
     def use_homing_gains(self, homing: bool) -> None:
         """Switch to or from the gain set for homing."""
@@ -197,28 +106,14 @@ class VirtualAxis:
 
     def apply_protections(self, limits: ProtectionSettings) -> None:
         """Thresholds of the protections."""
-        p = self.p
-        p[k.P_OCP_A], p[k.P_UVLO_V] = limits.over_current_a, limits.under_voltage_v
-        p[k.P_OVP_V], p[k.P_BRAKE_ON_V] = limits.over_voltage_v, limits.brake_on_v
-        fitted = limits.brake_enabled and self.spec.supply.braking_resistor
-        p[k.P_BRAKE_OFF_V], p[k.P_BRAKE_ENABLED] = limits.brake_off_v, fitted
-        p[k.P_LOCK_ANGLE], p[k.P_LOCK_S] = limits.locked_angle_rad, limits.locked_s
-        p[k.P_OVERLOAD_NM], p[k.P_OVERLOAD_S] = limits.overload_nm, limits.overload_s
-        p[k.P_OTP_C], p[k.P_OVER_SPEED] = limits.over_temperature_c, limits.over_speed_rad_s
-        p[k.P_SPEED_ERROR], p[k.P_SPEED_ERROR_S] = limits.speed_error_rad_s, limits.speed_error_s
-        p[k.P_FOLLOWING_S], p[k.P_BRAKE_R] = limits.following_error_s, limits.braking_ohm
-        p[k.P_I2T_LIMIT] = limits.i2t_s
-        rated = self.motor.rated_torque_nm
-        p[k.P_I2T_RATED_NM] = min(limits.i2t_rated_nm, 1e3 * rated)
-        p[k.P_LOCK_NM] = rated if limits.locked_nm is None else limits.locked_nm
+        resistor = self.spec.supply.braking_resistor
+        loop_parameters.write_protections(self.p, limits, self.motor.rated_torque_nm, resistor)
         self._braked = limits.holding_brake or self.spec.motor.brake
         self.release_brake(self._brake_released)
 
     def apply_impedance(self, settings: ImpedanceSettings) -> None:
         """Gains of the impedance controller."""
-        p = self.p
-        p[k.P_Z_KP], p[k.P_Z_KI], p[k.P_Z_KD] = settings.kp, settings.ki, settings.kd
-        p[k.P_Z_FILTER], p[k.P_Z_LIMIT] = low_pass(settings.filter_hz), settings.limit_nm
+        loop_parameters.write_impedance(self.p, settings)
 
     def apply_windows(
         self, position_rad: float, speed_rad_s: float, zero_rad_s: float, following_rad: float
@@ -422,15 +317,3 @@ class VirtualAxis:
     def raise_fault(self, bit: int) -> None:
         """Latch a fault as if its protection had acted."""
         self.s[k.S_FAULTS] = float(self.faults | bit)
-
-
-def _lag(time_constant_s: float) -> float:
-    return 1.0 if time_constant_s <= 0 else 1.0 - math.exp(-k.STEP_S / time_constant_s)
-
-
-def _swing_coefficients(swing: SwingFilter) -> list[float]:
-    """The kernel's A11, A12, A21, A22, B1, B2: the notch's low pass, sampled exactly."""
-    w, two_zeta_w = TURN * swing.frequency_hz, 2 * swing.damping * TURN * swing.frequency_hz
-    block = np.array([[0.0, 1.0, 0.0], [-w * w, -two_zeta_w, two_zeta_w], [0.0, 0.0, 0.0]])
-    solved = expm(block * k.STEP_S)
-    return [solved[i, j] for i, j in ((0, 0), (0, 1), (1, 0), (1, 1), (0, 2), (1, 2))]

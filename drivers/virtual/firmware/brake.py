@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.families.base import BrakeTimes
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.schedule import Timer
 
 _LOOK_S = 1e-3

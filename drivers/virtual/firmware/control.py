@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.alarms import FaultLog
 from drivers.virtual.firmware.brake import HoldingBrake
 from drivers.virtual.firmware.core import Core
@@ -13,6 +12,7 @@ from drivers.virtual.firmware.families.base import FaultInfo
 from drivers.virtual.firmware.faults import Faults
 from drivers.virtual.firmware.identification import Identification
 from drivers.virtual.firmware.jog import TerminalJog
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.modes import CST, PP, PT, Modes
 from drivers.virtual.firmware.poles import PoleIdentification
 from drivers.virtual.firmware.states import Command, State, decode, next_state

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable
 from typing import Protocol
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.alarms import Alarms, FaultLog, Snapshot, snapshot_of
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.families.base import FaultInfo
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.schedule import Timer
 from drivers.virtual.firmware.states import State
 from profiles.schema import Fault

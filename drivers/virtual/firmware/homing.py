@@ -12,8 +12,8 @@ import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.schedule import Timer
 
 _FAR = 1e9

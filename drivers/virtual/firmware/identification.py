@@ -13,8 +13,8 @@ from collections.abc import Callable, Generator
 
 import numpy as np
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.schedule import Timer
 
 (

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.dictionary import Number
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.monitors import monitors
 from drivers.virtual.firmware.panel import Panel
 from drivers.virtual.firmware.states import State

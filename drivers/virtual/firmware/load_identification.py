@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.families.base import RPM
 from drivers.virtual.firmware.identification import regress
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.schedule import Timer
 
 _SAMPLE_S = 0.002

@@ -10,11 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.alarms import Record
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.dictionary import Number
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.states import State
 from drivers.virtual.firmware.terminals import Terminals
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.dictionary import Number
+from drivers.virtual.firmware.kernel import layout as k
 
 _INPUTS, _OUTPUTS = 4, 2
 _PROBE_FUNCTION = 4  # of DI1 (probe 1) and DI2 (probe 2), 004:6480, 004:6492

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.axis import VirtualAxis
+from drivers.virtual.firmware.kernel import layout as k
 
 
 class Timer:

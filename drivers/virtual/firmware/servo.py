@@ -15,7 +15,6 @@ from drivers.virtual.device import (
     ProcessImage,
     SdoAbort,
 )
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.alarms import FaultLog
 from drivers.virtual.firmware.automatic import Automatic
 from drivers.virtual.firmware.axis import VirtualAxis
@@ -25,6 +24,7 @@ from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.dictionary import Entry, ObjectDictionary
 from drivers.virtual.firmware.families.base import Family
 from drivers.virtual.firmware.faults import Emergency
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.live import live_values
 from drivers.virtual.firmware.mapping import MappingRules
 from drivers.virtual.firmware.panel import Panel

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.families.terminals import (
@@ -16,6 +15,7 @@ from drivers.virtual.firmware.families.terminals import (
     TerminalTable,
     is_virtually_on,
 )
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.states import State
 
 _LATCHES = ("60BA:00", "60BB:00", "60BC:00", "60BD:00")

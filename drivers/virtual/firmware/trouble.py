@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from drivers.virtual.firmware import kernel as k
-from drivers.virtual.firmware.axis import TURN
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.loop_parameters import TURN
 from drivers.virtual.firmware.panel import Panel
 from drivers.virtual.firmware.terminals import Terminals
 from profiles.schema import Fault

@@ -9,8 +9,8 @@ import pytest
 from pydantic import ValidationError
 from scipy.linalg import expm
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.axis import VirtualAxis
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.settings import ProtectionSettings
 from drivers.virtual.mechanics import (
     EncoderSpec,

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.mechanics import FrictionSpec, MechanicsSpec, MotorSpec
 
 from .on_wire import EVERY, Aborted, OnWire

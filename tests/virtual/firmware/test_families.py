@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from drivers.virtual.device import SdoAbort
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware import make_device
 from drivers.virtual.firmware.factory import FAMILIES
 from drivers.virtual.firmware.families.mms7 import Mms7
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import MechanicsSpec, TravelSpec
 from profiles.loader import drive_names, load_profile

@@ -8,7 +8,7 @@ import struct
 import numpy as np
 import pytest
 
-from drivers.virtual.firmware import kernel as k
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.mechanics import EncoderSpec, FrictionSpec, LoadSpec, TravelSpec
 
 from .servo_bench import REV, TURN, Bench, rigid

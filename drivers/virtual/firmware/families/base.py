@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.settings import LoopSettings, MotorData, ProtectionSettings
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.families import power
@@ -31,6 +30,7 @@ from drivers.virtual.firmware.families.conversions import (
 from drivers.virtual.firmware.families.loops import UNIT_GAIN, LoopReader
 from drivers.virtual.firmware.families.reports import faults_of
 from drivers.virtual.firmware.families.terminals import TABLES, TerminalTable
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.settings import LoopSettings, MotorData, ProtectionSettings
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw

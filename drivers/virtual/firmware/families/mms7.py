@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.families.base import (
@@ -20,6 +19,7 @@ from drivers.virtual.firmware.families.base import (
     inertia_kgm2,
 )
 from drivers.virtual.firmware.families.terminals import TerminalTable
+from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.settings import (
     Biquad,
     GainSet,

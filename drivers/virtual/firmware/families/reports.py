@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.families.base import FaultInfo
+from drivers.virtual.firmware.kernel import layout as k
 from profiles.schema import Profile
 
 #: Names of faults as manuals print them, per protection, and the standard's code (CiA 402-2).

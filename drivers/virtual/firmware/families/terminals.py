@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.dictionary import ObjectDictionary
 from drivers.virtual.firmware.families.base import Wiring
+from drivers.virtual.firmware.kernel import layout as k
 
 InputUse = Literal[
     "negative_limit", "positive_limit", "home", "reset", "emergency", "probe1", "probe2", "gain",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from drivers.virtual.firmware import kernel as k
 from drivers.virtual.firmware.families.base import (
     Autosave,
     Choice,
@@ -19,6 +18,7 @@ from drivers.virtual.firmware.families.base import (
     TorqueHoming,
     Traits,
 )
+from drivers.virtual.firmware.kernel import layout as k
 
 #: P08.09 (000:3399). What the level of each condition is counted in is not printed: torque in %,
 #: speeds in rpm, the change of speed in 10 rpm/s and the deviation in command units are assumed.

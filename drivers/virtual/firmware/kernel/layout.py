@@ -1,0 +1,95 @@
+"""What every number in the flat arrays of the 50 µs loop is: parameters, state and their codes.
+
+``p`` are the parameters, written by the firmware; ``s`` is the state, owned by the loop. SI units
+throughout: rad, rad/s, Nm, A, V, °C. Compiled code holds these indices as constants.
+"""
+
+from __future__ import annotations
+
+STEP_S = 50e-6
+STEP_NS = 50_000
+
+# --- what the command generator does -------------------------------------------------------
+GEN_OFF, GEN_POSITION, GEN_VELOCITY, GEN_TORQUE, GEN_CYCLIC, GEN_TORQUE_STOP = range(6)
+# --- which loops are closed ----------------------------------------------------------------
+LOOP_OFF, LOOP_POSITION, LOOP_SPEED, LOOP_TORQUE, LOOP_IMPEDANCE = range(5)
+# --- events that end a run early, as bits --------------------------------------------------
+EV_FAULT, EV_STOPPED, EV_ARRIVED, EV_SIGNAL, EV_INDEX, EV_STALL, EV_ALARM_CLOCK, EV_LIMIT = (
+    1 << bit for bit in range(8)
+)  # fmt: skip
+# --- protections: bits of the MMS7's error status 200Bh:0Bh (004:6254-6282), then those that
+#     other families have ------------------------------------------------------------------
+(
+    F_OVER_CURRENT, F_UNDER_VOLTAGE, F_LOCKED, F_POWER_STAGE, F_OVERLOAD, F_POSITION_LIMIT,
+    F_SENSOR, F_MEMORY, F_OVER_TEMPERATURE, F_OVER_VOLTAGE, F_OVER_SPEED, F_SPEED_ERROR,
+    F_WATCHDOG, F_FOLLOWING,
+) = (1 << bit for bit in range(14))  # fmt: skip
+# --- switches, as bits of P_SIGNAL_* and S_SIGNALS ------------------------------------------
+SIG_NEGATIVE, SIG_POSITIVE, SIG_HOME = 1, 2, 4
+
+# --- when the second gains act: P_SWITCH_KIND (conditions as M6-L 000:3399, R6L 002:10800) -----
+(
+    SWITCH_OFF, SWITCH_SMALL_ERROR, SWITCH_INPUT, SWITCH_TORQUE, SWITCH_SPEED_DEMAND,
+    SWITCH_SPEED, SWITCH_ACCELERATION, SWITCH_ERROR, SWITCH_COMMANDED, SWITCH_UNFINISHED,
+    SWITCH_COMMANDED_OR_FAST,
+) = range(11)  # fmt: skip
+# --- what a limit switch does: P_LIMIT_STOPS --------------------------------------------------
+LIMIT_IGNORED, LIMIT_FAULT, LIMIT_HOLDS = range(3)
+
+# --- parameters -----------------------------------------------------------------------------
+(
+    P_GEN, P_LOOP, P_EVENT_MASK, P_TARGET, P_V_MAX, P_ACC, P_DEC, P_STOPPING, P_STOP_DEC,
+    P_V_TARGET, P_T_TARGET, P_T_SLOPE, P_STOP_SPEED, P_STOP_TORQUE,
+    P_KP_POSITION_1, P_KP_POSITION_2, P_KP_SPEED_1, P_KP_SPEED_2, P_KI_SPEED_1, P_KI_SPEED_2,
+    P_SWITCH_LEVEL, P_SWITCH_TIME, P_SWITCH_KIND, P_SPEED_OUT_LIMIT, P_POSITION_OUT_LIMIT,
+    P_TORQUE_SPEED_LIMIT, P_MAX_SPEED, P_T_MAX, P_T_MIN,
+    P_FF_SPEED, P_FF_SPEED_COEFFICIENT, P_FF_TORQUE, P_FF_TORQUE_COEFFICIENT,
+    P_POSITION_FILTER, P_SPEED_FILTER, P_SPEED_SOURCE, P_OBSERVER_GAIN, P_OBSERVER_INERTIA,
+    P_OBSERVER_VISCOUS, P_OBSERVER_COULOMB, P_NOTCH_COUNT,
+    P_COUNTS_PER_RAD, P_NOISE, P_ENCODER_DEAD,
+    P_COULOMB, P_GRAVITY, P_STOP_MIN, P_STOP_MAX, P_BRAKE_TORQUE,
+    P_LIMIT_NEGATIVE, P_LIMIT_POSITIVE, P_HOME_FROM, P_HOME_TO,
+    P_SIGNAL_FORCED, P_SIGNAL_FORCED_ON, P_SIGNAL_INVERTED, P_WATCH_MASK, P_WATCH_VALUE,
+    P_LIMIT_STOPS, P_ALARM_STEP,
+    P_KT, P_RESISTANCE, P_SUPPLY_V, P_SUPPLY_R, P_SUPPLY_C, P_SUPPLY_SINKS, P_BRAKE_R,
+    P_BRAKE_ON_V, P_BRAKE_OFF_V, P_BRAKE_ENABLED, P_THERMAL_K_PER_W, P_THERMAL_S, P_AMBIENT,
+    P_OCP_A, P_UVLO_V, P_OVP_V, P_LOCK_ANGLE, P_LOCK_S, P_OVERLOAD_NM, P_OVERLOAD_S,
+    P_OTP_C, P_OVER_SPEED, P_SPEED_ERROR, P_SPEED_ERROR_S, P_RATED_NM,
+    P_POSITION_WINDOW, P_SPEED_WINDOW, P_ZERO_SPEED, P_FOLLOWING_WINDOW, P_STALL_NM, P_STALL_S,
+    P_STALL_SPEED, P_Z_KP, P_Z_KI, P_Z_KD, P_Z_FILTER, P_Z_LIMIT, P_LOAD_RATIO_S,
+    P_POWER_LIMIT_V, P_INDEX_RAD, P_TORQUE_FILTER, P_FOLLOWING_S,
+    P_TORQUE_FILTER_2, P_SWITCH_HYSTERESIS, P_SWITCH_DELAY, P_SWITCH_INPUT, P_LIMIT_DEC,
+    P_DYNAMIC_BRAKE, P_BRAKE_CLOSED, P_I2T_LIMIT, P_LOCK_NM, P_FRICTION_POSITIVE,
+    P_FRICTION_NEGATIVE, P_FRICTION_VISCOUS, P_TORQUE_BIAS, P_I2T_RATED_NM,
+    P_THIRD_GAINS, P_THIRD_DELAY, P_KP_POSITION_3, P_KP_SPEED_3, P_KI_SPEED_3,
+    P_SHAPE_ON, P_SHAPE_A11, P_SHAPE_A12, P_SHAPE_A21, P_SHAPE_A22, P_SHAPE_B1, P_SHAPE_B2,
+    P_QUADRANT_POSITIVE, P_QUADRANT_NEGATIVE, P_QUADRANT_DELAY, P_QUADRANT_FILTER,
+    P_QUADRANT_ANGLE, P_PLACE_NM, P_PLACE_PER_RAD, P_PLACE_AT, P_FAN,
+    P_STICTION, P_STRIBECK,
+) = range(139)  # fmt: skip
+P_NOTCHES = 139
+"""Start of the notches: per notch a1, a2, b1, b2 of (z² + a1·z + a2)/(z² + b1·z + b2)."""
+P_SIZE = P_NOTCHES + 16
+
+# --- state ----------------------------------------------------------------------------------
+(
+    S_STEP, S_EVENTS, S_FAULTS, S_THETA, S_THETA_FILTERED, S_OMEGA_RAW, S_OMEGA, S_OMEGA_LOW,
+    S_OMEGA_OBSERVED, S_P_DEMAND, S_V_DEMAND, S_A_DEMAND, S_T_DEMAND, S_STOPPED, S_ARRIVED,
+    S_SPEED_REFERENCE, S_INTEGRAL, S_FF_SPEED, S_FF_TORQUE, S_GAIN_MIX, S_TORQUE_COMMAND,
+    S_TORQUE, S_CURRENT, S_SATURATED, S_SPEED_LIMITED,
+    S_VOLTAGE, S_BRAKE_DUTY, S_BRAKE_ON, S_TEMPERATURE,
+    S_LOAD_RATIO, S_SIGNALS, S_INDEX_ANGLE, S_INDEX_COUNT,
+    S_LOCK_ANCHOR, S_LOCK_T, S_OVERLOAD_T, S_SPEED_ERROR_T,
+    S_POSITION_T, S_SPEED_T, S_ZERO_T, S_FOLLOWING_T, S_STALL_T,
+    S_IP_POSITION, S_IP_POSITION_INC, S_IP_SPEED, S_IP_SPEED_INC, S_IP_TORQUE, S_IP_TORQUE_INC,
+    S_IP_LEFT, S_Z_INTEGRAL, S_Z_SPEED, S_SPARE_NORMAL, S_HAS_SPARE, S_LIMIT_ACTIVE, S_UQ,
+    S_TORQUE_FILTERED, S_SECOND_GAINS, S_SWITCH_T, S_I2T, S_LIMIT_HELD,
+    S_THIRD_MIX, S_REST_T, S_SHAPE, S_SHAPE_RATE,
+    S_QUADRANT_SIGN, S_QUADRANT_T, S_QUADRANT_FROM, S_QUADRANT,
+) = range(68)  # fmt: skip
+S_NOTCHES = 68
+"""Start of the notch states, two per notch."""
+S_TRACE = S_NOTCHES + 8
+"""Start of the last TRACE_STEPS torque commands, as a ring by the step counter."""
+TRACE_STEPS = 4096
+S_SIZE = S_TRACE + TRACE_STEPS

@@ -1,0 +1,100 @@
+"""One step of the mechanics: the exact linear chain, then friction and end stops.
+
+Friction is time-stepping on the velocity level (J. J. Moreau, "Unilateral contact and dry
+friction in finite freedom dynamics", 1988): the friction torque of a step is the one that ends it
+at rest, limited to the Coulomb torque, so nothing chatters.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.kernel.basics import clamp
+
+
+@njit(nogil=True)
+def _behind(x, size):  # type: ignore[no-untyped-def]
+    """Angle of the last inertia of the chain, in rad."""
+    behind = x[0]
+    for i in range(3, size, 2):
+        behind -= x[i]
+    return behind
+
+
+@njit(nogil=True)
+def _pull(p, x, size):  # type: ignore[no-untyped-def]
+    """What the load takes of the last inertia: its weight, by its place, and as a fan does."""
+    pull = p[k.P_GRAVITY]
+    if p[k.P_PLACE_NM] != 0.0:
+        angle = _behind(x, size) - p[k.P_PLACE_AT]
+        pull += p[k.P_PLACE_NM] * math.sin(p[k.P_PLACE_PER_RAD] * angle)
+    if p[k.P_FAN] != 0.0:
+        speed = x[size - 1] if size > 3 else x[1]
+        pull += p[k.P_FAN] * speed * abs(speed)
+    return pull
+
+
+@njit(nogil=True)
+def _beyond(p, x, size):  # type: ignore[no-untyped-def]
+    """How far the last inertia is beyond an end stop, signed."""
+    behind = _behind(x, size)
+    if behind > p[k.P_STOP_MAX]:
+        return behind - p[k.P_STOP_MAX]
+    if behind < p[k.P_STOP_MIN]:
+        return behind - p[k.P_STOP_MIN]
+    return 0.0
+
+
+@njit(nogil=True)
+def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-untyped-def]
+    """One exact step of the linear chain, then friction and end stops on the velocity level."""
+    size = x.shape[0]
+    contact = 0
+    for g in range(gap_state.shape[0]):
+        if abs(x[gap_state[g]]) >= half_gap[g]:
+            contact |= 1 << g
+    am, bm = a[contact], b[contact]
+    pull = _pull(p, x, size)
+    for i in range(size):
+        total = bm[i, 0] * s[k.S_TORQUE_COMMAND] - bm[i, 2] * pull
+        for j in range(size):
+            total += am[i, j] * x[j]
+        for g in range(gap_state.shape[0]):
+            if contact >> g & 1:
+                total += bm[i, 3 + g] * (1.0 if x[gap_state[g]] > 0.0 else -1.0)
+        scratch[i] = total
+    coulomb = p[k.P_COULOMB]
+    if p[k.P_STICTION] > 0.0:
+        slow = x[1] / p[k.P_STRIBECK]
+        coulomb += p[k.P_STICTION] * math.exp(-slow * slow)
+    if int(p[k.P_LOOP]) == k.LOOP_OFF or p[k.P_BRAKE_CLOSED] > 0.0:
+        coulomb += p[k.P_BRAKE_TORQUE]
+    friction = 0.0
+    if coulomb > 0.0:
+        needed = -scratch[1] / bm[1, 1]
+        friction = clamp(needed, -coulomb, coulomb)
+        for i in range(size):
+            scratch[i] += bm[i, 1] * friction
+        if friction == needed:
+            scratch[1] = 0.0
+            if x[1] == 0.0:
+                scratch[0] = x[0]
+    last = size - 1 if size > 3 else 1
+    beyond = _beyond(p, scratch, size)
+    if beyond * scratch[last] > 0.0:
+        push = -scratch[last] / bm[last, 2]
+        for i in range(size):
+            scratch[i] += bm[i, 2] * push
+        scratch[last] = 0.0
+        # What the push over the step did not take back is taken back as an inelastic impact.
+        beyond = _beyond(p, scratch, size)
+        if size > 3:
+            scratch[size - 2] += beyond
+        else:
+            scratch[0] -= beyond
+    for i in range(size):
+        x[i] = scratch[i]
+    s[k.S_TORQUE] = x[2]
