@@ -12,7 +12,8 @@ from backend.cyclic import CyclicSession
 from drivers.errors import Busy, DriveError, NotAllowed
 
 if TYPE_CHECKING:
-    from backend.bench import Bench, Member
+    from backend.bench import Bench
+    from backend.member import Member
 
 #: Why no motion may begin on a bus at present.
 _CHANGING = "the cyclic exchange is just being changed"
@@ -39,13 +40,13 @@ class Exchanges:
     ) -> CyclicSession:
         """Exchange process data with all drives of a bus; see `Bench.start_cyclic`."""
         bench = self._bench
-        link = await bench.link(url)
+        link = await bench.buses.open(url)
         users = [m for m in bench.members.values() if any(p.link is link for p in m.drive.ports)]
         if not users:
             raise NotAllowed(f"{url} has no connected drives", remedy="connect a drive first")
         for member in users:
             if member.drive.id != in_job_of:
-                bench.require_idle(member)
+                bench.motion.require_idle(member)
         self._require_settled(url)
         if (old := self.running.get(url)) is not None and old.running:
             raise Busy(f"{url}: the cyclic exchange runs already", remedy="end it first")

@@ -20,17 +20,17 @@ async def search_line(
         Busy: drives of the bench use this adapter. LinkLost: the adapter is missing.
     """
     wanted = parse_url(url)
-    if wanted.scheme not in ("modbus", "mlink") or wanted.is_virtual or url in bench.wires:
+    if wanted.scheme not in ("modbus", "mlink") or wanted.is_virtual or url in bench.buses.wires:
         raise NotAllowed(
             f"{url} has no baud rate and parity to search for",
             value=url,
             remedy="choose a serial adapter, for example modbus:///dev/ttyUSB0",
         )
-    same = [known for known in bench.links if parse_url(known).place == wanted.place]
+    same = [known for known in bench.buses.opened if parse_url(known).place == wanted.place]
     users = [
         member.drive.name
         for member in bench.members.values()
-        if any(bench.url_of(port) in same for port in member.drive.ports)
+        if any(bench.buses.url_of(port) in same for port in member.drive.ports)
     ]
     if users:
         raise Busy(
@@ -38,7 +38,7 @@ async def search_line(
             remedy="take these drives off the bench first",
         )
     for known in same:
-        await bench.close_link(known)
+        await bench.buses.close(known)
     found = await search_line_settings(wanted, progress, stations=stations)
     bench.journal.add(f"{wanted.place}: line settings {found.url if found else 'not found'}")
     return found

@@ -6,9 +6,10 @@ import asyncio
 import contextlib
 from dataclasses import dataclass
 
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.cyclic import CyclicSession
 from backend.jobs import Job
+from backend.member import Member
 from backend.ports import Port
 from backend.tools import profile_speed
 from drivers.errors import DriveError
@@ -80,7 +81,7 @@ async def exchange_for(bench: Bench, member: Member, cycle_s: float) -> Exchange
         NotAllowed: no cyclic data on this bus, or a drive refuses.
     """
     port = port_of(member)
-    drive, url = member.drive.id, bench.url_of(port)
+    drive, url = member.drive.id, bench.buses.url_of(port)
     by_speed = {drive} if profile_speed.needed(member.drive, port.link) else set[str]()
     running = bench.sessions.get(url)
     before_s = None
@@ -89,7 +90,7 @@ async def exchange_for(bench: Bench, member: Member, cycle_s: float) -> Exchange
             return Exchange(running, bench, drive, url, own=False)
         for other in bench.members.values():
             if other.drive in running.drives:
-                bench.require_idle(other)
+                bench.motion.require_idle(other)
         before_s = running.state.cycle_s if running.state is not None else None
         await bench.stop_cyclic(url)
     try:

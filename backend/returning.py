@@ -16,7 +16,8 @@ from drivers.errors import NotAllowed
 from drivers.link import Found
 
 if TYPE_CHECKING:
-    from backend.bench import Bench, Member
+    from backend.bench import Bench
+    from backend.member import Member
 
 _STANDS_S, _STANDS_RPM = 0.5, 5.0
 

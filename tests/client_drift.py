@@ -16,7 +16,7 @@ from pathlib import Path
 
 from pydantic.json_schema import models_json_schema
 
-from backend.api import live_messages, live_people_messages, models, models_description
+from backend.api import live_messages, live_people_messages, models_bench, models_description
 from backend.api.app import make_app
 from backend.bench import Bench
 
@@ -42,7 +42,7 @@ def description() -> str:
     messages += [
         (model, "serialization")
         for model in (
-            models.FoundDrive,
+            models_bench.FoundDrive,
             models_description.ImportedDescription,
             models_description.LineSearchResult,
         )

@@ -11,7 +11,8 @@ from typing import Annotated
 from fastapi import Depends, Header, Request
 
 from backend.api.errors import NotFound
-from backend.bench import Bench, Member
+from backend.bench import Bench
+from backend.member import Member
 from backend.people.errors import NotLoggedIn
 from backend.people.identity import Identity, acting
 from backend.people.station import People

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-from backend.api import models
+from backend.api import models, models_axis, models_bench, models_parameters, models_sets
 from backend.api.errors import problem_of
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.drive import Drive
 from backend.elapsed import moment_of
 from backend.jobs import Job
 from backend.journal import Entry
 from backend.matching import match_profiles
+from backend.member import Member
 from backend.monitor import Snapshot
 from backend.parameter_set import Difference
 from backend.readings import Reading
@@ -27,9 +28,9 @@ def moment(seconds: float) -> datetime:
     return datetime.fromtimestamp(seconds, UTC)
 
 
-def quality(now: LinkQuality) -> models.Quality:
+def quality(now: LinkQuality) -> models_bench.Quality:
     """Counters of a link."""
-    return models.Quality(
+    return models_bench.Quality(
         connected=now.connected,
         state=now.state,
         transactions=now.transactions,
@@ -44,12 +45,12 @@ def quality(now: LinkQuality) -> models.Quality:
     )
 
 
-def bus(bench: Bench, url: str, link: Link) -> models.Bus:
+def bus(bench: Bench, url: str, link: Link) -> models_bench.Bus:
     """An opened bus."""
     session = bench.sessions.get(url)
     info = None
     if session is not None and session.state is not None:
-        info = models.CyclicInfo(
+        info = models_bench.CyclicInfo(
             running=session.running,
             problem=session.trouble,
             cycle_us=session.state.cycle_s * 1e6,
@@ -57,7 +58,7 @@ def bus(bench: Bench, url: str, link: Link) -> models.Bus:
             channels=list(session.state.channels),
             left_over=dict(session.state.left_over),
         )
-    return models.Bus(
+    return models_bench.Bus(
         url=url,
         kind=link.kind,
         quality=quality(link.quality()),
@@ -66,13 +67,13 @@ def bus(bench: Bench, url: str, link: Link) -> models.Bus:
     )
 
 
-def lease(bench: Bench, drive: str, connection: str | None) -> models.Lease:
+def lease(bench: Bench, drive: str, connection: str | None) -> models_bench.Lease:
     """Who controls a drive, seen from ``connection``."""
     holder = bench.leases.holder(drive)
     if holder is None:
-        return models.Lease(holder=None, since=None)
+        return models_bench.Lease(holder=None, since=None)
     asked = bench.leases.asked(drive)
-    return models.Lease(
+    return models_bench.Lease(
         holder=holder.person,
         since=moment(holder.since),
         mine=holder.connection == connection,
@@ -85,10 +86,10 @@ def lease(bench: Bench, drive: str, connection: str | None) -> models.Lease:
 
 def drive_summary(
     bench: Bench, member: Member, connection: str | None = None
-) -> models.DriveSummary:
+) -> models_bench.DriveSummary:
     """A drive of the bench."""
     drive, found = member.drive, member.drive.found
-    return models.DriveSummary(
+    return models_bench.DriveSummary(
         id=drive.id,
         name=drive.name,
         notes=drive.notes,
@@ -97,8 +98,8 @@ def drive_summary(
         maker=drive.profile.identity.maker,
         partial=drive.profile.partial,
         ports=[
-            models.PortInfo(
-                url=bench.url_of(port),
+            models_bench.PortInfo(
+                url=bench.buses.url_of(port),
                 kind=port.link.kind,
                 station=port.station,
                 watchdog=bool(port.spec and port.spec.watchdog.present),
@@ -113,7 +114,7 @@ def drive_summary(
         unsaved=len(drive.unsaved),
         pending=len(drive.pending),
         owed=[
-            models.OwedValue(
+            models_bench.OwedValue(
                 key=debt.key,
                 name=drive.parameter(debt.key).name,
                 raw=debt.raw,
@@ -126,9 +127,9 @@ def drive_summary(
     )
 
 
-def fault(known: Fault) -> models.ActiveFault:
+def fault(known: Fault) -> models_axis.ActiveFault:
     """A fault with what to do about it."""
-    return models.ActiveFault(
+    return models_axis.ActiveFault(
         code=known.code,
         name=known.name,
         kind=known.kind,
@@ -139,7 +140,7 @@ def fault(known: Fault) -> models.ActiveFault:
     )
 
 
-def axis_state(bench: Bench, member: Member, now: Snapshot) -> models.AxisState:
+def axis_state(bench: Bench, member: Member, now: Snapshot) -> models_axis.AxisState:
     """State of an axis."""
     job = bench.jobs.moving(member.drive.id)
     try:
@@ -147,7 +148,7 @@ def axis_state(bench: Bench, member: Member, now: Snapshot) -> models.AxisState:
     except ValueError:
         name = f"Mode {now.mode}"
     value = now.values.get
-    return models.AxisState(
+    return models_axis.AxisState(
         drive=member.drive.id,
         time=moment(now.time),
         fresh=now.fresh,
@@ -174,10 +175,10 @@ def axis_state(bench: Bench, member: Member, now: Snapshot) -> models.AxisState:
     )
 
 
-def reading(drive: Drive, key: str) -> models.ParameterValue:
+def reading(drive: Drive, key: str) -> models_parameters.ParameterValue:
     """What the drive said last of a parameter."""
     last = drive.readings.get(key) or Reading(key, None, None, None)
-    return models.ParameterValue(
+    return models_parameters.ParameterValue(
         key=key,
         raw=last.raw,
         value=last.value,
@@ -189,14 +190,14 @@ def reading(drive: Drive, key: str) -> models.ParameterValue:
     )
 
 
-def readings(drive: Drive, keys: list[str]) -> list[models.ParameterValue]:
+def readings(drive: Drive, keys: list[str]) -> list[models_parameters.ParameterValue]:
     """Like `reading` for many, with the marks computed once."""
     unsaved, pending = drive.unsaved, drive.pending
     result = []
     for key in keys:
         last = drive.readings.get(key) or Reading(key, None, None, None)
         result.append(
-            models.ParameterValue.model_construct(
+            models_parameters.ParameterValue.model_construct(
                 key=key,
                 raw=last.raw,
                 value=last.value,
@@ -211,11 +212,11 @@ def readings(drive: Drive, keys: list[str]) -> list[models.ParameterValue]:
 
 
 def parameter_row(
-    drive: Drive, parameter: Parameter, last: models.ParameterValue
-) -> models.ParameterRow:
+    drive: Drive, parameter: Parameter, last: models_parameters.ParameterValue
+) -> models_parameters.ParameterRow:
     """Description and value of a parameter."""
     why = drive.unreachable_why(parameter)
-    return models.ParameterRow.model_construct(
+    return models_parameters.ParameterRow.model_construct(
         key=parameter.key,
         number=parameter.number,
         name=parameter.name,
@@ -244,9 +245,9 @@ def parameter_row(
     )
 
 
-def procedure(known: Procedure) -> models.ProcedureInfo:
+def procedure(known: Procedure) -> models_axis.ProcedureInfo:
     """A procedure of the profile."""
-    return models.ProcedureInfo(
+    return models_axis.ProcedureInfo(
         name=known.name,
         title=known.title,
         help=known.help,
@@ -277,18 +278,18 @@ def job(known: Job) -> models.JobInfo:
     )
 
 
-def found_drive(bench: Bench, url: str, kind: str, found: Found) -> models.FoundDrive:
+def found_drive(bench: Bench, url: str, kind: str, found: Found) -> models_bench.FoundDrive:
     """A drive seen by a scan."""
     user = next(
         (
             member.drive.id
             for member in bench.members.values()
             for port in member.drive.ports
-            if bench.url_of(port) == url and port.station == found.station
+            if bench.buses.url_of(port) == url and port.station == found.station
         ),
         None,
     )
-    return models.FoundDrive(
+    return models_bench.FoundDrive(
         url=url,
         station=found.station,
         vendor_id=found.vendor_id,
@@ -306,10 +307,10 @@ def found_drive(bench: Bench, url: str, kind: str, found: Found) -> models.Found
     )
 
 
-def matches(kind: str, found: Found) -> list[models.ProfileMatch]:
+def matches(kind: str, found: Found) -> list[models_bench.ProfileMatch]:
     """Profiles that fit, best first."""
     return [
-        models.ProfileMatch(
+        models_bench.ProfileMatch(
             profile=match.profile.drive,
             title=match.profile.title,
             confidence=match.confidence,
@@ -319,7 +320,7 @@ def matches(kind: str, found: Found) -> list[models.ProfileMatch]:
     ]
 
 
-def difference(row: Difference) -> models.DiffRow:
+def difference(row: Difference) -> models_sets.DiffRow:
     """One row of a comparison."""
     known = row.parameter
 
@@ -329,7 +330,7 @@ def difference(row: Difference) -> models.DiffRow:
         return raw if isinstance(raw, str) else known.to_value(raw)
 
     default = known.default_raw if known else None
-    return models.DiffRow(
+    return models_sets.DiffRow(
         key=row.key,
         name=known.name if known else "",
         group=known.group if known else "",

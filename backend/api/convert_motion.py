@@ -5,7 +5,8 @@ from __future__ import annotations
 from backend.api.live_messages import JogStart
 from backend.api.models_motion import GenerateRequest, HomeRequest, MoveRequest, SequenceRequest
 from backend.axis import Envelope
-from backend.bench import Bench, Member
+from backend.bench import Bench
+from backend.member import Member
 from backend.tools.cyclic_motion import GeneratorSettings
 from backend.tools.homing import HomingSettings
 from backend.tools.jog import JogSettings

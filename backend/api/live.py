@@ -1,72 +1,25 @@
-"""The live websocket: states, values, jobs and samples out; watch, jog and STOP in.
-
-Each connection has one sender task. States coalesce (only the newest of each drive is kept);
-samples never do: they wait in their subscription's bounded queue, which counts what it drops.
-"""
+"""The live websocket of all pages: what the bench tells goes to those that look at it."""
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import itertools
-import math
-import time
-from datetime import UTC, datetime
 from functools import partial
 
-from fastapi import WebSocket, WebSocketDisconnect
-from pydantic import BaseModel, ValidationError
-from starlette.websockets import WebSocketState
+from fastapi import WebSocket
 
-import backend
-from backend.api import convert
-from backend.api.convert_motion import jog_settings, unit_of
-from backend.api.errors import problem_of
-from backend.api.live_messages import (
-    DriveRequest,
-    DrivesChanged,
-    Hello,
-    JobChanged,
-    JogEnded,
-    JogRenew,
-    JogStart,
-    JogStop,
-    LeaseTake,
-    Logged,
-    Ping,
-    Pong,
-    Refused,
-    ScopeStart,
-    ScopeStop,
-    StateChanged,
-    StopAll,
-    ValuesChanged,
-    WatchState,
-    WatchValues,
-    from_page,
-)
+from backend.api import convert, live_news
+from backend.api.live_connection import Connection
+from backend.api.live_messages import Logged
 from backend.api.live_people import PeopleLive
-from backend.api.live_people_messages import PeopleRequest
-from backend.api.live_scope import ScopeStreams
-from backend.api.live_shared import Shared, only
-from backend.api.security_messages import require_message
+from backend.api.live_shared import Shared
 from backend.api.security_socket import OpenSockets
-from backend.audit.asked import Asked, asked
-from backend.bench import Bench, Member
-from backend.jobs import Job, JobResult, Progress
+from backend.bench import Bench
+from backend.jobs import Job
 from backend.journal import Entry
 from backend.monitor import Snapshot
-from backend.people.identity import Actor, Identity, acting
+from backend.people.identity import Actor, acting
 from backend.people.station import People
 from backend.readings import Reading
-from backend.tools.cyclic_motion import jog_cyclic
-from backend.tools.jog import Hold, jog
-from drivers.errors import DriveError
-
-#: Messages that wait for a slow page; states, values and drive lists coalesce and do not count.
-QUEUE = 500
-#: A connection that has not taken a message for this long is closed.
-SEND_TIMEOUT_S = 10.0
 
 
 class LiveHub:
@@ -117,25 +70,25 @@ class LiveHub:
         return list(self.connections.values())
 
     def _snapshot(self, drive: str, snapshot: Snapshot) -> None:
-        state = Shared(partial(_state, self.bench, drive, snapshot))
+        state = Shared(partial(live_news.state, self.bench, drive, snapshot))
         for connection in self._each():
             if drive in connection.watched:
                 connection.later("state", drive, state)
 
     def _readings(self, drive: str, readings: list[Reading]) -> None:
         keys = frozenset(reading.key for reading in readings)
-        values = Shared(partial(_values, self.bench, drive, keys))
+        values = Shared(partial(live_news.values, self.bench, drive, keys))
         for connection in self._each():
             connection.fresh_values(drive, keys, values)
 
     def _job(self, job: Job) -> None:
-        changed = Shared(partial(_job, job))
+        changed = Shared(partial(live_news.job_state, job))
         for connection in self._each():
             connection.later("job", job.id, changed)
 
     def _drives(self) -> None:
         # Who holds nothing sees the same list.
-        others = Shared(partial(_drive_list, self.bench, None))
+        others = Shared(partial(live_news.drive_list, self.bench, None))
         for connection in self._each():
             holds = self.bench.leases.held_by(connection.id)
             connection.later("drives", "", connection.drive_list() if holds else others)
@@ -145,311 +98,3 @@ class LiveHub:
         logged = Shared(lambda: Logged(entry=convert.log_entry(entry)))
         for connection in self._each():
             connection.send(logged)
-
-
-def _state(bench: Bench, drive: str, snapshot: Snapshot) -> BaseModel | None:
-    member = bench.members.get(drive)
-    if member is None:
-        return None
-    return StateChanged(state=convert.axis_state(bench, member, snapshot))
-
-
-def _values(bench: Bench, drive: str, keys: frozenset[str]) -> BaseModel | None:
-    member = bench.members.get(drive)
-    if member is None or not keys:
-        return None
-    rows = convert.readings(member.drive, sorted(keys))
-    return ValuesChanged.model_construct(drive=drive, values=rows)
-
-
-def _drive_list(bench: Bench, connection: str | None) -> BaseModel:
-    members = bench.members.values()
-    return DrivesChanged(drives=[convert.drive_summary(bench, m, connection) for m in members])
-
-
-def _job(job: Job) -> BaseModel:
-    return JobChanged(job=convert.job(job))
-
-
-class Connection:
-    """One page."""
-
-    def __init__(
-        self,
-        name: str,
-        socket: WebSocket,
-        bench: Bench,
-        people: PeopleLive,
-        known: People,
-        identity: Identity,
-    ) -> None:
-        self.id = name
-        self.identity = identity
-        self.page = ""
-        self.since = datetime.now(UTC)
-        self.heard = time.monotonic()
-        self.watched: set[str] = set()
-        self._people, self._known = people, known
-        self._socket = socket
-        self._bench = bench
-        self._queue: asyncio.Queue[Shared] = asyncio.Queue(QUEUE)
-        self._latest: dict[tuple[str, str], Shared] = {}
-        self._values: dict[str, tuple[frozenset[str], Shared]] = {}
-        self._wake = asyncio.Event()
-        self._holds: dict[str, Hold] = {}
-        self.scopes = ScopeStreams(bench, name, self.send, socket.send_bytes)
-        self._polls: dict[str, asyncio.Task[None]] = {}
-        self._overflow = False
-
-    async def run(self) -> None:
-        """Until the page is gone."""
-        self.send(Hello(connection=self.id, version=backend.__version__))
-        self.later("drives", "", self.drive_list())
-        self._people.changed()
-        sender = asyncio.create_task(self._sender(), name=f"live-{self.id}")
-        receiver = asyncio.create_task(self._receiver(), name=f"hear-{self.id}")
-        scoper = asyncio.create_task(self.scopes.run(), name=f"scopes-{self.id}")
-        tasks = (sender, receiver, scoper)
-        done, pending = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        # Before anything is waited for: nobody holds a button here any more.
-        self._release_holds()
-        for task in pending:
-            task.cancel()
-        await asyncio.wait(tasks)
-        for task in done:
-            error = None if task.cancelled() else task.exception()
-            # A page may go in the middle of a message, or sleep for so long that its messages
-            # wait for ever; both are ordinary ends. Samples and words are sent beside each other:
-            # the one finds the line closed, the other that it is known to be.
-            known_closed = self._socket.application_state is WebSocketState.DISCONNECTED
-            if isinstance(error, RuntimeError) and known_closed:
-                continue
-            if error is not None and not isinstance(error, (WebSocketDisconnect, TimeoutError)):
-                raise error
-
-    async def close(self) -> None:
-        """Release everything that lived by this connection; a jog ends at once."""
-        self._release_holds()
-        for drive in self.watched:
-            if (member := self._bench.members.get(drive)) is not None:
-                member.monitor.watchers.discard(self.id)
-        self.watched = set()
-        for task in self._polls.values():
-            task.cancel()
-        await self.scopes.close()
-
-    def _release_holds(self) -> None:
-        self.release(None, "the page's connection closed")
-
-    def release(self, drive: str | None, reason: str) -> None:
-        """End jogs of this page: of one axis, or all."""
-        for each, hold in self._holds.items():
-            if drive in (None, each):
-                hold.release(reason)
-
-    # --- out --------------------------------------------------------------------------
-
-    def send(self, message: BaseModel | Shared) -> None:
-        """Queue a message that must not be lost; a page that never reads is cut off."""
-        try:
-            self._queue.put_nowait(message if isinstance(message, Shared) else only(message))
-        except asyncio.QueueFull:
-            self._overflow = True
-        self._wake.set()
-
-    def later(self, kind: str, which: str, message: Shared) -> None:
-        """Send the newest state of something; older ones not yet sent are replaced."""
-        self._latest[kind, which] = message
-        self._wake.set()
-
-    def fresh_values(self, drive: str, keys: frozenset[str], values: Shared) -> None:
-        """New readings of a drive; only the newest of each parameter is sent."""
-        waiting = self._values.get(drive)
-        if waiting is not None and not waiting[0] <= keys:
-            keys |= waiting[0]
-            values = Shared(partial(_values, self._bench, drive, keys))
-        self._values[drive] = keys, values
-        self._wake.set()
-
-    def drive_list(self) -> Shared:
-        """The bench as this connection sees it."""
-        return Shared(partial(_drive_list, self._bench, self.id))
-
-    async def _sender(self) -> None:
-        while not self._overflow:
-            await self._wake.wait()
-            self._wake.clear()
-            while not self._queue.empty():
-                await self._text(self._queue.get_nowait())
-            latest, self._latest = self._latest, {}
-            for message in latest.values():
-                await self._text(message)
-            values, self._values = self._values, {}
-            for _, message in values.values():
-                await self._text(message)
-            # States need not come faster than a screen shows them.
-            await asyncio.sleep(0.03)
-        await self._socket.close(code=1013, reason="the page does not read")
-
-    async def _text(self, message: Shared) -> None:
-        if (text := message.text) is not None:
-            async with asyncio.timeout(SEND_TIMEOUT_S):
-                await self._socket.send_text(text)
-
-    # --- in ---------------------------------------------------------------------------
-
-    async def _receiver(self) -> None:
-        with contextlib.suppress(WebSocketDisconnect):
-            while True:
-                message = await self._socket.receive()
-                if message["type"] == "websocket.disconnect":
-                    return
-                text = message.get("text")
-                # Not silent while a request takes its time.
-                self.heard = math.inf
-                await self._handle(text if isinstance(text, str) else "")
-                self.heard = time.monotonic()
-
-    async def _handle(self, text: str) -> None:
-        try:
-            request = from_page.validate_json(text)
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            problem = DriveError(
-                f"not a message of this interface: {first['msg']}",
-                remedy="reload the page: it is of another version than the server",
-            )
-            self.send(Refused(request="?", problem=problem_of(problem)))
-            return
-        try:
-            self.identity = self._known.admit(self.identity, request.type)
-            acting.set(Actor(self.identity, self.id))
-            asked.set(Asked(request.model_dump))
-            require_message(self._known, self.identity, request)
-            if isinstance(request, PeopleRequest):
-                await self._people.act(self, self.identity, request)
-            else:
-                await self._act(request)
-        except DriveError as error:
-            self.send(Refused(request=request.type, problem=problem_of(error)))
-
-    async def _act(self, request: DriveRequest) -> None:
-        match request:
-            case StopAll():
-                await self._stop(request)
-            case JogRenew():
-                if (hold := self._holds.get(request.drive)) is not None:
-                    hold.renew()
-            case JogStop():
-                if (hold := self._holds.get(request.drive)) is not None:
-                    hold.release(request.reason or "released")
-            case JogStart():
-                self._jog(request)
-            case WatchState():
-                self._watch(set(request.drives))
-            case WatchValues():
-                self._watch_values(request)
-            case LeaseTake():
-                self._lease(request)
-            case ScopeStart() | ScopeStop():
-                self.scopes.request(request)
-            case Ping():
-                self.send(Pong(n=request.n))
-
-    async def _stop(self, request: StopAll) -> None:
-        drives = [request.drive] if request.drive else list(self._bench.members)
-        known = [drive for drive in drives if drive in self._bench.members]
-        problems = await self._bench.stop(known)
-        self._bench.journal.add("STOP", level="warning", drive=request.drive)
-        for drive, text in problems.items():
-            if text:
-                failure = DriveError(
-                    f"STOP did not reach it: {text}",
-                    drive=drive,
-                    remedy="use the hardware stop, then look at its supply and cable",
-                )
-                self.send(Refused(request="stop", problem=problem_of(failure)))
-
-    def _lease(self, request: LeaseTake) -> None:
-        self._bench.member(request.drive)
-        if request.take:
-            self._bench.leases.take(request.drive, self.id, self.identity.person)
-            return
-        if (hold := self._holds.get(request.drive)) is not None:
-            hold.release("control was given back")
-        self._bench.leases.give(request.drive, self.id)
-
-    def _watch(self, drives: set[str]) -> None:
-        for drive in drives | self.watched:
-            if (member := self._bench.members.get(drive)) is None:
-                continue
-            # A drive that was taken off the bench and put back is another one of the same name.
-            watchers = member.monitor.watchers
-            if (self.id in watchers) is not (drive in drives):
-                watchers ^= {self.id}
-                member.monitor.hurry()
-        self.watched = {drive for drive in drives if drive in self._bench.members}
-
-    def _watch_values(self, request: WatchValues) -> None:
-        drive = self._bench.member(request.drive).drive
-        for key in request.keys:
-            drive.parameter(key)
-        if (old := self._polls.pop(request.drive, None)) is not None:
-            old.cancel()
-        if request.keys:
-            self._polls[request.drive] = asyncio.create_task(
-                self._poll(request), name=f"watch-{self.id}-{request.drive}"
-            )
-
-    async def _poll(self, request: WatchValues) -> None:
-        while (member := self._bench.members.get(request.drive)) is not None:
-            # A lost link is told by the monitor; polling goes on until the drive is back.
-            with contextlib.suppress(DriveError):
-                await member.drive.read_many(request.keys)
-            await asyncio.sleep(request.period_s)
-
-    # --- jog --------------------------------------------------------------------------
-
-    def _jog(self, request: JogStart) -> None:
-        bench, member = self._bench, self._bench.member(request.drive)
-        held_before = bench.leases.holder(request.drive) is not None
-        bench.leases.take(request.drive, self.id, self.identity.person)
-        hold = Hold()
-        try:
-            job = bench.jobs.start(
-                "jog",
-                f"Jog {member.drive.name}",
-                lambda progress: _jog_work(bench, member, request, hold, progress),
-                drive=request.drive,
-                motion=True,
-            )
-        except DriveError:
-            if not held_before:
-                bench.leases.give(request.drive, self.id)
-            raise
-        self._holds[request.drive] = hold
-        member.monitor.hurry()
-
-        def ended(_task: object) -> None:
-            if self._holds.get(request.drive) is hold:
-                del self._holds[request.drive]
-            if not held_before:
-                bench.leases.give(request.drive, self.id)
-            result = job.result or {}
-            reason = str(result.get("reason", job.state))
-            problem = problem_of(job.error) if job.error else None
-            self.send(JogEnded(drive=request.drive, reason=reason, problem=problem))
-
-        if job.task is not None:
-            job.task.add_done_callback(ended)
-
-
-async def _jog_work(
-    bench: Bench, member: Member, request: JogStart, hold: Hold, progress: Progress
-) -> JobResult:
-    """Through the cyclic exchange where it runs, else as a moving target."""
-    axis = member.axis
-    settings = jog_settings(request, await unit_of(bench, member, request.unit))
-    if axis.session is not None and axis.session.running:
-        return await jog_cyclic(axis, axis.session, settings, hold, progress)
-    return await jog(axis, settings, hold, progress)

@@ -22,16 +22,10 @@ from typing import Annotated, Literal
 from pydantic import Field, TypeAdapter
 
 from backend.api.live_people_messages import PeopleRequest
-from backend.api.models import (
-    AxisState,
-    DriveSummary,
-    JobInfo,
-    LogEntry,
-    Message,
-    ParameterValue,
-    Positive,
-    Problem,
-)
+from backend.api.models import JobInfo, LogEntry, Message, Positive, Problem
+from backend.api.models_axis import AxisState
+from backend.api.models_bench import DriveSummary
+from backend.api.models_parameters import ParameterValue
 
 # --- page to server -----------------------------------------------------------------
 

@@ -14,7 +14,7 @@ from backend.people.station import People
 from drivers.errors import DriveError
 
 if TYPE_CHECKING:
-    from backend.api.live_people import Page
+    from backend.api.live_page import Page
 
 log = logging.getLogger(__name__)
 

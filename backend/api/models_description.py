@@ -6,7 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from backend.api.models import FoundDrive, Message
+from backend.api.models import Message
+from backend.api.models_bench import FoundDrive
 
 #: What a profile may be called.
 PROFILE_NAME = r"^[a-z][a-z0-9_]{0,59}$"

@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from backend.api.models import Message, ParameterValue, Positive
+from backend.api.models import Message, Positive
+from backend.api.models_parameters import ParameterValue
 from backend.mechanics_calc import Mechanics
 from backend.regeneration import Verdict
 

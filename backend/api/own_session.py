@@ -62,7 +62,7 @@ def own_account(accounts: Accounts, me: Identity) -> Account:
     """
     if me.kind != "session":
         raise Forbidden("this needs a log-in with a password", remedy="log in")
-    return accounts.owner(me.session)
+    return accounts.directory.owner(me.session)
 
 
 def whose_sessions(accounts: Accounts, me: Identity) -> int | None:

@@ -32,13 +32,15 @@ router = APIRouter()
 async def tokens(people: ThePeople, me: Me) -> list[TokenInfo]:
     """Tokens for scripts: the own ones; for an administrator all."""
     accounts = people.accounts
-    return [_token(accounts, each) for each in accounts.tokens(whose_sessions(accounts, me))]
+    return [
+        _token(accounts, each) for each in accounts.directory.tokens(whose_sessions(accounts, me))
+    ]
 
 
 def _token(accounts: Accounts, token: Token) -> TokenInfo:
     return TokenInfo(
         id=token.id,
-        person=accounts.account(token.account).name,
+        person=accounts.directory.account(token.account).name,
         name=token.name,
         scopes=sorted(token.scopes),
         created=token.created,
@@ -69,7 +71,8 @@ async def revoke_token(people: ThePeople, record: TheRecord, me: Me, token_id: s
     """Revoke a token at once."""
     accounts = people.accounts
     found = next(
-        (t for t in accounts.tokens(whose_sessions(accounts, me)) if t.id == token_id), None
+        (t for t in accounts.directory.tokens(whose_sessions(accounts, me)) if t.id == token_id),
+        None,
     )
     if found is None:
         raise NoSuchPerson("there is no such token", value=token_id)
@@ -90,18 +93,18 @@ async def revoke_token(people: ThePeople, record: TheRecord, me: Me, token_id: s
 @router.get("/accounts")
 async def accounts(people: ThePeople, me: Me) -> list[AccountInfo]:
     """Who may log in."""
-    return [_account(people.accounts, each, me) for each in people.accounts.all()]
+    return [_account(people.accounts, each, me) for each in people.accounts.directory.all()]
 
 
 def _account(accounts: Accounts, account: Account, me: Identity) -> AccountInfo:
-    sessions = accounts.sessions(account.id)
+    sessions = accounts.directory.sessions(account.id)
     return AccountInfo(
         id=account.id,
         name=account.name,
         role=account.role,
         created=account.created,
         sessions=len(sessions),
-        tokens=len(accounts.tokens(account.id)),
+        tokens=len(accounts.directory.tokens(account.id)),
         me=any(each.id == me.session for each in sessions),
     )
 
@@ -129,7 +132,7 @@ async def change_account(
     people: ThePeople, record: TheRecord, me: Me, account_id: int, body: AccountChange
 ) -> AccountInfo:
     """Change role or password; with the password all sessions of the account end."""
-    known = people.accounts.account(account_id)
+    known = people.accounts.directory.account(account_id)
     before = known.role
     if body.role is not None:
         known = await people.accounts.set_role(account_id, body.role)
@@ -151,13 +154,13 @@ async def change_account(
             target=known.name,
             person=me.person,
         )
-    return _account(people.accounts, people.accounts.account(account_id), me)
+    return _account(people.accounts, people.accounts.directory.account(account_id), me)
 
 
 @router.delete("/accounts/{account_id}", status_code=204)
 async def remove_account(people: ThePeople, record: TheRecord, me: Me, account_id: int) -> Response:
     """Delete an account; its sessions and tokens end at once."""
-    name = people.accounts.account(account_id).name
+    name = people.accounts.directory.account(account_id).name
     await people.accounts.remove(account_id)
     record.note(
         "account",

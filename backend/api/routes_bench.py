@@ -11,7 +11,9 @@ from backend.api import convert
 from backend.api.context import Connection, Controlled, Me, TheBench, TheMember, ThePeople
 from backend.api.errors import NotFound
 from backend.api.interfaces import list_interfaces
-from backend.api.models import (
+from backend.api.models import JobInfo, LogEntry
+from backend.api.models_axis import StopRequest, StopResult
+from backend.api.models_bench import (
     Bus,
     ConnectRequest,
     CyclicRequest,
@@ -19,19 +21,16 @@ from backend.api.models import (
     DriveUpdate,
     Health,
     Interfaces,
-    JobInfo,
-    LogEntry,
     PortRequest,
     ProfileInfo,
     ScanRequest,
-    StopRequest,
-    StopResult,
 )
 from backend.api.security import require_right
 from backend.audit import Fact
 from backend.audit.asked import note_before
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.jobs import Job, JobResult, Progress
+from backend.member import Member
 from backend.people.rights import Right
 from backend.second_port import require_same_drive
 from drivers.link import Found
@@ -45,13 +44,13 @@ router = APIRouter()
 async def health(bench: TheBench) -> Health:
     """Whether the server is alive."""
     now = convert.moment(backend.now())
-    return Health(version=backend.__version__, time=now, demo=bool(bench.wires))
+    return Health(version=backend.__version__, time=now, demo=bool(bench.buses.wires))
 
 
 @router.get("/interfaces")
 async def interfaces(bench: TheBench) -> Interfaces:
     """What this machine can connect through."""
-    return list_interfaces(list(bench.wires))
+    return list_interfaces(list(bench.buses.wires))
 
 
 @router.get("/profiles")
@@ -86,7 +85,7 @@ async def profiles() -> list[ProfileInfo]:
 @router.get("/buses")
 async def buses(bench: TheBench) -> list[Bus]:
     """Opened buses with their counters."""
-    return [convert.bus(bench, url, link) for url, link in bench.links.items()]
+    return [convert.bus(bench, url, link) for url, link in bench.buses.opened.items()]
 
 
 @router.post("/buses/cyclic")
@@ -96,7 +95,7 @@ async def start_cyclic(
     """Exchange process data with all drives of a bus."""
     _require_bus(bench, request.url, connection)
     await bench.start_cyclic(request.url, request.cycle_us / 1e6)
-    return convert.bus(bench, request.url, bench.links[request.url])
+    return convert.bus(bench, request.url, bench.buses.opened[request.url])
 
 
 @router.delete("/buses/cyclic", status_code=204)
@@ -112,14 +111,14 @@ async def stop_cyclic(
 def _require_bus(bench: Bench, url: str, connection: str | None) -> None:
     """Control of every drive of a bus."""
     for member in bench.members.values():
-        if any(bench.url_of(port) == url for port in member.drive.ports):
+        if any(bench.buses.url_of(port) == url for port in member.drive.ports):
             bench.leases.require(member.drive.id, connection)
 
 
 @router.delete("/buses", status_code=204)
 async def close_bus(bench: TheBench, url: Annotated[str, Query()]) -> Response:
     """Close a bus that no drive uses."""
-    await bench.close_link(url)
+    await bench.buses.close(url)
     return Response(status_code=204)
 
 
@@ -129,10 +128,10 @@ async def scan(bench: TheBench, request: ScanRequest, connection: Connection = N
     _require_bus(bench, request.url, connection)
 
     async def work(progress: Progress) -> JobResult:
-        seen: list[Found] = await bench.scan(
+        seen: list[Found] = await bench.buses.scan(
             request.url, request.stations, progress, stop_after_first=request.stop_after_first
         )
-        kind = (await bench.link(request.url)).kind
+        kind = (await bench.buses.open(request.url)).kind
         drives = [convert.found_drive(bench, request.url, kind, found) for found in seen]
         return {"found": [drive.model_dump(mode="json") for drive in drives]}
 
@@ -151,7 +150,7 @@ async def connect(
 ) -> DriveSummary:
     """Make a station a drive of the bench. Its identity is asked for first."""
     _require_bus(bench, request.url, connection)
-    seen = await bench.scan(request.url, [request.station], lambda _fraction, _step: None)
+    seen = await bench.buses.scan(request.url, [request.station], lambda _fraction, _step: None)
     found = next((f for f in seen if f.station == request.station), None)
     member = await bench.connect(
         request.url, request.station, request.profile, request.name, found=found
@@ -245,7 +244,7 @@ async def stop(bench: TheBench, request: StopRequest | None = None) -> StopResul
     request = request or StopRequest()
     wanted = [request.drive] if request.drive is not None else list(bench.members)
     known = [drive_id for drive_id in wanted if drive_id in bench.members]
-    problems = await bench.stop(known)
+    problems = await bench.motion.stop(known)
     bench.journal.add("STOP", level="warning", drive=request.drive)
     failed = {drive_id: text for drive_id, text in problems.items() if text}
     failed |= {drive_id: "not on this bench" for drive_id in wanted if drive_id not in known}

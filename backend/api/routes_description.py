@@ -10,7 +10,8 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from backend.api import convert
 from backend.api.context import TheBench, TheMember
 from backend.api.errors import NotFound
-from backend.api.models import JobInfo, ProfileMatch
+from backend.api.models import JobInfo
+from backend.api.models_bench import ProfileMatch
 from backend.api.models_description import (
     PROFILE_NAME,
     DescribedDevice,
@@ -110,14 +111,14 @@ async def read_dictionary(bench: TheBench, request: ReadDictionaryRequest) -> Jo
 
     async def work(progress: Progress) -> JobResult:
         progress(0.0, f"looking for {place}")
-        seen = await bench.scan(request.url, [request.station], lambda _fraction, _step: None)
+        seen = await bench.buses.scan(request.url, [request.station], lambda _fraction, _step: None)
         found = next((f for f in seen if f.station == request.station), None)
         if found is None:
             raise NotAllowed(
                 f"nothing answers at {place}",
                 remedy="check power, cable, station number and line settings",
             )
-        link = await bench.link(request.url)
+        link = await bench.buses.open(request.url)
         try:
             task = await drive_task(link, found, request.profile, progress)
         except ImportFailed as error:

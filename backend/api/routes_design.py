@@ -33,8 +33,9 @@ from backend.api.models_tune import (
     Undo,
 )
 from backend.api.routes_measurements import change_log, measurement_head
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.measurements import BadMeasurement, unpack
+from backend.member import Member
 from backend.report.changes import Change
 from backend.tools import gains, notch, sweep_evaluation, tune_candidates
 from backend.tools.axis_facts import read_facts
@@ -109,7 +110,7 @@ async def preview_notches(member: TheMember, request: NotchPreviewRequest) -> No
 @router.put("/drives/{drive_id}/notches")
 async def write_notches(bench: TheBench, member: Controlled, request: NotchWrite) -> Undo:
     """Write all notches and make them act; saving is another step."""
-    with bench.keeping_still(member):
+    with bench.motion.keeping_still(member):
         before = await notch.write_notches(
             member.axis, _notches(request.notches), meaning_of(member.drive)
         )
@@ -151,7 +152,7 @@ async def write_gains(bench: TheBench, member: Controlled, request: GainWrite) -
         )
     else:
         raw = gains.plan_level(member.drive, request.level or 0)
-    with bench.keeping_still(member):
+    with bench.motion.keeping_still(member):
         before = await write_settings(member.axis, raw)
     await _note(bench, member, "gains", before)
     bench.journal.add(f"{member.drive.name}: gains written", drive=member.drive.id)
@@ -165,7 +166,7 @@ def _gains(speed_hz: float, integral_hz: float, position_1_s: float, inertia_kgm
 @router.post("/drives/{drive_id}/tune/undo")
 async def undo_tuning(bench: TheBench, member: Controlled, request: Undo) -> Undo:
     """Put back what a change returned as `before`; returns what was there until now."""
-    with bench.keeping_still(member):
+    with bench.motion.keeping_still(member):
         now = {key: await member.drive.raw(key) for key in request.before}
         await put_back(member.axis, request.before)
     await _note(bench, member, "undo", now)

@@ -10,20 +10,13 @@ from fastapi import APIRouter
 from backend.api import convert, convert_motion
 from backend.api.context import Controlled, TheBench, TheMember
 from backend.api.errors import NotFound, problem_of
-from backend.api.models import (
+from backend.api.models import JobInfo
+from backend.api.models_axis import (
     ActiveFault,
     AxisState,
-    JobInfo,
-    LoadSetRequest,
-    ParameterRow,
-    ParameterValue,
-    ParameterWrite,
-    ParameterWrites,
     ProcedureInfo,
     ProcedureRequest,
-    ReadAllRequest,
     TransitionRequest,
-    WriteResult,
 )
 from backend.api.models_motion import (
     GenerateRequest,
@@ -32,8 +25,18 @@ from backend.api.models_motion import (
     MoveRequest,
     SequenceRequest,
 )
-from backend.bench import Bench, Member
+from backend.api.models_parameters import (
+    ParameterRow,
+    ParameterValue,
+    ParameterWrite,
+    ParameterWrites,
+    ReadAllRequest,
+    WriteResult,
+)
+from backend.api.models_sets import LoadSetRequest
+from backend.bench import Bench
 from backend.jobs import JobResult, Progress
+from backend.member import Member
 from backend.readings import Reading
 from backend.tools import cyclic_motion, homing, move, parameters, procedures
 from drivers.cia402 import Mode, State
@@ -192,7 +195,7 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
     old = drive.readings.get(parameter.key)
     value, raw = (request.value, False) if request.raw is None else (request.raw, True)
     matters = drive.matters_to_motion(parameter.key)
-    with bench.keeping_still(member) if matters else contextlib.nullcontext():
+    with bench.motion.keeping_still(member) if matters else contextlib.nullcontext():
         if drive.commands_motion(parameter.key):
             await _require_disabled(member, parameter.key)
         reading = await drive.write(key, 0 if value is None else value, raw=raw)
@@ -243,7 +246,7 @@ async def run_procedure(
             value=name,
             remedy=_choose(p.name for p in member.drive.profile.procedures),
         )
-    bench.require_idle(member)
+    bench.motion.require_idle(member)
     job = bench.jobs.start(
         "procedure",
         f"{known.title}: {member.drive.name}",

@@ -22,8 +22,9 @@ from backend.api.models_ethercat import (
     SegmentPort,
     SegmentStation,
 )
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.jobs import JobResult, Progress
+from backend.member import Member
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.ethercat import firmware, permissions
@@ -241,7 +242,7 @@ async def _body(request: Request, file: str) -> bytes:
 
 
 def _link(bench: Bench, url: str) -> EthercatLink:
-    link = bench.links.get(url)
+    link = bench.buses.opened.get(url)
     if not isinstance(link, EthercatLink):
         raise NotFound(
             f"{url} is no opened EtherCAT bus", value=url, remedy="scan it on the Connect page"
@@ -265,7 +266,7 @@ def _require_calm(bench: Bench, link: EthercatLink, connection: str | None) -> N
     """
     for member in _members(bench, link):
         bench.leases.require(member.drive.id, connection)
-        bench.require_idle(member)
+        bench.motion.require_idle(member)
 
 
 def _require_confirmed(confirmed: bool, warning: str) -> None:
@@ -292,7 +293,7 @@ def _station(
             m
             for m in bench.members.values()
             for port in m.drive.ports
-            if bench.url_of(port) == url and port.station == seen.station
+            if bench.buses.url_of(port) == url and port.station == seen.station
         ),
         None,
     )

@@ -11,7 +11,7 @@ from backend import gear, regeneration
 from backend.api import convert
 from backend.api.context import Controlled, TheBench, TheMember
 from backend.api.errors import NotFound
-from backend.api.models import JobInfo, ParameterValue
+from backend.api.models import JobInfo
 from backend.api.models_functions import (
     AxisRecordInfo,
     BrakingInfo,
@@ -25,14 +25,15 @@ from backend.api.models_functions import (
     PastFaultInfo,
     WatchUpdate,
 )
+from backend.api.models_parameters import ParameterValue
 from backend.audit.asked import note_before
 from backend.axis import Envelope
 from backend.axis_store import AxisRecord, AxisStore
-from backend.bench import Member
 from backend.drive import Drive
 from backend.fault_history import PastFault, history_of, read_history
 from backend.functions import functions_of
 from backend.mechanics_calc import GearPlan, Mechanics
+from backend.member import Member
 from backend.readings import Reading
 from backend.tools import identification
 from backend.units import gentlest_ramp_rpm_s
@@ -267,7 +268,7 @@ async def write_gear(
     bench: TheBench, member: Controlled, store: TheStore, request: Mechanics
 ) -> GearWritten:
     """Write the gear for these mechanics, all or nothing, and keep the mechanics."""
-    with bench.keeping_still(member):
+    with bench.motion.keeping_still(member):
         plan = await gear.plan(member.axis, request)
         change = await gear.write_gear(member.axis, plan.values)
     old = store.get(member.drive.id)

@@ -11,7 +11,6 @@ from backend import io_functions
 from backend.api import convert
 from backend.api.context import Connection, Controlled, TheBench, TheMember
 from backend.api.errors import NotFound
-from backend.api.models import ParameterValue
 from backend.api.models_functions import (
     ForcingInfo,
     ForcingStart,
@@ -21,10 +20,11 @@ from backend.api.models_functions import (
     TerminalFunction,
     TerminalInfo,
 )
-from backend.bench import Member
+from backend.api.models_parameters import ParameterValue
 from backend.forcing import ForcingSession, ForcingSessions
 from backend.functions import functions_of
 from backend.io_functions import ProbeSettings, TerminalState
+from backend.member import Member
 from profiles.functions import Forcing, TerminalFacts
 
 router = APIRouter(prefix="/drives/{drive_id}/io")

@@ -13,8 +13,9 @@ from backend.api.disposition import disposition
 from backend.api.errors import NotFound
 from backend.api.models_report import ReportInfo, ReportRequest
 from backend.api.routes_measurements import change_log, measurement_head
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.measurements import BadMeasurement, Head
+from backend.member import Member
 from backend.report.gather import About, belongs, choose, kind_of, live_facts, measured_from
 from backend.report.store import Format, ReportStore, render
 from drivers.errors import NotAllowed

@@ -122,14 +122,14 @@ async def sessions(people: ThePeople, me: Me) -> list[SessionInfo]:
     return [
         SessionInfo(
             id=each.id,
-            person=accounts.account(each.account).name,
+            person=accounts.directory.account(each.account).name,
             client=each.client,
             created=each.created,
             used=each.used,
             expires=each.expires,
             me=each.id == me.session,
         )
-        for each in accounts.sessions(whose_sessions(accounts, me))
+        for each in accounts.directory.sessions(whose_sessions(accounts, me))
     ]
 
 
@@ -138,11 +138,16 @@ async def end_session(people: ThePeople, record: TheRecord, me: Me, session_id: 
     """End a log-in at once: an own one, or as an administrator anybody's."""
     accounts = people.accounts
     found = next(
-        (s for s in accounts.sessions(whose_sessions(accounts, me)) if s.id == session_id), None
+        (
+            s
+            for s in accounts.directory.sessions(whose_sessions(accounts, me))
+            if s.id == session_id
+        ),
+        None,
     )
     if found is None:
         raise NoSuchPerson("there is no such session", value=session_id)
-    whose = accounts.account(found.account).name
+    whose = accounts.directory.account(found.account).name
     await accounts.log_out(session_id)
     record.note(
         "login",

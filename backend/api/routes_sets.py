@@ -11,8 +11,8 @@ from backend import parameter_set
 from backend.api import convert, convert_library
 from backend.api.context import Controlled, TheBench, TheMember
 from backend.api.errors import NotFound
-from backend.api.models import Diff, SaveSetRequest
 from backend.api.models_library import StoredSet, ThreeWay
+from backend.api.models_sets import Diff, SaveSetRequest
 from backend.bench import Bench
 from backend.drive import Drive
 from backend.library.identity import doubts

@@ -8,8 +8,8 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from backend.api.context import Me, ThePeople
 from backend.api.live import LiveHub
-from backend.api.live_people import chat_line
 from backend.api.live_people_messages import InvitationView
+from backend.api.live_people_views import chat_line
 from backend.api.models_people import (
     ChatLog,
     JoinAsGuest,
@@ -43,7 +43,7 @@ TheLive = Annotated[LiveHub, Depends(_live_of)]
 @router.get("/people")
 async def people_here(live: TheLive, me: Me) -> PeopleList:
     """Who is connected."""
-    return PeopleList(people=live.people.here(me.session))
+    return PeopleList(people=live.people.views.here(me.session))
 
 
 @router.get("/chat")
@@ -88,7 +88,7 @@ async def join(
 @router.get("/invitations")
 async def invitations(live: TheLive, me: Me) -> list[InvitationView]:
     """Invitations since the server was started, newest first."""
-    return live.people.invitations(me)
+    return live.people.views.invitations(me)
 
 
 @router.post("/invitations", status_code=201)
@@ -112,7 +112,7 @@ async def invite(
         level="warning",
         person=me.person,
     )
-    view = live.people.invitation(made, host=True, identity=me)
+    view = live.people.views.invitation(made, host=True, identity=me)
     return MadeInvitation(invitation=view, link=f"/guest/{secret}")
 
 
@@ -130,7 +130,7 @@ async def revoke_invitation(
         level="warning",
         person=me.person,
     )
-    return live.people.invitation(ended, host=True, identity=me)
+    return live.people.views.invitation(ended, host=True, identity=me)
 
 
 @router.put("/invitations/{invitation_id}/grant")
@@ -161,7 +161,7 @@ async def grant(
         drive=body.drive,
         person=me.person,
     )
-    return live.people.invitation(granted, host=True, identity=me)
+    return live.people.views.invitation(granted, host=True, identity=me)
 
 
 @router.delete("/invitations/{invitation_id}/grant")
@@ -178,4 +178,4 @@ async def withdraw_grant(
         level="warning",
         person=me.person,
     )
-    return live.people.invitation(ended, host=True, identity=me)
+    return live.people.views.invitation(ended, host=True, identity=me)

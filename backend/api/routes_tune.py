@@ -23,11 +23,12 @@ from backend.api.models_tune import (
 )
 from backend.api.routes_measurements import change_log
 from backend.axis import Envelope
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.cyclic import CyclicSession
 from backend.jobs import JobResult, Progress
 from backend.measurements import MeasurementStore
 from backend.measuring import EXCHANGE_ENDS_S, exchange_for
+from backend.member import Member
 from backend.report.changes import Change
 from backend.restoring import shielded
 from backend.tools import (
@@ -55,7 +56,7 @@ async def _start(
     bench: Bench, member: Member, request: TuneLimits, kind: str, title: str, tool: Tool
 ) -> JobInfo:
     """Start a measurement as a job; raw data are stored before they are evaluated."""
-    bench.require_idle(member)
+    bench.motion.require_idle(member)
     exchange = await exchange_for(bench, member, request.cycle_ms / 1e3)
     session = exchange.session
     files: list[str] = []

@@ -6,7 +6,7 @@ from typing import Literal
 
 from backend.api import live_messages as live
 from backend.api import live_people_messages as people_live
-from backend.api.live_people import require_control
+from backend.api.live_control import require_control
 from backend.api.models import Message
 from backend.api.security import require_right
 from backend.people.errors import Forbidden

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from backend.api.models import ActiveFault
+from backend.api.models_axis import ActiveFault
 from backend.mechanics_calc import GearPlan
 from profiles.schema import Raw
 

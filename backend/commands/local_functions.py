@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from backend import gear as gears
-from backend.api.models import ActiveFault
+from backend.api.models_axis import ActiveFault
 from backend.axis import Axis
 from backend.commands.function_answers import Faults, Gear, Past, Terminal, of_plan
 from backend.commands.options import Place

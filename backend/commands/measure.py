@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from backend.api.models import DriveSummary
+from backend.api.models_bench import DriveSummary
 from backend.axis import Axis, Envelope
 from backend.commands.remote import Remote, remote
 from backend.commands.session import drive_at, progress, run_in_order

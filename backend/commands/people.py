@@ -46,9 +46,11 @@ def _with(config: Path | None, work: Callable[[Accounts], Awaitable[None]]) -> N
 
 
 def _find(accounts: Accounts, name: str) -> Account:
-    found = next((a for a in accounts.all() if a.name.casefold() == name.casefold()), None)
+    found = next(
+        (a for a in accounts.directory.all() if a.name.casefold() == name.casefold()), None
+    )
     if found is None:
-        known = ", ".join(a.name for a in accounts.all())
+        known = ", ".join(a.name for a in accounts.directory.all())
         raise NotAllowed(f"there is no account {name}", limit=known, remedy="see `people list`")
     return found
 
@@ -58,8 +60,8 @@ def list_accounts(config: Config = None) -> None:
     """Who may log in."""
 
     async def work(accounts: Accounts) -> None:
-        for each in accounts.all():
-            here = len(accounts.sessions(each.id))
+        for each in accounts.directory.all():
+            here = len(accounts.directory.sessions(each.id))
             print(f"{each.name}  {each.role}  {here} {'session' if here == 1 else 'sessions'}")
 
     _with(config, work)

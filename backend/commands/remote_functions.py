@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backend.api.models import ActiveFault
+from backend.api.models_axis import ActiveFault
 from backend.api.models_functions import FaultHistoryInfo, GearPlanInfo, GearWritten, IoInfo
 from backend.commands.function_answers import Faults, Gear, Past, Terminal
 from backend.commands.options import Place

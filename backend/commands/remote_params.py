@@ -9,8 +9,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import quote
 
-from backend.api.models import Diff, DriveSummary, FoundDrive, ParameterRow, ParameterValue
+from backend.api.models_bench import DriveSummary, FoundDrive
 from backend.api.models_library import StoredSet
+from backend.api.models_parameters import ParameterRow, ParameterValue
+from backend.api.models_sets import Diff
 from backend.commands import values
 from backend.commands.options import Place
 from backend.commands.remote import Remote, remote

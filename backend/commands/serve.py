@@ -110,7 +110,7 @@ async def accounts_needed(folder: Path, serving: Serving) -> bool:
     people = People(folder, accounts_needed=True)
     try:
         await people.open()
-        return people.accounts.is_set_up
+        return people.accounts.directory.is_set_up
     finally:
         people.close()
 

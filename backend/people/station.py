@@ -56,14 +56,14 @@ class People:
     @property
     def setup_needed(self) -> bool:
         """Whether the first administrator is still to be made."""
-        return self.accounts_needed and not self.accounts.is_set_up
+        return self.accounts_needed and not self.accounts.directory.is_set_up
 
     def identify(self, cookie: str | None, bearer: str | None) -> Identity | None:
         """Who has this cookie or token, with the rights of this moment; None for nobody."""
         if not self.accounts_needed:
             return LOCAL
         if bearer is not None:
-            known = self.accounts.token(bearer)
+            known = self.accounts.directory.token(bearer)
             if known is None:
                 return None
             owner, token = known
@@ -71,12 +71,12 @@ class People:
             return Identity(f"{owner.name} ({token.name})", owner.role, "token", token.id, rights)
         if cookie is None:
             return None
-        found = self.accounts.session(cookie)
+        found = self.accounts.directory.session(cookie)
         if found is not None:
             account, session, alive = found
             if not alive:
                 return None
-            self.accounts.touch(session.id)
+            self.accounts.directory.touch(session.id)
             return _of_session(account, session)
         return self.support.guest(cookie)
 
@@ -89,14 +89,14 @@ class People:
                 found = self.support.of_session(identity.session)
                 return None if found is None else self.support.identity(found)
             case "session" | "token":
-                return self.accounts.renewed(identity)
+                return self.accounts.directory.renewed(identity)
 
     def expires(self, identity: Identity) -> datetime | None:
         """When this person's session ends; None where it does not."""
         if identity.is_guest:
             found = self.support.of_session(identity.session)
             return None if found is None else datetime.fromtimestamp(moment_of(found.expires), UTC)
-        return self.accounts.expires(identity.session)
+        return self.accounts.directory.expires(identity.session)
 
     def admit(self, identity: Identity, message: str) -> Identity:
         """The person behind a live connection, at the time of a message.
@@ -110,16 +110,16 @@ class People:
                 raise NotLoggedIn("the session is over", remedy="log in again")
             return replace(identity, rights=frozenset())
         if message != "ping":
-            self.accounts.touch(identity.session)
+            self.accounts.directory.touch(identity.session)
         return now
 
     def may_stop(self, cookie: str | None) -> Identity | None:
         """Somebody who was logged in until lately: their page still shows STOP, and it works."""
-        found = None if cookie is None else self.accounts.session(cookie)
+        found = None if cookie is None else self.accounts.directory.session(cookie)
         if found is None:
             return None
         account, session, _ = found
-        if not self.accounts.is_remembered(session):
+        if not self.accounts.directory.is_remembered(session):
             return None
         return Identity(account.name, account.role, "session", session.id, frozenset())
 

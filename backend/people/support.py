@@ -23,7 +23,7 @@ from backend.people.throttle import Throttle
 from drivers.errors import NotAllowed
 
 #: The enabling button counts as released this long after the last sign of life. With the 20 ms
-#: between looks (`backend.api.live_people`) a silent page stops the motion within 200 ms.
+#: between looks (`backend.api.live_watch`) a silent page stops the motion within 200 ms.
 ENABLING_TIMEOUT_S = 0.17
 LONGEST_INVITATION_S = 24 * 3600.0
 LONGEST_GRANT_S = 8 * 3600.0

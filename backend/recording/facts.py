@@ -9,9 +9,10 @@ from dataclasses import asdict
 from typing import Any
 
 from backend import parameter_set
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.drive import Drive
 from backend.fault_history import PastFault, history_of, read_history
+from backend.member import Member
 from backend.readings import Reading
 from drivers.errors import DriveError
 
@@ -30,7 +31,7 @@ def identity(bench: Bench, member: Member) -> dict[str, Any]:
         "title": drive.profile.title,
         "serial": found.serial if found else None,
         "firmware": found.firmware if found else "",
-        "ports": [{"url": bench.url_of(p), "station": p.station} for p in drive.ports],
+        "ports": [{"url": bench.buses.url_of(p), "station": p.station} for p in drive.ports],
         "notes": drive.notes,
     }
 
@@ -134,7 +135,7 @@ def links(bench: Bench, members: Sequence[Member]) -> list[dict[str, Any]]:
     return [
         {
             "drive": member.drive.id,
-            "url": bench.url_of(port),
+            "url": bench.buses.url_of(port),
             "station": port.station,
             **asdict(port.link.quality(port.station)),
         }

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import backend
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.drive import Drive
 from backend.evaluation import evaluate
 from backend.measurements import BadMeasurement, Head, MeasurementStore, profile_version
+from backend.member import Member
 from backend.report.changes import Change, net
 from backend.report.facts import ChangedSetting, Facts, Identity, Measured
 from backend.report.views import view_of
@@ -150,7 +151,7 @@ def _identity(bench: Bench, drive: Drive) -> Identity:
         revision=found.revision if found else None,
         serial=found.serial if found else None,
         firmware=found.firmware if found else "",
-        buses=tuple(f"{bench.url_of(port)} #{port.station}" for port in drive.ports),
+        buses=tuple(f"{bench.buses.url_of(port)} #{port.station}" for port in drive.ports),
     )
 
 

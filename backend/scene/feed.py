@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.drive import Drive
 from backend.mechanics_calc import Mechanics
+from backend.member import Member
 from backend.scene.geometry import Track, Travel, track_of, travel_of
 from backend.scope import Subscription
 from backend.units import AxisUnits

@@ -82,7 +82,7 @@ async def _serve(state: Path, wires: dict[str, dict[str, Any]]) -> None:
     people = People(state, accounts_needed=True, passwords=cheap)
     await people.open()
     for name, role in NAMES.items():
-        if not any(account.name == name for account in people.accounts.all()):
+        if not any(account.name == name for account in people.accounts.directory.all()):
             await people.accounts.add(name, PASSWORD, role)
     bench = Bench(state, {name: _wire(name, facts) for name, facts in wires.items()})
     listening = _listen("127.0.0.1", 0)

@@ -18,7 +18,7 @@ import httpx
 import numpy as np
 import pytest
 
-from backend.api import live, live_scope
+from backend.api import live_connection, live_scope
 from backend.demo import DemoBench
 from backend.recording.reader import RecordingReader
 from drivers.virtual.wires.netns import unavailable
@@ -86,7 +86,7 @@ def unbroken(frames: list[bytes], number: int) -> int:
 
 
 def test_sixteen_channels_at_4_khz(station: Station, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (live, live_scope):
+    for module in (live_connection, live_scope):
         monkeypatch.setattr(module, "SEND_TIMEOUT_S", 600.0)  # the sleeping one is to wake
     axes = [station.add(n, URL, name=f"A{n}") for n in range(1, AXES + 1)]
     body = {"url": URL, "cycle_us": CYCLE_US}

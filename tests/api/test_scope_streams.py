@@ -15,7 +15,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from backend.api import live, live_scope
+from backend.api import live_connection, live_scope
 from backend.demo import DemoBench
 from drivers.virtual.wires.netns import unavailable
 from tests.api.test_ethercat import BENCH, URL
@@ -181,7 +181,7 @@ def ask_for_much(page: ClientConnection, axis: str, numbers: range) -> None:
 def test_a_sleeping_page_loses_only_its_own_view_and_every_sample_is_counted(
     station: Station, axis: str, asleep: ClientConnection, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for module in (live, live_scope):
+    for module in (live_connection, live_scope):
         monkeypatch.setattr(module, "SEND_TIMEOUT_S", 60.0)  # it sleeps, it is not gone
     exchange(station, run=True)
     ask_for_much(asleep, axis, range(1, 31))

@@ -14,8 +14,9 @@ import httpx
 import uvicorn
 from argon2 import PasswordHasher
 
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.commands.serve import Serving, _config, _listen
+from backend.member import Member
 from backend.people.passwords import Passwords
 from backend.people.rights import Right, Role
 from backend.people.station import People
@@ -87,7 +88,9 @@ class GuardedServer:
         self.people = People(folder, accounts_needed=accounts, passwords=CHEAP)
         self.ahead = timedelta(0)
         self.callers: list[Caller] = []
-        self.people.accounts._now = lambda: datetime.now(UTC) + self.ahead
+        self.people.accounts._now = self.people.accounts.directory._now = lambda: (
+            datetime.now(UTC) + self.ahead
+        )
         self.bench: Bench
         self.member: Member
         self.app: Any = None
@@ -172,7 +175,7 @@ class GuardedServer:
         return Caller(self, cookie=made.cookies["servodeck"])
 
     def token(self, role: Role, *scopes: Right) -> Caller:
-        owner = next(a for a in self.people.accounts.all() if a.role is role)
+        owner = next(a for a in self.people.accounts.directory.all() if a.role is role)
         make: Awaitable[Any] = self.people.accounts.make_token(
             owner.id, "script", frozenset(scopes), timedelta(days=1)
         )

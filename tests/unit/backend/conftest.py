@@ -7,8 +7,9 @@ import httpx
 import pytest
 
 from backend.api.app import make_app
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.drive import Drive
+from backend.member import Member
 from backend.ports import Port
 from drivers.link import Found
 from profiles.schema import (

@@ -9,14 +9,16 @@ from typing import Any
 
 import pytest
 
-from backend.api.live import Connection, LiveHub
+from backend.api.live import LiveHub
+from backend.api.live_connection import Connection
 from backend.api.live_messages import ScopeChannel, ScopeStart
 from backend.api.security_socket import OpenSockets
 from backend.axis import Envelope
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.cyclic import CyclicSession
 from backend.jobs import JobRunner, Progress
 from backend.measuring import Exchange
+from backend.member import Member
 from backend.monitor import Snapshot
 from backend.people.identity import LOCAL, Actor, acting
 from backend.people.station import People
@@ -87,7 +89,7 @@ async def test_nothing_begins_to_move_on_its_way_off_the_bench(
     servo.gate.clear()
     removing = asyncio.create_task(bench.remove("x"))
     async with asyncio.timeout(60):
-        while not bench._parting:  # noqa: ASYNC110 - a set has no event
+        while not bench.motion._parting:  # noqa: ASYNC110 - a set has no event
             await asyncio.sleep(0)
     await asyncio.sleep(0.05)
     with pytest.raises(Busy, match="taken off the bench"):
@@ -204,7 +206,7 @@ async def _left(bench: Bench, tmp_path: Path, *pages: Page) -> Any:
     hub = LiveHub(bench, People(tmp_path), OpenSockets())
     for page in pages:
         hub.people.left(page)  # type: ignore[arg-type]
-    await asyncio.gather(*hub.people._tasks)
+    await asyncio.gather(*hub.people._motions._tasks)
     return hub
 
 

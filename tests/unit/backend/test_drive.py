@@ -9,7 +9,7 @@ from itertools import chain, pairwise
 import pytest
 from pydantic import ValidationError
 
-from backend.api.models import ParameterWrite
+from backend.api.models_parameters import ParameterWrite
 from backend.drive import Drive
 from backend.ports import OBJECT_BATCH, Port
 from backend.tools.parameters import read_all

@@ -14,13 +14,14 @@ from backend.access import Leases
 from backend.api.app import make_app
 from backend.api.live import LiveHub
 from backend.api.security_socket import OpenSockets
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.cyclic import CyclicState
 from backend.elapsed import elapsed_s, moment_of
 from backend.gear import write_gear
 from backend.jobs import Progress
 from backend.measuring import Exchange, exchange_for
 from backend.mechanics_calc import GearValue
+from backend.member import Member
 from backend.owed_store import OwedStore
 from backend.people.identity import LOCAL, Actor, acting
 from backend.people.rights import Right
@@ -151,7 +152,7 @@ async def test_no_motion_begins_on_a_bus_that_is_searched(
         return []
 
     monkeypatch.setattr(servo, "scan", scan)
-    searching = asyncio.create_task(bench.scan(URL, None, lambda _share, _text: None))
+    searching = asyncio.create_task(bench.buses.scan(URL, None, lambda _share, _text: None))
     await turns()
     with pytest.raises(Busy, match="looked for"):
         bench.jobs.start("move", "Move X", forever, drive="x", motion=True)
@@ -243,7 +244,7 @@ async def test_nothing_begins_to_move_while_its_settings_change(
     servo.gate.clear()
     async with httpx.AsyncClient(transport=transport, base_url="http://test/api/v1") as http:
         ramp = asyncio.create_task(http.put("/drives/x/parameters/6083:00", json={"raw": 70000}))
-        while not bench._still["x"]:  # noqa: ASYNC110 - a count has no event
+        while not bench.motion._still["x"]:  # noqa: ASYNC110 - a count has no event
             await asyncio.sleep(0)
         with pytest.raises(Busy, match="settings are just being changed"):
             bench.jobs.start("move", "Move X", forever, drive="x", motion=True)

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from backend.axis import Axis
-from backend.bench import Member
 from backend.drive import Drive
 from backend.fault_history import named_fault, read_history
+from backend.member import Member
 from backend.ports import Port
 from backend.recording.facts import past_faults
 from drivers.errors import NotAllowed, Rejected

@@ -9,10 +9,10 @@ from typing import cast
 import pytest
 
 from backend import monitor as watching
-from backend.bench import Member
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.journal import Journal
+from backend.member import Member
 from drivers.cia402 import State
 from tests.support.servo import STATUS, Servo
 

@@ -9,9 +9,10 @@ import httpx
 import pytest
 
 from backend.axis import Envelope
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.cyclic import CyclicState
 from backend.jobs import Progress
+from backend.member import Member
 from backend.ports import Port
 from backend.tools import jog as jogging
 from backend.tools import move as moving
@@ -52,7 +53,7 @@ async def test_stop_is_sent_even_when_its_asker_is_gone(
 ) -> None:
     servo.enable()
     servo.gate.clear()
-    asking = asyncio.create_task(bench.stop(["x"]))
+    asking = asyncio.create_task(bench.motion.stop(["x"]))
     await asyncio.sleep(0)
     asking.cancel()  # the page closed right after Esc
     servo.gate.set()
@@ -109,7 +110,7 @@ async def test_work_that_swallows_its_cancellation_cannot_enable_again(
 
     job = bench.jobs.start("move", "Move", stubborn, drive="x", motion=True)
     await eventually(lambda: servo.number(STATUS) == 0x237)
-    await bench.stop(["x"])
+    await bench.motion.stop(["x"])
     await job.wait()
     assert enabling(servo) == 0
     assert isinstance(job.error, NotAllowed)
@@ -120,7 +121,7 @@ async def test_stop_that_did_not_reach_the_drive_is_sent_when_it_answers(
 ) -> None:
     servo.enable()
     servo.mute = True
-    assert "no answer" in (await bench.stop(["x"]))["x"]
+    assert "no answer" in (await bench.motion.stop(["x"]))["x"]
     await x.monitor.refresh()
     assert servo.words() == []
     servo.mute = False
@@ -166,7 +167,7 @@ async def test_after_stop_power_is_not_cut_while_the_axis_still_moves(
     await eventually(lambda: servo.number(STATUS) == 0x237)
     servo.on_write = lambda _place, _value: setattr(servo, "speed_inc", 500)
     servo.written.clear()
-    await bench.stop(["x"])
+    await bench.motion.stop(["x"])
     await job.wait()
     assert 0 not in servo.words(), "Disable voltage lets a moving axis coast"
     assert isinstance(job.error, DriveError)

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from backend.axis import Envelope
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.jobs import Progress
+from backend.member import Member
 from backend.tools.axis_facts import read_facts
 from backend.tools.jog import Hold, JogSettings, jog
 from backend.tools.move import MoveSettings, move

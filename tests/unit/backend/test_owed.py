@@ -12,7 +12,8 @@ import httpx
 import pytest
 
 from backend.axis import Envelope
-from backend.bench import Bench, Member
+from backend.bench import Bench
+from backend.member import Member
 from backend.restoring import RestoreFailed
 from backend.tools.temporary import temporary
 from drivers.cia402 import Mode

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from backend.axis import Envelope
-from backend.bench import Member
+from backend.member import Member
 from backend.quick_stop import STOP_S
 from backend.tools.recording import Play, bus_limits, enabled, play
 from backend.tools.temporary import stopping_hard

@@ -17,9 +17,10 @@ from backend.api.live_messages import JogStart
 from backend.api.models_motion import GenerateRequest, HomeRequest, MoveRequest, SequenceRequest
 from backend.axis import Envelope
 from backend.axis_store import AxisRecord
-from backend.bench import Bench, Member
+from backend.bench import Bench
 from backend.jobs import Progress
 from backend.mechanics_calc import Mechanics
+from backend.member import Member
 from backend.tools import jog as jogging
 from backend.tools import move as moving
 from backend.tools.cyclic_motion import _require_inside

@@ -1,0 +1,285 @@
+"""One page's live connection: states, values, jobs and samples out; watch, jog and STOP in.
+
+Each connection has one sender task. States coalesce (only the newest of each drive is kept);
+samples never do: they wait in their subscription's bounded queue, which counts what it drops.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import time
+from datetime import UTC, datetime
+from functools import partial
+
+from fastapi import WebSocket, WebSocketDisconnect
+from pydantic import BaseModel, ValidationError
+from starlette.websockets import WebSocketState
+
+import backend
+from backend.api import live_news
+from backend.api.errors import problem_of
+from backend.api.live_jog import Jogs
+from backend.api.live_messages import (
+    DriveRequest,
+    Hello,
+    JogRenew,
+    JogStart,
+    JogStop,
+    LeaseTake,
+    Ping,
+    Pong,
+    Refused,
+    ScopeStart,
+    ScopeStop,
+    StopAll,
+    WatchState,
+    WatchValues,
+    from_page,
+)
+from backend.api.live_people import PeopleLive
+from backend.api.live_people_messages import PeopleRequest
+from backend.api.live_scope import ScopeStreams
+from backend.api.live_shared import Shared, only
+from backend.api.security_messages import require_message
+from backend.audit.asked import Asked, asked
+from backend.bench import Bench
+from backend.people.identity import Actor, Identity, acting
+from backend.people.station import People
+from drivers.errors import DriveError
+
+#: Messages that wait for a slow page; states, values and drive lists coalesce and do not count.
+QUEUE = 500
+#: A connection that has not taken a message for this long is closed.
+SEND_TIMEOUT_S = 10.0
+
+
+class Connection:
+    """One page."""
+
+    def __init__(
+        self,
+        name: str,
+        socket: WebSocket,
+        bench: Bench,
+        people: PeopleLive,
+        known: People,
+        identity: Identity,
+    ) -> None:
+        self.id = name
+        self.identity = identity
+        self.page = ""
+        self.since = datetime.now(UTC)
+        self.heard = time.monotonic()
+        self.watched: set[str] = set()
+        self._people, self._known = people, known
+        self._socket = socket
+        self._bench = bench
+        self._queue: asyncio.Queue[Shared] = asyncio.Queue(QUEUE)
+        self._latest: dict[tuple[str, str], Shared] = {}
+        self._values: dict[str, tuple[frozenset[str], Shared]] = {}
+        self._wake = asyncio.Event()
+        self.jogs = Jogs(bench, name, self.send)
+        self.scopes = ScopeStreams(bench, name, self.send, socket.send_bytes)
+        self._polls: dict[str, asyncio.Task[None]] = {}
+        self._overflow = False
+
+    async def run(self) -> None:
+        """Until the page is gone."""
+        self.send(Hello(connection=self.id, version=backend.__version__))
+        self.later("drives", "", self.drive_list())
+        self._people.changed()
+        sender = asyncio.create_task(self._sender(), name=f"live-{self.id}")
+        receiver = asyncio.create_task(self._receiver(), name=f"hear-{self.id}")
+        scoper = asyncio.create_task(self.scopes.run(), name=f"scopes-{self.id}")
+        tasks = (sender, receiver, scoper)
+        done, pending = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        # Before anything is waited for: nobody holds a button here any more.
+        self.release(None, "the page's connection closed")
+        for task in pending:
+            task.cancel()
+        await asyncio.wait(tasks)
+        for task in done:
+            error = None if task.cancelled() else task.exception()
+            # A page may go in the middle of a message, or sleep for so long that its messages
+            # wait for ever; both are ordinary ends. Samples and words are sent beside each other:
+            # the one finds the line closed, the other that it is known to be.
+            known_closed = self._socket.application_state is WebSocketState.DISCONNECTED
+            if isinstance(error, RuntimeError) and known_closed:
+                continue
+            if error is not None and not isinstance(error, (WebSocketDisconnect, TimeoutError)):
+                raise error
+
+    async def close(self) -> None:
+        """Release everything that lived by this connection; a jog ends at once."""
+        self.release(None, "the page's connection closed")
+        for drive in self.watched:
+            if (member := self._bench.members.get(drive)) is not None:
+                member.monitor.watchers.discard(self.id)
+        self.watched = set()
+        for task in self._polls.values():
+            task.cancel()
+        await self.scopes.close()
+
+    def release(self, drive: str | None, reason: str) -> None:
+        """End jogs of this page: of one axis, or all."""
+        self.jogs.release(drive, reason)
+
+    # --- out --------------------------------------------------------------------------
+
+    def send(self, message: BaseModel | Shared) -> None:
+        """Queue a message that must not be lost; a page that never reads is cut off."""
+        try:
+            self._queue.put_nowait(message if isinstance(message, Shared) else only(message))
+        except asyncio.QueueFull:
+            self._overflow = True
+        self._wake.set()
+
+    def later(self, kind: str, which: str, message: Shared) -> None:
+        """Send the newest state of something; older ones not yet sent are replaced."""
+        self._latest[kind, which] = message
+        self._wake.set()
+
+    def fresh_values(self, drive: str, keys: frozenset[str], values: Shared) -> None:
+        """New readings of a drive; only the newest of each parameter is sent."""
+        waiting = self._values.get(drive)
+        if waiting is not None and not waiting[0] <= keys:
+            keys |= waiting[0]
+            values = Shared(partial(live_news.values, self._bench, drive, keys))
+        self._values[drive] = keys, values
+        self._wake.set()
+
+    def drive_list(self) -> Shared:
+        """The bench as this connection sees it."""
+        return Shared(partial(live_news.drive_list, self._bench, self.id))
+
+    async def _sender(self) -> None:
+        while not self._overflow:
+            await self._wake.wait()
+            self._wake.clear()
+            while not self._queue.empty():
+                await self._text(self._queue.get_nowait())
+            latest, self._latest = self._latest, {}
+            for message in latest.values():
+                await self._text(message)
+            values, self._values = self._values, {}
+            for _, message in values.values():
+                await self._text(message)
+            # States need not come faster than a screen shows them.
+            await asyncio.sleep(0.03)
+        await self._socket.close(code=1013, reason="the page does not read")
+
+    async def _text(self, message: Shared) -> None:
+        if (text := message.text) is not None:
+            async with asyncio.timeout(SEND_TIMEOUT_S):
+                await self._socket.send_text(text)
+
+    # --- in ---------------------------------------------------------------------------
+
+    async def _receiver(self) -> None:
+        with contextlib.suppress(WebSocketDisconnect):
+            while True:
+                message = await self._socket.receive()
+                if message["type"] == "websocket.disconnect":
+                    return
+                text = message.get("text")
+                # Not silent while a request takes its time.
+                self.heard = math.inf
+                await self._handle(text if isinstance(text, str) else "")
+                self.heard = time.monotonic()
+
+    async def _handle(self, text: str) -> None:
+        try:
+            request = from_page.validate_json(text)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            problem = DriveError(
+                f"not a message of this interface: {first['msg']}",
+                remedy="reload the page: it is of another version than the server",
+            )
+            self.send(Refused(request="?", problem=problem_of(problem)))
+            return
+        try:
+            self.identity = self._known.admit(self.identity, request.type)
+            acting.set(Actor(self.identity, self.id))
+            asked.set(Asked(request.model_dump))
+            require_message(self._known, self.identity, request)
+            if isinstance(request, PeopleRequest):
+                await self._people.act(self, self.identity, request)
+            else:
+                await self._act(request)
+        except DriveError as error:
+            self.send(Refused(request=request.type, problem=problem_of(error)))
+
+    async def _act(self, request: DriveRequest) -> None:
+        match request:
+            case StopAll():
+                await self._stop(request)
+            case JogRenew():
+                self.jogs.renew(request.drive)
+            case JogStop():
+                self.jogs.release(request.drive, request.reason or "released")
+            case JogStart():
+                self.jogs.start(request, self.identity.person)
+            case WatchState():
+                self._watch(set(request.drives))
+            case WatchValues():
+                self._watch_values(request)
+            case LeaseTake():
+                self._lease(request)
+            case ScopeStart() | ScopeStop():
+                self.scopes.request(request)
+            case Ping():
+                self.send(Pong(n=request.n))
+
+    async def _stop(self, request: StopAll) -> None:
+        drives = [request.drive] if request.drive else list(self._bench.members)
+        known = [drive for drive in drives if drive in self._bench.members]
+        problems = await self._bench.motion.stop(known)
+        self._bench.journal.add("STOP", level="warning", drive=request.drive)
+        for drive, text in problems.items():
+            if text:
+                failure = DriveError(
+                    f"STOP did not reach it: {text}",
+                    drive=drive,
+                    remedy="use the hardware stop, then look at its supply and cable",
+                )
+                self.send(Refused(request="stop", problem=problem_of(failure)))
+
+    def _lease(self, request: LeaseTake) -> None:
+        self._bench.member(request.drive)
+        if request.take:
+            self._bench.leases.take(request.drive, self.id, self.identity.person)
+            return
+        self.jogs.release(request.drive, "control was given back")
+        self._bench.leases.give(request.drive, self.id)
+
+    def _watch(self, drives: set[str]) -> None:
+        for drive in drives | self.watched:
+            if (member := self._bench.members.get(drive)) is None:
+                continue
+            # A drive that was taken off the bench and put back is another one of the same name.
+            watchers = member.monitor.watchers
+            if (self.id in watchers) is not (drive in drives):
+                watchers ^= {self.id}
+                member.monitor.hurry()
+        self.watched = {drive for drive in drives if drive in self._bench.members}
+
+    def _watch_values(self, request: WatchValues) -> None:
+        drive = self._bench.member(request.drive).drive
+        for key in request.keys:
+            drive.parameter(key)
+        if (old := self._polls.pop(request.drive, None)) is not None:
+            old.cancel()
+        if request.keys:
+            self._polls[request.drive] = asyncio.create_task(
+                self._poll(request), name=f"watch-{self.id}-{request.drive}"
+            )
+
+    async def _poll(self, request: WatchValues) -> None:
+        while (member := self._bench.members.get(request.drive)) is not None:
+            # A lost link is told by the monitor; polling goes on until the drive is back.
+            with contextlib.suppress(DriveError):
+                await member.drive.read_many(request.keys)
+            await asyncio.sleep(request.period_s)

@@ -1,0 +1,121 @@
+"""Control of an axis, passed between the people whose pages are open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from backend.access import Notice
+from backend.api.live_page import Page
+from backend.api.live_people_messages import (
+    LeaseAnswer,
+    LeaseAsk,
+    LeaseHand,
+    LeaseNotice,
+    LeaseOverride,
+)
+from backend.api.people_record import PeopleRecord
+from backend.bench import Bench
+from backend.people.errors import Forbidden
+from backend.people.identity import Identity
+from backend.people.rights import GRANTABLE, Right
+from backend.people.station import People
+from drivers.errors import NotAllowed
+
+
+class PeopleControl:
+    """Of all live connections of a server."""
+
+    def __init__(self, bench: Bench, people: People, pages: Mapping[str, Page]) -> None:
+        self._bench, self._people, self._pages = bench, people, pages
+        self._record = PeopleRecord(bench)
+        bench.leases.on_notice.append(self._notice)
+
+    async def act(
+        self,
+        page: Page,
+        identity: Identity,
+        request: LeaseAsk | LeaseAnswer | LeaseHand | LeaseOverride,
+    ) -> None:
+        """Carry out a request for control.
+
+        Raises:
+            NotAllowed, Forbidden, Busy: it is not to be had now.
+        """
+        leases, drive = self._bench.leases, request.drive
+        self._bench.member(drive)
+        match request:
+            case LeaseAsk():
+                leases.ask(drive, page.id, identity.person)
+                self._log(drive, identity, "asks for control")
+            case LeaseAnswer(give=True):
+                if leases.asked(drive) is not None:
+                    page.release(drive, "control was handed over")
+                    leases.give(drive, page.id)
+                    self._log(drive, identity, "gives control")
+            case LeaseAnswer():
+                leases.refuse(drive, page.id)
+                self._log(drive, identity, "keeps control")
+            case LeaseHand():
+                to = self._pages.get(request.to)
+                if to is None:
+                    raise NotAllowed(
+                        "this person is not here any more",
+                        drive=drive,
+                        remedy="take control yourself if it is free",
+                    )
+                require_control(self._people, to.identity, drive)
+                page.release(drive, "control was handed over")
+                leases.hand(drive, page.id, to.id, to.identity.person, request.time_s)
+                self._log(drive, identity, f"hands control to {to.identity.person}")
+            case LeaseOverride():
+                await self._override(page, identity, drive)
+
+    async def _override(self, page: Page, identity: Identity, drive: str) -> None:
+        holder = self._bench.leases.holder(drive)
+        held_by = None if holder is None else self._pages.get(holder.connection)
+        from_guest = held_by is not None and held_by.identity.is_guest
+        if Right.ADMINISTER not in identity.rights and not from_guest:
+            raise Forbidden(
+                "only an administrator takes control from somebody",
+                drive=drive,
+                remedy="ask for control",
+            )
+        if held_by is not None and held_by.id != page.id:
+            held_by.release(drive, "control was taken")
+            if self._bench.jobs.moving(drive) is not None:
+                # Who watched this motion does not control it any more.
+                await self._bench.motion.stop([drive])
+        self._bench.leases.override(drive, page.id, identity.person)
+        self._log(drive, identity, "takes control by override")
+
+    def _log(self, drive: str, identity: Identity, what: str) -> None:
+        text = f"{identity.person} {what}"
+        self._record.note("lease", what, text, drive=drive, person=identity.person)
+
+    def _notice(self, notice: Notice) -> None:
+        page = self._pages.get(notice.connection)
+        if page is not None:
+            page.send(LeaseNotice(drive=notice.drive, kind=notice.kind, person=notice.person))
+
+
+def require_control(people: People, identity: Identity, drive: str) -> None:
+    """This person may hold the control of an axis now.
+
+    Raises:
+        Forbidden: they may only look, or have a grant for another axis.
+    """
+    now = people.renewed(identity)
+    rights = frozenset() if now is None else now.rights & GRANTABLE
+    if now is None or not rights:
+        raise Forbidden(
+            f"{identity.person} may only look",
+            drive=drive,
+            remedy="ask the person on site to grant control"
+            if identity.is_guest
+            else "ask an administrator",
+        )
+    if now.is_guest:
+        found = people.support.of_session(now.session)
+        grant = None if found is None else people.support.running(found)
+        if grant is not None and grant.drive not in (None, drive):
+            raise Forbidden("the grant is for another axis", drive=drive)

@@ -1,0 +1,85 @@
+"""The jogs of one page: each runs for as long as the page renews it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pydantic import BaseModel
+
+from backend.api.convert_motion import jog_settings, unit_of
+from backend.api.errors import problem_of
+from backend.api.live_messages import JogEnded, JogStart
+from backend.bench import Bench
+from backend.jobs import JobResult, Progress
+from backend.member import Member
+from backend.tools.cyclic_motion import jog_cyclic
+from backend.tools.jog import Hold, jog
+from drivers.errors import DriveError
+
+
+class Jogs:
+    """Of one live connection. ``send`` queues a message for its page."""
+
+    def __init__(self, bench: Bench, connection: str, send: Callable[[BaseModel], None]) -> None:
+        self._bench, self._connection, self._send = bench, connection, send
+        self._holds: dict[str, Hold] = {}
+
+    def renew(self, drive: str) -> None:
+        """The button is still held."""
+        if (hold := self._holds.get(drive)) is not None:
+            hold.renew()
+
+    def release(self, drive: str | None, reason: str) -> None:
+        """End the jog of one axis, or all."""
+        for each, hold in self._holds.items():
+            if drive in (None, each):
+                hold.release(reason)
+
+    def start(self, request: JogStart, person: str) -> None:
+        """Begin a jog, and take control for its length where nobody has it.
+
+        Raises:
+            DriveError: the axis may not move, or somebody else controls it.
+        """
+        bench, member = self._bench, self._bench.member(request.drive)
+        held_before = bench.leases.holder(request.drive) is not None
+        bench.leases.take(request.drive, self._connection, person)
+        hold = Hold()
+        try:
+            job = bench.jobs.start(
+                "jog",
+                f"Jog {member.drive.name}",
+                lambda progress: _jog_work(bench, member, request, hold, progress),
+                drive=request.drive,
+                motion=True,
+            )
+        except DriveError:
+            if not held_before:
+                bench.leases.give(request.drive, self._connection)
+            raise
+        self._holds[request.drive] = hold
+        member.monitor.hurry()
+
+        def ended(_task: object) -> None:
+            if self._holds.get(request.drive) is hold:
+                del self._holds[request.drive]
+            if not held_before:
+                bench.leases.give(request.drive, self._connection)
+            result = job.result or {}
+            reason = str(result.get("reason", job.state))
+            problem = problem_of(job.error) if job.error else None
+            self._send(JogEnded(drive=request.drive, reason=reason, problem=problem))
+
+        if job.task is not None:
+            job.task.add_done_callback(ended)
+
+
+async def _jog_work(
+    bench: Bench, member: Member, request: JogStart, hold: Hold, progress: Progress
+) -> JobResult:
+    """Through the cyclic exchange where it runs, else as a moving target."""
+    axis = member.axis
+    settings = jog_settings(request, await unit_of(bench, member, request.unit))
+    if axis.session is not None and axis.session.running:
+        return await jog_cyclic(axis, axis.session, settings, hold, progress)
+    return await jog(axis, settings, hold, progress)

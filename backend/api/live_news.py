@@ -1,0 +1,39 @@
+"""What a bench tells its pages: made once for all that look."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel
+
+from backend.api import convert
+from backend.api.live_messages import DrivesChanged, JobChanged, StateChanged, ValuesChanged
+from backend.bench import Bench
+from backend.jobs import Job
+from backend.monitor import Snapshot
+
+
+def state(bench: Bench, drive: str, snapshot: Snapshot) -> BaseModel | None:
+    """An axis, unless its drive has left the bench."""
+    member = bench.members.get(drive)
+    if member is None:
+        return None
+    return StateChanged(state=convert.axis_state(bench, member, snapshot))
+
+
+def values(bench: Bench, drive: str, keys: frozenset[str]) -> BaseModel | None:
+    """What was read of these parameters, unless the drive has left the bench."""
+    member = bench.members.get(drive)
+    if member is None or not keys:
+        return None
+    rows = convert.readings(member.drive, sorted(keys))
+    return ValuesChanged.model_construct(drive=drive, values=rows)
+
+
+def drive_list(bench: Bench, connection: str | None) -> BaseModel:
+    """The drives as the holder of this connection sees them; as a stranger without one."""
+    members = bench.members.values()
+    return DrivesChanged(drives=[convert.drive_summary(bench, m, connection) for m in members])
+
+
+def job_state(job: Job) -> BaseModel:
+    """A job as it is now."""
+    return JobChanged(job=convert.job(job))

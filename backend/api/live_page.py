@@ -1,0 +1,31 @@
+"""What those who look after people need of a live connection."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Protocol
+
+from pydantic import BaseModel
+
+from backend.api.live_shared import Shared
+from backend.people.identity import Identity
+
+
+class Page(Protocol):
+    """What is needed of a live connection."""
+
+    id: str
+    identity: Identity
+    page: str
+    since: datetime
+    #: Monotonic time of the last message; infinite while one is being carried out.
+    heard: float
+
+    def send(self, message: BaseModel | Shared) -> None:
+        """Queue a message that must not be lost."""
+
+    def later(self, kind: str, which: str, message: Shared) -> None:
+        """Send the newest state of something."""
+
+    def release(self, drive: str | None, reason: str) -> None:
+        """End jogs of this page: of one axis, or all."""

@@ -1,0 +1,126 @@
+"""No motion outlives the page or the right that it was begun with."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine, Mapping
+
+from backend.api.live_page import Page
+from backend.api.people_record import PeopleRecord
+from backend.bench import Bench
+from backend.jobs import Job
+from backend.people.station import People
+from backend.people.support import Invitation
+from drivers.cia402 import State
+
+
+class PeopleMotions:
+    """Of all live connections of a server."""
+
+    def __init__(self, bench: Bench, people: People, pages: Mapping[str, Page]) -> None:
+        self._bench, self._pages = bench, pages
+        self._support = people.support
+        self._record = PeopleRecord(bench)
+        self._tasks: set[asyncio.Task[object]] = set()
+        self._ending: set[str] = set()
+        bench.on_job.append(self._job)
+        self._support.on_disabled.append(self._disabled)
+
+    def end(self, page: Page, what: str) -> None:
+        """What this page moves comes to its end; ``what`` became of it."""
+        for job in self._bench.jobs.all():
+            own = job.actor is not None and job.actor.connection == page.id
+            # A jog ends by its own dead-man, with its ramp; and a second cancelling would disturb
+            # the cleanup of the first.
+            if not own or not _moves(job) or job.kind == "jog" or job.id in self._ending:
+                continue
+            self._bench.journal.add(
+                f"{job.title}: ended, the page that began it {what}",
+                level="warning",
+                drive=job.drive,
+            )
+            self._ending.add(job.id)
+            self._spawn(self._cancel(job))
+
+    def let_go(self, page: Page, what: str) -> None:
+        """Nothing stays enabled that nobody looks after: not what this page enabled and left so.
+
+        Whoever controls or moves the axis by now looks after it from here on.
+        """
+        for member in self._bench.members.values():
+            if member.axis.enabled_by != page.id:
+                continue
+            drive = member.drive.id
+            holder, job = self._bench.leases.holder(drive), self._bench.jobs.moving(drive)
+            actor = None if job is None else job.actor
+            others = {each.connection for each in (holder, actor) if each is not None}
+            heir = next((each for each in others if each not in (None, page.id)), None)
+            member.axis.enabled_by = heir
+            if heir is None:
+                text = f"{member.drive.name} loses its power: the page that enabled it {what}"
+                self._bench.journal.add(text, level="warning", drive=drive)
+                self._spawn(self._bench.motion.let_go(drive))
+
+    async def _cancel(self, job: Job) -> None:
+        try:
+            await self._bench.jobs.cancel(job)
+        finally:
+            self._ending.discard(job.id)
+
+    def _disabled(self, invitation: Invitation, why: str) -> None:
+        """A guest may not move anything from now on: what moves stops."""
+        session = invitation.session
+        self._record.note(
+            "invitation",
+            "motion ended",
+            f"{invitation.guest} may not move anything now: {why}",
+            target=invitation.guest,
+            outcome=why,
+        )
+        guests = [p for p in self._pages.values() if session and p.identity.session == session]
+        for page in guests:
+            page.release(None, why)
+        drives = {
+            job.drive
+            for job in self._bench.jobs.all()
+            if _moves(job) and job.drive and _session_of(job) == session
+        }
+        for page in guests:
+            drives |= {d for d in self._bench.leases.held_by(page.id) if self._is_enabled(d)}
+            if self._support.running(invitation) is None:
+                self._bench.leases.drop(page.id)
+        self._stop(drives, f"{invitation.guest}: {why}")
+
+    def _job(self, job: Job) -> None:
+        """A guest's motion that began just as the button was let go."""
+        actor = job.actor
+        if actor is None or not actor.identity.is_guest or not _moves(job) or not job.drive:
+            return
+        invitation = self._support.of_session(actor.identity.session)
+        if invitation is None or not self._support.enabled(invitation.id):
+            self._stop({job.drive}, "the enabling button is not held")
+
+    def _stop(self, drives: set[str], why: str) -> None:
+        known = [drive for drive in drives if drive in self._bench.members]
+        if known:
+            for drive in known:
+                self._bench.journal.add(f"stopped: {why}", level="warning", drive=drive)
+            self._spawn(self._bench.motion.stop(known))
+
+    def _is_enabled(self, drive: str) -> bool:
+        member = self._bench.members.get(drive)
+        snapshot = None if member is None else member.monitor.snapshot
+        return snapshot is not None and snapshot.state is State.OPERATION_ENABLED
+
+    def _spawn(self, work: Coroutine[object, object, object]) -> None:
+        task: asyncio.Task[object] = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+
+def _moves(job: Job) -> bool:
+    return job.motion and job.stoppable and job.state == "running"
+
+
+def _session_of(job: Job) -> str:
+    return "" if job.actor is None else job.actor.identity.session

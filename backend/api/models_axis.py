@@ -1,0 +1,96 @@
+"""Messages about an axis: its state, transitions, procedures and STOP."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from backend.api.models import Message
+
+
+class ActiveFault(Message):
+    """A fault or warning that is present now."""
+
+    code: str
+    name: str
+    kind: Literal["fault", "warning"]
+    causes: list[str]
+    remedies: list[str]
+    reset: str
+    source: str
+
+
+class AxisState(Message):
+    """State of an axis, in engineering units where units are named."""
+
+    drive: str
+    time: datetime
+    fresh: bool = Field(description="False when the last reading failed; values are then old")
+    problem: str = Field(description="why the reading failed, or empty")
+    state: str
+    status_word: int | None
+    mode: int | None
+    mode_name: str
+    modes: list[int] = Field(description="modes this drive supports")
+    goals: list[str] = Field(description="states that can be asked for now")
+    target_reached: bool
+    internal_limit: bool
+    mode_bits: dict[str, bool] = Field(description="meaning of bits 12 and 13 in this mode")
+    position: float | None
+    velocity: float | None
+    torque: float | None
+    following_error: float | None
+    dc_voltage: float | None
+    temperature: float | None
+    units: dict[str, str] = Field(description="unit of each of the values above")
+    faults: list[ActiveFault]
+    blocked_by: list[str] = Field(description="causes that keep the axis from being enabled")
+    moving_job: str | None
+
+
+class TransitionRequest(Message):
+    """Drive the CiA 402 state machine to a state."""
+
+    goal: Literal[
+        "Switch on disabled",
+        "Ready to switch on",
+        "Switched on",
+        "Operation enabled",
+        "Quick stop active",
+    ]
+    mode: int | None = Field(default=None, description="mode of operation to set before")
+
+
+class ProcedureInfo(Message):
+    """A named sequence of the profile."""
+
+    name: str
+    title: str
+    help: str
+    warning: str
+    requires_stop: bool
+    confirm: list[str] = Field(description="texts the user must agree to")
+    steps: list[str]
+    source: str
+    notes: str
+
+
+class ProcedureRequest(Message):
+    """Run a procedure."""
+
+    confirmed: bool = False
+
+
+class StopRequest(Message):
+    """STOP; all drives where none is named."""
+
+    drive: str | None = None
+
+
+class StopResult(Message):
+    """What STOP reached."""
+
+    stopped: list[str]
+    failed: dict[str, str] = Field(description="drives that could not be told, and why")

@@ -1,0 +1,227 @@
+"""Messages about the bench: its buses, what they are connected through, and its drives."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from backend.api.models import Message
+
+
+class Health(Message):
+    """The server is alive."""
+
+    version: str
+    time: datetime
+    demo: bool
+
+
+class SerialPort(Message):
+    """A serial adapter of this machine."""
+
+    path: str
+    description: str
+    url: str = Field(description="bus URL to start from")
+    usable: bool
+    problem: str = ""
+
+
+class NetworkInterface(Message):
+    """A network interface that could carry EtherCAT."""
+
+    name: str
+    up: bool
+    url: str
+    usable: bool
+    problem: str = ""
+
+
+class Interfaces(Message):
+    """What this machine can connect through."""
+
+    serial: list[SerialPort]
+    network: list[NetworkInterface]
+    can: list[str] = Field(description="bus URLs to start from")
+    virtual: list[str] = Field(description="buses of the running demo bench")
+
+
+class Quality(Message):
+    """Counters of one link or station since it was opened."""
+
+    connected: bool
+    state: str
+    transactions: int
+    timeouts: int
+    crc_errors: int
+    framing_errors: int
+    retries: int
+    lost_frames: int
+    wkc_errors: int
+    round_trip_ms: float | None
+    details: dict[str, float | int | str]
+
+
+class CyclicInfo(Message):
+    """The running cyclic exchange of a bus."""
+
+    running: bool
+    problem: str = Field(
+        default="",
+        description="why it does not run although it is wanted; it is set up again by itself",
+    )
+    cycle_us: float
+    dc: bool | None = Field(description="distributed clocks in use; None where there are none")
+    channels: list[str] = Field(description="drive/key of what comes with every cycle")
+    left_over: dict[str, str] = Field(description="what did not fit, and why; it is polled")
+
+
+class CyclicRequest(Message):
+    """Begin to exchange process data with all drives of a bus."""
+
+    url: str
+    cycle_us: int = Field(default=1000, ge=250, le=10000)
+
+
+class Bus(Message):
+    """An opened bus."""
+
+    url: str
+    kind: str
+    quality: Quality
+    cyclic_possible: bool
+    cyclic: CyclicInfo | None
+
+
+class ScanRequest(Message):
+    """Look for drives on a bus."""
+
+    url: str
+    stations: list[int] | None = Field(default=None, description="only these; all where None")
+    stop_after_first: bool = False
+
+
+class ProfileMatch(Message):
+    """A profile that fits what was found, and how sure that is."""
+
+    profile: str
+    title: str
+    confidence: Literal["certain", "likely", "possible"]
+    why: str
+
+
+class FoundDrive(Message):
+    """One drive seen by a scan."""
+
+    url: str
+    station: int
+    vendor_id: int | None
+    product_code: int | None
+    revision: int | None
+    serial: int | None
+    name: str
+    alias: int | None
+    hardware: str
+    firmware: str
+    state: str
+    notes: list[str]
+    matches: list[ProfileMatch]
+    connected_as: str | None = Field(description="id of the drive that already uses this station")
+
+
+class ConnectRequest(Message):
+    """Make a found station a drive of this bench."""
+
+    url: str
+    station: int = Field(ge=0, le=65535)
+    profile: str
+    name: str = Field(default="", max_length=60)
+
+
+class PortRequest(Message):
+    """A further port of a drive that is already connected."""
+
+    url: str
+    station: int = Field(ge=0, le=65535)
+    accept_difference: bool = Field(
+        default=False, description="settings read there differ, and it is the same drive even so"
+    )
+
+
+class DriveUpdate(Message):
+    """Name or notes of a drive."""
+
+    name: str | None = Field(default=None, min_length=1, max_length=60)
+    notes: str | None = Field(default=None, max_length=4000)
+    accept_identity: bool = Field(
+        default=False, description="the drive at this place was exchanged on purpose"
+    )
+
+
+class PortInfo(Message):
+    """One connection of a drive."""
+
+    url: str
+    kind: str
+    station: int
+    watchdog: bool
+    watchdog_help: str
+
+
+class Lease(Message):
+    """Who may move and write this axis now; nobody where ``holder`` is None."""
+
+    holder: str | None
+    since: datetime | None
+    mine: bool = False
+    connection: str | None = Field(default=None, description="live connection of the holder")
+    until: datetime | None = Field(default=None, description="end of a hand-over for a time")
+    asked_by: str | None = Field(default=None, description="who asks for control and waits")
+    asked_until: datetime | None = Field(
+        default=None, description="when control passes on if the holder does not answer"
+    )
+
+
+class OwedValue(Message):
+    """A parameter that a motion changed and could not put back, as the link was lost."""
+
+    key: str
+    name: str
+    raw: float | str = Field(description="what it was before; writing it puts it back")
+    unapplied: bool = Field(description="it is back, but does not act yet")
+
+
+class DriveSummary(Message):
+    """A drive of the bench."""
+
+    id: str
+    name: str
+    notes: str
+    profile: str
+    title: str
+    maker: str
+    partial: bool
+    ports: list[PortInfo]
+    connected: bool
+    serial: int | None
+    firmware: str
+    identity_warning: str = Field(description="non-empty when another drive answers here")
+    unsaved: int = Field(description="parameters in the drive but not in its memory")
+    pending: int = Field(description="parameters waiting for write-settings, enable or power-off")
+    owed: list[OwedValue] = Field(description="what a motion could not put back")
+    lease: Lease
+    quality: Quality
+
+
+class ProfileInfo(Message):
+    """A profile that servodeck brings, or one of the user's own."""
+
+    profile: str
+    title: str
+    maker: str
+    partial: bool
+    links: list[str]
+    parameters: int
+    own: bool = Field(default=False, description="in the user's folder, imported or written there")
+    problem: str = Field(default="", description="why this own profile cannot be used")

@@ -1,0 +1,102 @@
+"""Messages about the parameters of a drive."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import ConfigDict, Field, field_validator
+
+from backend.api.models import Message, Problem, Raw
+
+
+class ParameterInfo(Message):
+    """Description of a parameter, as in the profile."""
+
+    key: str
+    number: str | None
+    name: str
+    group: str
+    type: str
+    access: Literal["ro", "rw", "wo"]
+    pdo: str
+    unit: str
+    scale: float
+    offset: float
+    min_raw: int | float | None
+    max_raw: int | float | None
+    default_raw: Raw | None
+    enum: dict[int, str]
+    bits: dict[str, str]
+    effective: str
+    settable: str
+    motor_individual: bool
+    help: str
+    source: str
+    also_printed: list[str]
+    notes: str
+    reachable: bool = Field(description="False when no connected port can carry it")
+    unreachable_why: str = ""
+
+
+class ParameterValue(Message):
+    """What the drive said last."""
+
+    key: str
+    raw: Raw | None
+    value: Raw | None = Field(description="in the parameter's unit")
+    time: datetime | None
+    error: str = ""
+    unused: bool = Field(
+        default=False, description="the drive's own count leaves it out: not asked for"
+    )
+    unsaved: bool = False
+    pending: str = Field(
+        default="", description="what must happen before it acts: write_settings, reenable …"
+    )
+
+
+class ParameterRow(ParameterInfo):
+    """Description and value."""
+
+    reading: ParameterValue
+
+
+class ParameterWrite(Message):
+    """A new value: exactly one of ``raw`` and ``value``."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    raw: Raw | None = None
+    value: Raw | None = None
+
+    @field_validator("raw", "value", mode="before")
+    @classmethod
+    def _no_truth(cls, given: object) -> object:
+        if isinstance(given, bool):
+            # Else it would become 1 or 0 of whatever unit the parameter has.
+            raise ValueError(  # noqa: TRY004 - pydantic reports these only
+                "true and false are no values of a parameter: give the number"
+            )
+        return given
+
+
+class ParameterWrites(Message):
+    """Several new values, written in turn; a failure does not stop the rest."""
+
+    values: dict[str, ParameterWrite] = Field(max_length=2000)
+
+
+class WriteResult(Message):
+    """Result of one write, with the value that was read back."""
+
+    key: str
+    ok: bool
+    reading: ParameterValue
+    problem: Problem | None = None
+
+
+class ReadAllRequest(Message):
+    """Read parameters; all readable ones where ``keys`` is None."""
+
+    keys: list[str] | None = None

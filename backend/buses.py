@@ -1,0 +1,129 @@
+"""The buses of a bench: opened, searched for drives, and closed."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from backend.drive import Drive
+from backend.people.identity import by_itself
+from backend.ports import Port
+from drivers.errors import Busy, NotAllowed
+from drivers.link import Found, Link, LinkEvent
+from drivers.modbus.link import RegisterLink
+from drivers.urls import link_for
+
+if TYPE_CHECKING:
+    from backend.bench import Bench
+
+
+class Buses:
+    """For one bench. ``opened`` holds the link of each open bus by its URL.
+
+    ``wires`` are the wires of a demo bench: URLs such as ``mlink://virtual0`` and what makes
+    their links.
+    """
+
+    def __init__(self, bench: Bench, wires: Mapping[str, Callable[[], Link]]) -> None:
+        self.wires = dict(wires)
+        self.opened: dict[str, Link] = {}
+        self._bench = bench
+        self._opening = asyncio.Lock()
+
+    async def open(self, url: str) -> Link:
+        """The opened bus of this URL; opens it on first use.
+
+        Raises:
+            LinkLost: it cannot be opened. NotAllowed: no such kind of bus.
+        """
+        async with self._opening:
+            link = self.opened.get(url)
+            if link is None:
+                make = self.wires.get(url)
+                link = make() if make is not None else link_for(url)
+                await link.open()
+                link.listen(lambda event: by_itself().run(self._event, url, event))
+                self.opened[url] = link
+                self._bench.journal.add(f"opened {url}")
+                self._bench.drives_changed()
+            return link
+
+    async def close(self, url: str) -> None:
+        """Close a bus that no drive uses.
+
+        Raises:
+            Busy: drives use it. NotAllowed: it is not open.
+        """
+        users = [m.drive.name for m in self._bench.members.values() if url in self.urls_of(m.drive)]
+        if users:
+            raise Busy(f"{url} is used by {', '.join(users)}", remedy="remove these drives first")
+        link = self.opened.pop(url, None)
+        if link is None:
+            raise NotAllowed(
+                f"{url} is not open", value=url, remedy="open the bus on the page Connect"
+            )
+        await link.close()
+        self._bench.drives_changed()
+
+    def urls_of(self, drive: Drive) -> list[str]:
+        """The URLs of the open buses that this drive is reached over."""
+        return [
+            url for url, link in self.opened.items() if any(p.link is link for p in drive.ports)
+        ]
+
+    def url_of(self, port: Port) -> str:
+        """The URL a port was opened by, as the user knows it."""
+        return next((u for u, link in self.opened.items() if link is port.link), port.link.url)
+
+    async def scan(
+        self,
+        url: str,
+        stations: Sequence[int] | None,
+        progress: Callable[[float, str], None],
+        *,
+        stop_after_first: bool = False,
+    ) -> list[Found]:
+        """Look for drives on a bus.
+
+        Raises:
+            LinkLost: the bus cannot be opened.
+            Busy: a drive of it is moving; a scan may reset what it finds.
+        """
+        link = await self.open(url)
+        for member in self._bench.members.values():
+            if any(port.link is link for port in member.drive.ports):
+                self._bench.motion.require_idle(member)
+        with self._bench.exchanges.searching(url):
+            if stop_after_first and isinstance(link, RegisterLink):
+                # Only there is one address asked after the other, each at the price of a time-out.
+                found = await link.scan(progress, stations, stop_after=1)
+            else:
+                found = await link.scan(progress, stations)
+        self._bench.journal.add(
+            f"{url}: {len(found)} {'drive' if len(found) == 1 else 'drives'} found"
+        )
+        return found
+
+    def _event(self, url: str, event: LinkEvent) -> None:
+        drive = next(
+            (
+                m.drive
+                for m in self._bench.members.values()
+                for p in m.drive.ports
+                if self.url_of(p) == url and event.station in (None, p.station)
+            ),
+            None,
+        )
+        self._bench.journal.add(
+            f"{url}: {event.text}",
+            level="info" if event.kind in ("boot", "back", "state") else "warning",
+            drive=drive.id if drive else None,
+        )
+        if drive is not None and event.kind in ("boot", "back"):
+            self._bench.returning.returned(drive.id)
+
+    async def close_all(self) -> None:
+        """Let go of every bus; one that fails keeps no other open."""
+        links = self.opened.values()
+        await asyncio.gather(*(link.close() for link in links), return_exceptions=True)

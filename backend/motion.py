@@ -1,0 +1,153 @@
+"""Which axes of a bench may begin to move, and how they are brought to rest."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from backend.member import Member
+from drivers.errors import Busy, DriveError
+
+if TYPE_CHECKING:
+    from backend.bench import Bench
+
+
+class Motion:
+    """For one bench: what holds an axis still, STOP for all of them, and the power taken off."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+        self._stops: set[asyncio.Task[dict[str, str]]] = set()
+        #: Drives of which something is changed that no motion may begin with.
+        self._still: Counter[str] = Counter()
+        #: Drives that are being removed.
+        self._parting: set[str] = set()
+
+    @contextlib.contextmanager
+    def keeping_still(self, member: Member) -> Iterator[None]:
+        """Nothing begins to move this axis meanwhile, as what it relies on is changed. STOP works.
+
+        Raises:
+            Busy: something moves it already.
+        """
+        self.require_idle(member)
+        self._still[member.drive.id] += 1
+        try:
+            yield
+        finally:
+            self._still[member.drive.id] -= 1
+
+    def require_idle(self, member: Member) -> None:
+        """Nothing moves this axis.
+
+        Raises:
+            Busy: a job does.
+        """
+        if (job := self._bench.jobs.moving(member.drive.id)) is not None:
+            raise Busy(
+                f"{member.drive.name} is moved by {job.title!r}",
+                drive=member.drive.name,
+                remedy="wait for it to end, or stop it",
+            )
+
+    @contextlib.contextmanager
+    def parting(self, member: Member) -> Iterator[None]:
+        """STOP reaches what is on the bench: nothing may begin to move on its way off it."""
+        self._parting.add(member.drive.id)
+        try:
+            yield
+        finally:
+            self._parting.discard(member.drive.id)
+
+    def require_stays(self, member: Member) -> None:
+        """Nobody is taking this drive off the bench.
+
+        Raises:
+            Busy: somebody is.
+        """
+        if member.drive.id in self._parting:
+            raise Busy(
+                f"{member.drive.name} is being taken off the bench",
+                drive=member.drive.name,
+                remedy="wait until it is gone, then add it again if it is still needed",
+            )
+
+    def permit(self, drive_id: str) -> None:
+        """A new motion begins by a person's command; it takes back an earlier STOP.
+
+        Raises:
+            Busy: the exchange of its bus is being started or ended, or it leaves the bench.
+        """
+        member = self._bench.member(drive_id)
+        self.require_stays(member)
+        if self._still[drive_id]:
+            raise Busy(
+                f"{member.drive.name}: its settings are just being changed",
+                drive=member.drive.name,
+                remedy="try again when they have been",
+            )
+        self._bench.exchanges.require_calm(
+            member.drive.name, self._bench.buses.urls_of(member.drive)
+        )
+        member.axis.permit()
+
+    async def stop(self, drive_ids: Sequence[str]) -> dict[str, str]:
+        """Quick stop of these drives, all at once; motion jobs are cancelled.
+
+        The write does not wait for any job's cleanup, and goes out even when whoever asked for
+        it is gone by then. Returns drive id to problem, empty text where the drive took the stop.
+        """
+        members = [self._bench.member(drive_id) for drive_id in drive_ids]
+        for member in members:
+            # Before anything else runs: nothing in progress may enable the axis from here on.
+            member.axis.stopped = True
+            job = self._bench.jobs.moving(member.drive.id)
+            if job is not None and job.stoppable and job.task is not None:
+                # Cancelled before the write, so that it sends nothing after it but its cleanup.
+                job.task.cancel()
+        task = asyncio.create_task(self._stop(members), name="stop")
+        self._stops.add(task)
+        task.add_done_callback(self._stops.discard)
+        self._bench.witness.stopped(drive_ids)
+        return await asyncio.shield(task)
+
+    async def _stop(self, members: Sequence[Member]) -> dict[str, str]:
+        async def one(member: Member) -> str:
+            problem = ""
+            try:
+                await member.axis.stop()
+            except DriveError as error:
+                problem = error.message
+            member.monitor.hurry()
+            return problem
+
+        problems = await asyncio.gather(*(one(member) for member in members))
+        return {m.drive.id: text for m, text in zip(members, problems, strict=True)}
+
+    async def let_go(self, drive_id: str) -> None:
+        """Take the power off an axis that was enabled here and left so; never raises."""
+        member = self._bench.members.get(drive_id)
+        if member is not None:
+            job = self._bench.jobs.moving(drive_id)
+            if job is not None:
+                # Of the page that is gone, and being ended: the axis is brought to rest first.
+                await job.wait()
+            await self.let_go_of(member)
+            member.monitor.hurry()
+
+    async def let_go_of(self, member: Member) -> None:
+        """Take the power off an axis now; where that fails, it owes its stop; never raises."""
+        try:
+            await member.axis.let_go()
+        except DriveError as error:
+            # Told to stop as soon as it answers, here or after it was put back on the bench.
+            member.axis.owes_stop = True
+            text = f"{member.drive.name} may still be enabled: {error.message}"
+            self._bench.journal.add(text, level="error", drive=member.drive.id)
+
+    async def let_go_of_all(self) -> None:
+        """Take the power off every axis of the bench, all at once; never raises."""
+        await asyncio.gather(*(self.let_go_of(member) for member in self._bench.members.values()))

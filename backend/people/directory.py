@@ -1,0 +1,215 @@
+"""Accounts, sessions and tokens in memory: what every request asks for.
+
+STOP must not wait for a disk, so nothing here reads or writes one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from datetime import datetime, timedelta
+
+from backend.people.credentials import digest, name_key
+from backend.people.errors import NoSuchPerson
+from backend.people.identity import Identity
+from backend.people.records import REMEMBERED, Account, LoginSession, Records, Token
+from backend.people.rights import RIGHTS, Role
+from drivers.errors import NotAllowed
+
+_WRITE_USE = timedelta(minutes=1)
+
+
+class Directory:
+    """Of one station. ``ended`` is called with the id of every session that ends."""
+
+    def __init__(self, now: Callable[[], datetime], ended: Callable[[str], None]) -> None:
+        self._now, self._ended = now, ended
+        self._accounts: dict[int, Account] = {}
+        self._sessions: dict[str, LoginSession] = {}
+        self._written: dict[str, datetime] = {}
+        self._tokens: dict[str, Token] = {}
+        #: Ended here; a read that began before must not bring them back.
+        self._dead: set[str] = set()
+
+    # --- what the gate asks -----------------------------------------------------------
+
+    @property
+    def is_set_up(self) -> bool:
+        """Whether there is an administrator."""
+        return any(a.role is Role.ADMINISTRATOR for a in self._accounts.values())
+
+    def session(self, secret: str) -> tuple[Account, LoginSession, bool] | None:
+        """The session of a cookie, and whether it is still alive; None where there is none."""
+        session = self._sessions.get(digest(secret))
+        account = None if session is None else self._accounts.get(session.account)
+        if session is None or account is None:
+            return None
+        return account, session, self._now() < session.expires
+
+    def owner(self, session_id: str) -> Account:
+        """The account of a session.
+
+        Raises:
+            NoSuchPerson: there is no such session.
+        """
+        session = self._sessions.get(session_id)
+        if session is None:
+            raise NoSuchPerson("there is no such session", value=session_id)
+        return self.account(session.account)
+
+    def expires(self, session_id: str) -> datetime | None:
+        """When a session or token ends; None where there is none."""
+        known = self._sessions.get(session_id) or self._tokens.get(session_id)
+        return None if known is None else known.expires
+
+    def is_remembered(self, session: LoginSession) -> bool:
+        """Whether it is alive, or ended so lately that its page may not know."""
+        return self._now() < session.expires + REMEMBERED
+
+    def touch(self, session_id: str) -> None:
+        """A person did something with this session."""
+        if (session := self._sessions.get(session_id)) is not None:
+            self._sessions[session_id] = replace(session, used=self._now())
+
+    def renewed(self, identity: Identity) -> Identity | None:
+        """The same person with the role of this moment, or None when the session is over."""
+        now = self._now()
+        session, token = self._sessions.get(identity.session), self._tokens.get(identity.session)
+        known = session or token
+        account = None if known is None else self._accounts.get(known.account)
+        if known is None or account is None or now >= known.expires:
+            return None
+        rights = RIGHTS[account.role] if token is None else RIGHTS[account.role] & token.scopes
+        return replace(identity, role=account.role, rights=rights)
+
+    def token(self, secret: str) -> tuple[Account, Token] | None:
+        """The owner and the token, or None where it is unknown or has expired."""
+        token = self._tokens.get(digest(secret))
+        account = None if token is None else self._accounts.get(token.account)
+        if token is None or account is None or self._now() >= token.expires:
+            return None
+        return account, token
+
+    # --- who and what there is --------------------------------------------------------
+
+    def all(self) -> list[Account]:
+        """Accounts by name."""
+        return sorted(self._accounts.values(), key=lambda a: name_key(a.name))
+
+    def account(self, account_id: int) -> Account:
+        """The account of this number.
+
+        Raises:
+            NoSuchPerson: there is none.
+        """
+        account = self._accounts.get(account_id)
+        if account is None:
+            raise NoSuchPerson("there is no such account", value=account_id)
+        return account
+
+    def find(self, name: str) -> Account | None:
+        """The account of this name, however it is spelled; None where there is none."""
+        key = name_key(name.strip())
+        return next((a for a in self._accounts.values() if name_key(a.name) == key), None)
+
+    def require_another_administrator(self, account: Account) -> None:
+        """Somebody administers besides this one.
+
+        Raises:
+            NotAllowed: nobody would.
+        """
+        others = [
+            a
+            for a in self._accounts.values()
+            if a.role is Role.ADMINISTRATOR and a.id != account.id
+        ]
+        if account.role is Role.ADMINISTRATOR and not others:
+            raise NotAllowed(
+                f"{account.name} is the only administrator",
+                value=account.name,
+                remedy="make another account administrator first",
+            )
+
+    def sessions(self, account_id: int | None = None) -> list[LoginSession]:
+        """Living sessions, newest first; of one account where given."""
+        now = self._now()
+        found = [
+            s
+            for s in self._sessions.values()
+            if account_id in (None, s.account) and now < s.expires
+        ]
+        return sorted(found, key=lambda s: s.created, reverse=True)
+
+    def tokens(self, account_id: int | None = None) -> list[Token]:
+        """Tokens, newest first; of one account where given."""
+        found = [t for t in self._tokens.values() if account_id in (None, t.account)]
+        return sorted(found, key=lambda t: t.created, reverse=True)
+
+    # --- what has changed -------------------------------------------------------------
+
+    def put(self, account: Account) -> None:
+        """An account that is new or has changed."""
+        self._accounts[account.id] = account
+
+    def begin(self, session: LoginSession) -> None:
+        """A log-in that is written down."""
+        self._sessions[session.id] = session
+        self._written[session.id] = session.used
+
+    def put_token(self, token: Token) -> None:
+        """A new token."""
+        self._tokens[token.id] = token
+
+    def forget(self, session: str) -> None:
+        """A session or token is over."""
+        known = self._sessions.pop(session, None) or self._tokens.pop(session, None)
+        self._written.pop(session, None)
+        self._dead.add(session)
+        if known is not None:
+            self._ended(session)
+
+    def drop_account(self, account_id: int) -> None:
+        """Forget an account with its sessions and tokens."""
+        self._accounts.pop(account_id, None)
+        gone = [s.id for s in self._sessions.values() if s.account == account_id]
+        gone += [t.id for t in self._tokens.values() if t.account == account_id]
+        for each in gone:
+            self.forget(each)
+
+    # --- the database -----------------------------------------------------------------
+
+    def unwritten(self) -> list[LoginSession]:
+        """Sessions that were used for a minute or longer since that was written down."""
+        return [
+            s
+            for s in self._sessions.values()
+            if s.used - self._written.get(s.id, s.created) >= _WRITE_USE
+        ]
+
+    def over(self) -> list[str]:
+        """Ids of the sessions and tokens that nobody needs to know of any more."""
+        now = self._now()
+        sessions = [s.id for s in self._sessions.values() if now >= s.expires + REMEMBERED]
+        return sessions + [t.id for t in self._tokens.values() if now >= t.expires]
+
+    def written(self, used: Iterable[LoginSession]) -> None:
+        """These uses are written down."""
+        self._written |= {s.id: s.used for s in used}
+
+    def take(self, kept: Records) -> None:
+        """What the database holds now; what ended here before it could hold that stays ended."""
+        for account in self._accounts.keys() - kept.accounts.keys():
+            self.drop_account(account)
+        gone = (self._sessions.keys() - kept.sessions.keys()) | (
+            self._tokens.keys() - kept.tokens.keys()
+        )
+        for each in gone:
+            self.forget(each)
+        self._dead &= kept.sessions.keys() | kept.tokens.keys()
+        self._accounts = kept.accounts
+        self._tokens = {k: t for k, t in kept.tokens.items() if k not in self._dead}
+        for key, session in kept.sessions.items():
+            known = self._sessions.get(key)
+            if key not in self._dead and (known is None or known.used < session.used):
+                self._sessions[key] = session
+                self._written[key] = session.used
