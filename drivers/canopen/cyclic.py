@@ -7,14 +7,10 @@ control word of every axis that it has outputs for (`drivers.link.OwnsPowerState
 
 from __future__ import annotations
 
-import array
 import asyncio
-import math
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-
-import numpy as np
 
 from drivers.canopen import frames
 from drivers.canopen.busload import BusLoad
@@ -24,12 +20,13 @@ from drivers.canopen.images import CONTROL_WORD, Images
 from drivers.canopen.pdo import PdoPlan, plan_within_load
 from drivers.canopen.port import CanPort
 from drivers.canopen.synchronous import LoopClock, SyncLoop
+from drivers.canopen.trajectory import motion_of
 from drivers.canopen.url import CanUrl
 from drivers.cia402 import Dialect, Mode, State
-from drivers.errors import DriveError, LinkLost, NotAllowed, OutOfRange
-from drivers.ethercat.playback import AxisLoop, Limits, Motion
+from drivers.errors import DriveError, LinkLost, NotAllowed
+from drivers.ethercat.playback import AxisLoop
 from drivers.link import CyclicSignal, LinkEvent, ScopeBlock, Trajectory, Unsubscribe
-from profiles.schema import INTEGER_RANGE
+from drivers.setpoints import require_fits
 
 SHORTEST_CYCLE_S = 0.001
 _MODE = 0x6060
@@ -205,14 +202,14 @@ class CanopenCyclic:
         Raises:
             NotAllowed: not running or not enabled, a target that is not a mapped output, a jump at
                 the beginning, or an envelope limit whose signal is not among the inputs.
-            OutOfRange: a value does not fit its target.
+            OutOfRange: a value does not fit its target, or offsets are missing.
         """
         loop = self._require_running()
-        motions = [(t.station, _motion(t, loop.cycle_s)) for t in trajectories]
+        for trajectory in trajectories:
+            require_fits(trajectory)
+        motions = [(t.station, motion_of(t, loop.cycle_s)) for t in trajectories]
         for trajectory in trajectories:
             self._require_axis(trajectory.station)
-            if trajectory.target.subindex:
-                raise NotAllowed(f"{trajectory.target} is no setpoint of CiA 402")
             await self._until_seen_enabled(loop, trajectory.station)
         return loop.play(motions)
 
@@ -405,36 +402,3 @@ class CanopenCyclic:
                     remedy="compare the profile with the drive's own dictionary",
                 )
             images.set_output(key, data)
-
-
-def _motion(trajectory: Trajectory, cycle_s: float) -> Motion:
-    envelope = trajectory.envelope
-    for address, values in (
-        (trajectory.target, trajectory.values),
-        (trajectory.offset_target, trajectory.offset_values),
-    ):
-        if address is None or values is None or not len(values):
-            continue
-        low, high = INTEGER_RANGE[address.type]
-        if int(values.min()) < low or int(values.max()) > high:
-            raise OutOfRange(
-                f"the trajectory goes beyond what {address} can hold",
-                parameter=str(address),
-                limit=f"{low}…{high}",
-            )
-    offsets = trajectory.offset_values
-    return Motion(
-        target=trajectory.target.index or 0,
-        values=array.array("q", trajectory.values.tolist()),
-        limits=Limits(
-            envelope.position_min,
-            envelope.position_max,
-            envelope.speed_max,
-            envelope.torque_max,
-            envelope.following_error_max,
-        ),
-        renew_cycles=max(1, math.ceil(trajectory.renew_s / cycle_s)),
-        longest_step=int(np.max(np.abs(np.diff(trajectory.values)), initial=0)),
-        offset=None if trajectory.offset_target is None else trajectory.offset_target.index,
-        offset_values=None if offsets is None else array.array("q", offsets.tolist()),
-    )

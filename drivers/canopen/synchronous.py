@@ -18,7 +18,8 @@ from drivers.canopen.frames import HEARTBEAT, SYNC, Frame
 from drivers.canopen.images import Images, Key
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout
-from drivers.ethercat.playback import AxisLoop, Motion, Phase
+from drivers.ethercat.motion import Motion, Phase
+from drivers.ethercat.playback import AxisLoop
 from drivers.link import LinkEvent, ScopeBlock
 
 _BLOCK_S = 0.025

@@ -16,7 +16,8 @@ from dataclasses import dataclass, field
 
 from drivers.ethercat.gridphase import GridPhase
 from drivers.ethercat.mapping import Entry
-from drivers.ethercat.playback import AxisLoop, Phase
+from drivers.ethercat.motion import Phase
+from drivers.ethercat.playback import AxisLoop
 from drivers.ethercat.ring import RESYNCED, VALID, Ring, lost_flag
 from drivers.ethercat.segment import Segment
 

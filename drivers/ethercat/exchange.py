@@ -12,7 +12,8 @@ from drivers.ethercat import setup as setup_
 from drivers.ethercat.al_status import ERROR_BIT, AlState
 from drivers.ethercat.cyclic import CyclicLoop, Image, layout, percentile_us
 from drivers.ethercat.lanes import Done, Lanes
-from drivers.ethercat.playback import AxisLoop, Limits, Motion
+from drivers.ethercat.motion import Limits, Motion
+from drivers.ethercat.playback import AxisLoop
 from drivers.ethercat.preparation import Preparation, Report
 from drivers.ethercat.protocol import Message
 from drivers.ethercat.ring import Ring

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from drivers.codec import size_of
 from drivers.errors import NotAllowed
 from drivers.link import Address, CyclicSignal
+from drivers.setpoints import TARGETS
 from profiles.schema import DataType, PdoSet, PdoSpec, Profile
 
 CONTROL_WORD = Address(0x6040, 0, "UINT16")
 STATUS_WORD = Address(0x6041, 0, "UINT16")
 POSITION_ACTUAL = Address(0x6064, 0, "INT32")
-TARGETS = {0x607A: "position", 0x60FF: "velocity", 0x6071: "torque"}
 
 #: For a drive without a profile: what every CiA 402 drive known to us can take.
 _GENERIC_ENTRIES, _GENERIC_RX, _GENERIC_TX = 8, 0x1600, 0x1A00

@@ -11,23 +11,32 @@ could not follow the ramp is handed to the drive's quick stop too: without power
 
 from __future__ import annotations
 
-import array
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from enum import Enum
 
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
+from drivers.ethercat.motion import (
+    ACTUAL_POSITION,
+    ACTUAL_TORQUE,
+    ACTUAL_VELOCITY,
+    CONTROL,
+    FOLLOWING,
+    MODE,
+    MODE_OF,
+    MODE_SHOWN,
+    OFFSETS,
+    POSITION,
+    STATUS,
+    TORQUE,
+    VELOCITY,
+    Motion,
+    Phase,
+)
 
 STOP_S = 0.1
 """From any speed to standstill; shorter than the 200 ms in which a lost setpoint must end."""
 
-_CONTROL, _MODE, _POSITION, _VELOCITY, _TORQUE = 0x6040, 0x6060, 0x607A, 0x60FF, 0x6071
-_OFFSETS = (0x60B0, 0x60B1, 0x60B2)
-_STATUS, _MODE_SHOWN = 0x6041, 0x6061
-_ACTUAL_POSITION, _ACTUAL_VELOCITY, _ACTUAL_TORQUE, _FOLLOWING = 0x6064, 0x606C, 0x6077, 0x60F4
-_MODE_OF = {_POSITION: cia402.Mode.CSP, _VELOCITY: cia402.Mode.CSV, _TORQUE: cia402.Mode.CST}
 _RESTLESS = 2
 """Increments per cycle that encoder noise may make of an axis at rest."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
@@ -36,40 +45,6 @@ _STALE_CYCLES = 3
 """Samples that may be older than what a mailbox told before an axis was enabled anew."""
 _REST_S, _GIVE_UP = 0.05, 30
 """An axis rests after so long without motion; after so many times as long nobody waits for it."""
-
-
-class Phase(Enum):
-    """What the setpoints of an axis do."""
-
-    IDLE = "idle"
-    PLAYING = "playing"
-    HOLDING = "holding the last setpoint"
-    BRAKING = "braking"
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """The envelope in raw drive units; None means no limit of that kind."""
-
-    position_min: float | None = None
-    position_max: float | None = None
-    speed_max: float | None = None
-    torque_max: float | None = None
-    following_error_max: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """One value per cycle for one target, and the same for one offset."""
-
-    target: int
-    values: array.array[int]
-    limits: Limits
-    renew_cycles: int
-    longest_step: int
-    """Largest change between two values, found by the server: the loop has no time for it."""
-    offset: int | None = None
-    offset_values: array.array[int] | None = None
 
 
 class AxisLoop:
@@ -111,7 +86,7 @@ class AxisLoop:
         self._speed = 0.0
         self._brake_step = 0.0
         self._brake_left = 0
-        self._brake_target = _POSITION
+        self._brake_target = POSITION
         self._after_brake = State.READY
         self._after_quick_stop = State.READY
         self._was_enabled = False
@@ -129,7 +104,7 @@ class AxisLoop:
         Raises:
             NotAllowed: the control word is not in the process data, or the axis is in a fault.
         """
-        if _CONTROL not in self._out:
+        if CONTROL not in self._out:
             raise NotAllowed(f"station {self.station}: the control word is not in the cyclic data")
         if goal is State.OPERATION_ENABLED:
             if self.goal is not State.OPERATION_ENABLED:
@@ -151,8 +126,8 @@ class AxisLoop:
                 f"station {self.station} moves: its mode cannot be changed now",
                 remedy="disable the axis and wait until it stands",
             )
-        if mode is not None and _MODE in self._out:
-            self.outputs[self._out[_MODE]] = self._dialect.mode(mode)
+        if mode is not None and MODE in self._out:
+            self.outputs[self._out[MODE]] = self._dialect.mode(mode)
         if (
             goal is not State.OPERATION_ENABLED
             and goal is not State.QUICK_STOP_ACTIVE
@@ -199,18 +174,18 @@ class AxisLoop:
         self._report(self.station, why)
         motion, self._motion = self._motion, None
         self._clear_offsets()
-        if motion is not None and motion.target == _TORQUE:
-            self._set(_TORQUE, 0)
+        if motion is not None and motion.target == TORQUE:
+            self._set(TORQUE, 0)
             self.phase, self._brake_left = Phase.IDLE, 0
-            self._brake_target = _TORQUE
+            self._brake_target = TORQUE
             self.goal = State.QUICK_STOP_ACTIVE
             self._after_quick_stop = goal
             return
-        self._brake_target = motion.target if motion is not None else _POSITION
+        self._brake_target = motion.target if motion is not None else POSITION
         self.phase = Phase.BRAKING
         self._moved_at_stop = self._moved
         self._brake_left = self._stop_cycles
-        start = self._speed if self._brake_target == _POSITION else self._setpoint
+        start = self._speed if self._brake_target == POSITION else self._setpoint
         self._brake_step = start / self._stop_cycles
         self._after_brake = goal
 
@@ -218,15 +193,15 @@ class AxisLoop:
 
     def step(self, values: Sequence[int]) -> None:
         """Outputs of the next cycle from the inputs of this one, which must be valid."""
-        place = self._in.get(_MODE_SHOWN)
+        place = self._in.get(MODE_SHOWN)
         if place is not None:
             self._mode = values[place]
-        place = self._in.get(_STATUS)
+        place = self._in.get(STATUS)
         if place is not None:
             self.state = cia402.decode_state(
                 values[place], echoes_control=self._dialect.echoes_control
             )
-        place = self._in.get(_ACTUAL_POSITION)
+        place = self._in.get(ACTUAL_POSITION)
         if place is not None:
             position = values[place]
             self._moved = 0 if self._last_position is None else abs(position - self._last_position)
@@ -239,7 +214,7 @@ class AxisLoop:
         if self.phase in (Phase.PLAYING, Phase.HOLDING):
             self._guard(values)
         self._setpoints(values, enabled=enabled)
-        if _CONTROL in self._out:
+        if CONTROL in self._out:
             self._control()
 
     def blind(self) -> None:
@@ -250,10 +225,10 @@ class AxisLoop:
         """
         if self.phase is not Phase.IDLE:
             self._advance()
-        elif self.goal not in (None, State.OPERATION_ENABLED) and _CONTROL in self._out:
-            word = self.outputs[self._out[_CONTROL]]
+        elif self.goal not in (None, State.OPERATION_ENABLED) and CONTROL in self._out:
+            word = self.outputs[self._out[CONTROL]]
             if word & cia402.ENABLE_OPERATION == cia402.ENABLE_OPERATION:
-                self.outputs[self._out[_CONTROL]] = self._dialect.quick_stop
+                self.outputs[self._out[CONTROL]] = self._dialect.quick_stop
 
     def _fell_out(self) -> None:
         if self.goal is State.OPERATION_ENABLED:
@@ -273,7 +248,7 @@ class AxisLoop:
             self.stop("the setpoints were not renewed in time: the axis is braked and disabled")
             return
         limits = self._motion.limits
-        position = self._value(values, _ACTUAL_POSITION)
+        position = self._value(values, ACTUAL_POSITION)
         if position is not None:
             if limits.position_min is not None and position < limits.position_min:
                 self.stop(_beyond("position", position, limits.position_min))
@@ -282,8 +257,8 @@ class AxisLoop:
                 self.stop(_beyond("position", position, limits.position_max))
                 return
         for name, index, limit in (
-            ("speed", _ACTUAL_VELOCITY, limits.speed_max),
-            ("torque", _ACTUAL_TORQUE, limits.torque_max),
+            ("speed", ACTUAL_VELOCITY, limits.speed_max),
+            ("torque", ACTUAL_TORQUE, limits.torque_max),
         ):
             value = self._value(values, index)
             if limit is not None and value is not None and abs(value) > limit:
@@ -302,28 +277,28 @@ class AxisLoop:
         Else its loop would push on, and with more and more torque, for as long as it brakes.
         """
         assert self._motion is not None
-        actual = self._value(values, _ACTUAL_VELOCITY)
-        if actual is not None and self._motion.target == _VELOCITY:
+        actual = self._value(values, ACTUAL_VELOCITY)
+        if actual is not None and self._motion.target == VELOCITY:
             low, high = sorted((0.0, float(self._setpoint)))
             self._setpoint = min(max(actual, low), high)
 
     def _following_error(self, values: Sequence[int]) -> float:
-        told = self._value(values, _FOLLOWING)
+        told = self._value(values, FOLLOWING)
         if told is not None:
             return told
-        actual = self._value(values, _ACTUAL_POSITION)
-        moving = self._motion is not None and self._motion.target == _POSITION
+        actual = self._value(values, ACTUAL_POSITION)
+        moving = self._motion is not None and self._motion.target == POSITION
         return self._setpoint - actual if moving and actual is not None else 0.0
 
     def _setpoints(self, values: Sequence[int], *, enabled: bool) -> None:
         if self.phase is Phase.IDLE:
             if not enabled:
                 # Enabling must never move: the setpoint waits where the axis is.
-                actual = self._value(values, _ACTUAL_POSITION)
+                actual = self._value(values, ACTUAL_POSITION)
                 if actual is not None:
-                    self._set(_POSITION, round(actual))
-                self._set(_VELOCITY, 0)
-                self._set(_TORQUE, 0)
+                    self._set(POSITION, round(actual))
+                self._set(VELOCITY, 0)
+                self._set(TORQUE, 0)
                 self._clear_offsets()
             self._speed = 0.0
             return
@@ -338,7 +313,7 @@ class AxisLoop:
             return
         if self._place < len(motion.values):
             value = motion.values[self._place]
-            self._speed = value - self._setpoint if self._place or motion.target == _POSITION else 0
+            self._speed = value - self._setpoint if self._place or motion.target == POSITION else 0
             self._setpoint = value
             self._set(motion.target, value)
             if motion.offset is not None and motion.offset_values is not None:
@@ -351,11 +326,11 @@ class AxisLoop:
 
     def _brake(self) -> None:
         self._brake_left -= 1
-        if self._brake_target == _POSITION:
+        if self._brake_target == POSITION:
             self._speed -= self._brake_step
             if self._brake_left > 0:
                 self._setpoint += self._speed
-            self._set(_POSITION, round(self._setpoint))
+            self._set(POSITION, round(self._setpoint))
         else:
             self._setpoint = self._setpoint - self._brake_step if self._brake_left > 0 else 0.0
             self._set(self._brake_target, round(self._setpoint))
@@ -368,7 +343,7 @@ class AxisLoop:
                 self._after_quick_stop = self._after_brake
 
     def _control(self) -> None:
-        place = self._out[_CONTROL]
+        place = self._out[CONTROL]
         if self.goal is None:
             return
         if self.state in (State.FAULT, State.FAULT_REACTION) and not self._reset:
@@ -415,56 +390,29 @@ class AxisLoop:
     def check(self, motion: Motion) -> None:
         """Raise `NotAllowed` if this motion cannot begin in the next cycle."""
         where = f"station {self.station}"
-        for index in (motion.target, motion.offset):
-            if index is not None and index not in self._out:
-                raise NotAllowed(
-                    f"{where}: {index:04X}h is not in the cyclic data",
-                    remedy="configure the cyclic data with this target",
-                )
+        motion.require_mapped(self._out, where)
         if self.state is not State.OPERATION_ENABLED or self.goal is not State.OPERATION_ENABLED:
             raise NotAllowed(
                 f"{where} is in {self.state.value!r}, a motion needs 'Operation enabled'",
                 remedy=self.halted or "enable the axis first",
             )
-        wanted = cia402.Mode(self._dialect.mode(_MODE_OF[motion.target]))
+        wanted = cia402.Mode(self._dialect.mode(MODE_OF[motion.target]))
         if self._mode is not None and self._mode != wanted:
             raise NotAllowed(
                 f"{where} is in mode {self._mode}, this setpoint needs mode {int(wanted)}"
                 f" ({cia402.MODE_NAMES[wanted]})",
                 remedy="choose the mode when enabling the axis",
             )
-        for name, index, limit in (
-            ("travel", _ACTUAL_POSITION, motion.limits.position_min),
-            ("travel", _ACTUAL_POSITION, motion.limits.position_max),
-            ("speed", _ACTUAL_VELOCITY, motion.limits.speed_max),
-            ("torque", _ACTUAL_TORQUE, motion.limits.torque_max),
-        ):
-            if limit is not None and index not in self._in:
-                raise NotAllowed(
-                    f"{where}: the {name} limit cannot be watched, {index:04X}h is not mapped",
-                    remedy=f"configure the cyclic data with {index:04X}h",
-                )
+        motion.limits.require_watched(self._in, where)
         if self.phase is Phase.BRAKING:
             raise NotAllowed(f"{where} is braking: {self.halted}", remedy="wait until it stands")
         if not len(motion.values):
             raise NotAllowed(f"{where}: a trajectory without values")
-        if motion.target == _POSITION:
-            self._check_jump(motion, where)
-
-    def _check_jump(self, motion: Motion, where: str) -> None:
-        """The first position may be no further away than the longest step that follows."""
-        now = self.setpoint_now(_POSITION)
-        assert now is not None
-        self._setpoint = now
-        first = motion.values[0]
-        longest = max(motion.longest_step, abs(round(self._speed)), 1)
-        if abs(first - now) > longest:
-            raise NotAllowed(
-                f"{where}: the trajectory begins at {first}, the axis is held at {now}",
-                value=first,
-                limit=f"{longest} per cycle",
-                remedy="begin where the axis stands",
-            )
+        if motion.target == POSITION:
+            now = self.setpoint_now(POSITION)
+            assert now is not None
+            self._setpoint = now
+            motion.require_near(now, self._speed, where)
 
     def _value(self, values: Sequence[int], index: int) -> float | None:
         place = self._in.get(index)
@@ -476,7 +424,7 @@ class AxisLoop:
             self.outputs[place] = value
 
     def _clear_offsets(self) -> None:
-        for index in _OFFSETS:
+        for index in OFFSETS:
             self._set(index, 0)
 
 

@@ -15,7 +15,7 @@ from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
 from drivers.ethercat.hostprocess import HostProcess
 from drivers.ethercat.mapping import Pdo, StationPlan, plan_station
-from drivers.ethercat.playback import Phase
+from drivers.ethercat.motion import Phase
 from drivers.ethercat.protocol import Message
 from drivers.ethercat.recovery import Recovery
 from drivers.ethercat.ring import VALID, RingReader, lost_flag

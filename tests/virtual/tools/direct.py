@@ -28,7 +28,8 @@ from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat.cyclic import layout, places
 from drivers.ethercat.mapping import Pdo, plan_station
-from drivers.ethercat.playback import AxisLoop, Limits, Motion
+from drivers.ethercat.motion import Limits, Motion
+from drivers.ethercat.playback import AxisLoop
 from drivers.ethercat.setup import interpolation_period
 from drivers.link import (
     Address,

@@ -182,8 +182,13 @@ async def test_what_cannot_be_played_is_refused(link: CanopenLink) -> None:
         await _cyclic(link).play([Trajectory(5, TARGET.address, zeros, Envelope(torque_max=100))])
     with pytest.raises(NotAllowed, match="not in the cyclic data"):
         await _cyclic(link).play([Trajectory(5, SPEED_TARGET.address, zeros, Envelope())])
-    with pytest.raises(OutOfRange, match="beyond what 607A:00 can hold"):
+    with pytest.raises(OutOfRange, match="607A:00 holds"):
         await _cyclic(link).play([Trajectory(5, TARGET.address, zeros + 2**31, Envelope())])
+    offset = Address(0x60B2, 0, "INT16")
+    with pytest.raises(OutOfRange, match="differ in number"):
+        await _cyclic(link).play(
+            [Trajectory(5, TARGET.address, zeros, Envelope(), offset, zeros[:2])]
+        )
 
 
 async def test_halt_brakes_and_leaves_operation(bench: Bench, link: CanopenLink) -> None:

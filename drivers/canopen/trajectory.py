@@ -1,0 +1,31 @@
+"""Trajectories as the loop plays them."""
+
+from __future__ import annotations
+
+import array
+import math
+
+from drivers.ethercat.motion import Limits, Motion
+from drivers.link import Trajectory
+from drivers.setpoints import longest_step
+
+
+def motion_of(trajectory: Trajectory, cycle_s: float) -> Motion:
+    """A trajectory whose values fit (`drivers.setpoints.require_fits`), in cycles of the loop."""
+    envelope = trajectory.envelope
+    offsets = trajectory.offset_values
+    return Motion(
+        target=trajectory.target.index or 0,
+        values=array.array("q", trajectory.values.tolist()),
+        limits=Limits(
+            envelope.position_min,
+            envelope.position_max,
+            envelope.speed_max,
+            envelope.torque_max,
+            envelope.following_error_max,
+        ),
+        renew_cycles=max(1, math.ceil(trajectory.renew_s / cycle_s)),
+        longest_step=longest_step(trajectory),
+        offset=None if trajectory.offset_target is None else trajectory.offset_target.index,
+        offset_values=None if offsets is None else array.array("q", offsets.tolist()),
+    )

@@ -1,0 +1,101 @@
+"""A motion as the cyclic loop plays it: setpoints cycle by cycle within an envelope."""
+
+from __future__ import annotations
+
+import array
+from collections.abc import Container
+from dataclasses import dataclass
+from enum import Enum
+
+from drivers import cia402
+from drivers.errors import NotAllowed
+
+#: The objects of CiA 402-2 that a motion commands and watches.
+CONTROL, MODE, POSITION, VELOCITY, TORQUE = 0x6040, 0x6060, 0x607A, 0x60FF, 0x6071
+OFFSETS = (0x60B0, 0x60B1, 0x60B2)
+STATUS, MODE_SHOWN = 0x6041, 0x6061
+ACTUAL_POSITION, ACTUAL_VELOCITY, ACTUAL_TORQUE, FOLLOWING = 0x6064, 0x606C, 0x6077, 0x60F4
+MODE_OF = {POSITION: cia402.Mode.CSP, VELOCITY: cia402.Mode.CSV, TORQUE: cia402.Mode.CST}
+
+
+class Phase(Enum):
+    """What the setpoints of an axis do."""
+
+    IDLE = "idle"
+    PLAYING = "playing"
+    HOLDING = "holding the last setpoint"
+    BRAKING = "braking"
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """The envelope in raw drive units; None means no limit of that kind."""
+
+    position_min: float | None = None
+    position_max: float | None = None
+    speed_max: float | None = None
+    torque_max: float | None = None
+    following_error_max: float | None = None
+
+    def require_watched(self, inputs: Container[int], where: str) -> None:
+        """Every limit has its value among these objects of the cyclic data.
+
+        Raises:
+            NotAllowed: one has not.
+        """
+        for name, index, limit in (
+            ("travel", ACTUAL_POSITION, self.position_min),
+            ("travel", ACTUAL_POSITION, self.position_max),
+            ("speed", ACTUAL_VELOCITY, self.speed_max),
+            ("torque", ACTUAL_TORQUE, self.torque_max),
+        ):
+            if limit is not None and index not in inputs:
+                raise NotAllowed(
+                    f"{where}: the {name} limit cannot be watched, {index:04X}h is not mapped",
+                    remedy=f"configure the cyclic data with {index:04X}h",
+                )
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """One value per cycle for one target, and the same for one offset."""
+
+    target: int
+    values: array.array[int]
+    limits: Limits
+    renew_cycles: int
+    longest_step: int
+    """Largest change between two values, found by the server: the loop has no time for it."""
+    offset: int | None = None
+    offset_values: array.array[int] | None = None
+
+    def require_mapped(self, outputs: Container[int], where: str) -> None:
+        """Target and offset are among these objects of the cyclic data.
+
+        Raises:
+            NotAllowed: one is not.
+        """
+        for index in (self.target, self.offset):
+            if index is not None and index not in outputs:
+                raise NotAllowed(
+                    f"{where}: {index:04X}h is not in the cyclic data",
+                    remedy="configure the cyclic data with this target",
+                )
+
+    def require_near(self, now: int, speed: float, where: str) -> None:
+        """The first position is no further away than the longest step that follows.
+
+        ``now`` is the setpoint [increments] and ``speed`` its change in the last cycle.
+
+        Raises:
+            NotAllowed: it is: the axis would jump.
+        """
+        first = self.values[0]
+        longest = max(self.longest_step, abs(round(speed)), 1)
+        if abs(first - now) > longest:
+            raise NotAllowed(
+                f"{where}: the trajectory begins at {first}, the axis is held at {now}",
+                value=first,
+                limit=f"{longest} per cycle",
+                remedy="begin where the axis stands",
+            )
