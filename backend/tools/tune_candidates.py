@@ -29,6 +29,13 @@ _SEEN, _NARROWINGS = 0.23, 4
 _COHERENT = 0.8
 
 
+_UNMET: dict[LoadClass, str] = {
+    "stiff": "no design meets the goals for a stiff load",
+    "medium": "no design meets the goals for a medium load",
+    "compliant": "no design meets the goals for a compliant load",
+}
+
+
 @dataclass(frozen=True)
 class Design:
     """All candidates, fastest first; ``caution`` says why they are careful, empty where not."""
@@ -111,7 +118,7 @@ def design_for(
         )
         if table:
             return Design(load, table)
-        caution = f"no design meets the goals for a {load} load"
+        caution = _UNMET[load]
     return cautious_design(drive, facts, mechanics, inertia_kgm2, sample_rate_hz, caution)
 
 

@@ -218,7 +218,7 @@ class Trials:
         else:
             if verified.kept:
                 return Applied(candidate, verified, {})
-            self.tried.append(f"as it was, {verified.why}")
+            self.tried.append(f"as it was: {verified.why}")
         self.had_failed = True
         return None
 

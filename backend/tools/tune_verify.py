@@ -115,7 +115,7 @@ async def verify(
         missed = worse_than(promised, sharp_margins(more))
         swept, read = _joined(swept, read, more)
     measured = _width_of(read)
-    why = _named(candidate, ", ".join(missed))
+    why = _named(candidate, "; ".join(missed))
     step: step_tool.StepResult | None = None
     only_hums = False
     if not why:
@@ -124,7 +124,7 @@ async def verify(
         )
         restless_why = "" if read else restless(step)
         words = [hum(step), restless_why]
-        why = _named(candidate, ", ".join(word for word in words if word))
+        why = _named(candidate, "; ".join(word for word in words if word))
         only_hums = bool(words[0]) and not restless_why
     swept = replace(swept, margins=read)
     return Verified(

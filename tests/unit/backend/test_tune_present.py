@@ -75,7 +75,7 @@ async def test_without_margins_the_design_comes_back(monkeypatch: pytest.MonkeyP
     applied, held, tried, note = await outcome(monkeypatch, measured_hz=90.0, as_it_was_keeps=False)
     assert (applied.candidate.gains.speed_nms, applied.before) == (2.0, WAS)
     assert held == NEW
-    assert tried == ["as it was, phase margin"]
+    assert tried == ["as it was: phase margin"]
     assert "with 29% of the speed gain" in note
     assert "did not keep the promise" in note
 

@@ -9,6 +9,7 @@ import { parameters } from './texts/parameters'
 import { people } from './texts/people'
 import { recordings } from './texts/recordings'
 import { saidTexts } from './texts/said'
+import { saidOfTuning } from './texts/said-tuning'
 import { scene } from './texts/scene'
 import { scope } from './texts/scope'
 import { segment } from './texts/segment'
@@ -28,6 +29,7 @@ export const catalogue = {
   ...library,
   ...notListed,
   ...saidTexts,
+  ...saidOfTuning,
   ...scene,
   ...scope,
   ...segment,

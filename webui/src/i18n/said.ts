@@ -13,22 +13,35 @@ function under(prefix: string): [Key, string][] {
     .map(([key, [english]]) => [key as Key, english])
 }
 
+/** What is put in ends where the next sentence begins. */
 function patternOf(english: string): RegExp {
   const quoted = english.replace(/[.*+?^$()|[\]\\]/g, '\\$&')
-  return new RegExp(`^${quoted.replace(/\{(\w+)\}/g, '(?<$1>.+?)')}$`, 'u')
+  return new RegExp(`^${quoted.replace(/\{(\w+)\}/g, '(?<$1>(?:(?!: |; ).)+?)')}$`, 'u')
 }
 
+/** How the server strings sentences together, and how Chinese does; the outermost first. */
+const JOINTS = [
+  ['\n', '\n'],
+  ['; ', '；'],
+  [': ', '：'],
+] as const
+
 /**
- * What the server says of a job, in the language of the page. Parts between colons are sentences
- * of their own; what is not known, such as the name of an axis, passes as it is.
+ * What the server says, in the language of the page. Lines, and parts between semicolons and
+ * colons, are sentences of their own; what is not known, such as the name of an axis, passes as it
+ * is.
  */
 export function said(t: T, text: string): string {
   for (const { key, pattern } of PATTERNS) {
     const found = pattern.exec(text)
     if (found) return t(key, { ...found.groups })
   }
-  const colon = text.indexOf(': ')
-  if (colon < 0) return text
-  const first = said(t, text.slice(0, colon))
-  return first + (/\p{Script=Han}/u.test(first) ? '：' : ': ') + said(t, text.slice(colon + 2))
+  for (const [joint, chinese] of JOINTS) {
+    const at = text.indexOf(joint)
+    if (at < 0) continue
+    const first = said(t, text.slice(0, at))
+    const rest = said(t, text.slice(at + joint.length))
+    return first + (/\p{Script=Han}/u.test(first) ? chinese : joint) + rest
+  }
+  return text
 }

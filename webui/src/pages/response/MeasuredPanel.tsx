@@ -2,6 +2,7 @@ import { SegmentedControl } from '@mantine/core'
 import { useEffect, useMemo, useState } from 'react'
 import type { MeasurementContent, NotchPreviewInfo } from '../../api/schema'
 import { useT } from '../../i18n'
+import { said } from '../../i18n/said'
 import { Panel } from '../../widgets/Panel'
 import { TRACE_COLORS } from '../scope/channels'
 import { type Curve, filtered, measuredCurve, notchFor } from './bode'
@@ -77,7 +78,7 @@ export function MeasuredPanel({
     >
       {sweep.warnings.map((each) => (
         <p key={each} className="note warn">
-          {each}
+          {said(t, each)}
         </p>
       ))}
       {!mechanics && (

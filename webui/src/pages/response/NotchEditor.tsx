@@ -2,6 +2,7 @@ import { Button, Checkbox, Modal } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import { useT } from '../../i18n'
+import { said } from '../../i18n/said'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -24,10 +25,10 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
     // A family without notches is no fault of anything.
     return notches.problem ? (
       <Panel title={t('notch.title')}>
-        <p className="dim">{notches.problem.detail}</p>
+        <p className="dim">{said(t, notches.problem.detail)}</p>
         {notches.problem.remedy && (
           <p className="dim">
-            {t('problem.try')} {notches.problem.remedy}
+            {t('problem.try')} {said(t, notches.problem.remedy)}
           </p>
         )}
       </Panel>
@@ -108,7 +109,9 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
                   {!made.realised.stable && ` ${t('notch.unstable')}`}
                 </p>
               )}
-              {(made?.note || slot.note) && <p className="dim">{made?.note || slot.note}</p>}
+              {(made?.note || slot.note) && (
+                <p className="dim">{said(t, made?.note || slot.note)}</p>
+              )}
             </li>
           )
         })}

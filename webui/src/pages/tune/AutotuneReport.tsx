@@ -2,6 +2,7 @@ import { Button, useComputedColorScheme } from '@mantine/core'
 import { useMemo, useState } from 'react'
 import { api, ask } from '../../api/client'
 import { known, useT } from '../../i18n'
+import { said } from '../../i18n/said'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { hertz, measuredCurve } from '../response/bode'
@@ -75,7 +76,7 @@ export function AutotuneReport({
         <div className="note warn">
           <ul>
             {result.notes?.map((each) => (
-              <li key={each}>{each}</li>
+              <li key={each}>{said(t, each)}</li>
             ))}
           </ul>
         </div>
@@ -85,7 +86,7 @@ export function AutotuneReport({
           {t('autotune.tried')}
           <ul>
             {result.tried.map((each) => (
-              <li key={each}>{each}</li>
+              <li key={each}>{said(t, each)}</li>
             ))}
           </ul>
         </div>

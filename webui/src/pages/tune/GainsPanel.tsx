@@ -4,6 +4,7 @@ import { api, ask } from '../../api/client'
 import type { GainWrite } from '../../api/schema'
 import { href } from '../../app/router'
 import { useT } from '../../i18n'
+import { said } from '../../i18n/said'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
@@ -46,10 +47,10 @@ export function GainsPanel({
   if (!gains) {
     return of.problem ? (
       <Panel title={t('gains.title')}>
-        <p className="dim">{of.problem.detail}</p>
+        <p className="dim">{said(t, of.problem.detail)}</p>
         {of.problem.remedy && (
           <p className="dim">
-            {t('problem.try')} {of.problem.remedy}
+            {t('problem.try')} {said(t, of.problem.remedy)}
           </p>
         )}
       </Panel>

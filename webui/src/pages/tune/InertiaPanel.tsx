@@ -2,6 +2,7 @@ import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AxisState } from '../../api/schema'
 import { useT } from '../../i18n'
+import { said } from '../../i18n/said'
 import { setJob } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
 import { NumberField } from '../../widgets/NumberField'
@@ -147,7 +148,7 @@ export function InertiaResult({ result }: { result: Inertia }) {
     <>
       <p className={`note ${result.identifiable ? 'good' : 'warn'}`}>
         <strong>{t(result.identifiable ? 'inertia.sure' : 'inertia.unsure')}</strong>{' '}
-        {result.verdict !== 'ok' && result.verdict}
+        {result.verdict !== 'ok' && said(t, result.verdict)}
       </p>
       <div className="scroll-table">
         <table className="told-values" aria-label={t('inertia.title')}>
@@ -174,7 +175,7 @@ export function InertiaResult({ result }: { result: Inertia }) {
         {!si && `${t('inertia.perRated')} `}
         {t('inertia.fit', { r2: fixed(result.r2, 4) })}
         {result.load_ratio_against &&
-          ` ${t('inertia.against', { what: result.load_ratio_against })}`}
+          ` ${t('inertia.against', { what: said(t, result.load_ratio_against) })}`}
         {beside.map(({ help }) => ` ${t(help)}`)}
       </p>
     </>

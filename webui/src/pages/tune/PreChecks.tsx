@@ -1,6 +1,7 @@
 import { Button } from '@mantine/core'
 import type { Bus, DriveSummary } from '../../api/schema'
 import { useT } from '../../i18n'
+import { said } from '../../i18n/said'
 import * as live from '../../live/live'
 import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
@@ -40,7 +41,7 @@ export function PreChecks({
             </span>
             <span className="grow">
               {t(check.ok ? `tune.ok.${check.name}` : `tune.no.${check.name}`, { ms: cycleMs })}
-              {!check.ok && check.detail && <strong> {check.detail}</strong>}
+              {!check.ok && check.detail && <strong> {said(t, check.detail)}</strong>}
             </span>
             {!check.ok && check.name === 'faults' && (
               <a href={`#/axis/${encodeURIComponent(drive.id)}/alarms`}>{t('page.alarms')}</a>
