@@ -124,7 +124,7 @@ def distortion(
     highest = f >= _HIGHEST * path.sample_rate_hz
     if not _stands_out(rest, noise, upper, _ABOVE_NOISE):
         if not _stands_out(rest, noise, highest, _FAR_ABOVE_NOISE):
-            return Distortion(np.asarray(np.interp(frf.frequency_hz, f, share)))
+            return none
         upper = highest
     return Distortion(
         # What lies below the first empty bins is told by all of them, not by one beside a valley.

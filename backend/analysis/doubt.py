@@ -46,15 +46,19 @@ class Doubt:
 
 
 def doubt(
-    problem: Problem, x: FloatArray, shifted: Sequence[Shifted], path_covariance: FloatArray
-) -> Doubt:
-    """Joint doubt at a solution ``x``; ``path_covariance`` [n, n] is known of the n shifts."""
+    problem: Problem, x: FloatArray, shifted: Sequence[Shifted], path_covariance: FloatArray,
+    moved: FloatArray,
+) -> Doubt:  # fmt: skip
+    """Joint doubt at a solution ``x``; ``path_covariance`` [n, n] is known of the n shifts.
+
+    ``moved`` [n] is how far the path already is from where the torque alone would have it.
+    """
     residuals, jacobian = problem.misfit(x)
     root = robust_rows(residuals)
     values, gradients = problem.logs(x)
-    moved = [_moved(problem, x, values, shift) for shift in shifted]
-    rows = np.zeros((residuals.size, len(moved)))
-    for number, by_view in enumerate(moved):
+    by_shift = [_moved(problem, x, values, shift) for shift in shifted]
+    rows = np.zeros((residuals.size, len(by_shift)))
+    for number, by_view in enumerate(by_shift):
         parts = [p for v, q in zip(problem.views, by_view, strict=True) for p in _parts(v, q)]
         flat = np.concatenate(parts)
         rows[: flat.size, number] = flat
@@ -63,13 +67,16 @@ def doubt(
     freedom = max(int(np.count_nonzero(residuals)) - x.size, 1)
     variance = float(residuals @ residuals) / freedom
     information = whole.T @ whole / variance
-    information[x.size :, x.size :] += np.linalg.pinv(path_covariance)
+    by_torque = np.linalg.pinv(path_covariance)
+    information[x.size :, x.size :] += by_torque
     covariance = np.linalg.pinv(information, hermitian=True)
-    step = -covariance @ (whole.T @ residuals) / variance
+    slope = whole.T @ residuals / variance
+    slope[x.size :] += by_torque @ moved
+    step = -covariance @ slope
     own = _plant_slopes(problem, x)
     corrected, direct = [], []
     for place, view in enumerate(problem.views):
-        by_path = np.array([-q[place] for q in moved])
+        by_path = np.array([-q[place] for q in by_shift])
         corrected.append(_spread(np.vstack([own - gradients[place], by_path]), covariance))
         raw = [np.log(s.views[place].g / view.g) / s.step for s in shifted]
         plain = np.vstack([_late_slopes(problem, view, x), *raw])

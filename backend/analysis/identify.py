@@ -27,8 +27,10 @@ from backend.analysis.path_fit import (
     at_whole_cycles,
     find_paths,
     moved_path,
+    path_between,
     path_covariance,
 )
+from backend.analysis.reference_gain import ReferenceLoop
 from backend.analysis.reversals import with_balanced_reversals
 from backend.analysis.sampled_model import LoopModel, SampledFit
 from backend.analysis.sampling import (
@@ -40,6 +42,7 @@ from backend.analysis.sampling import (
 from backend.analysis.settling import settled
 from backend.analysis.stated_band import (
     distorted,
+    ended_where_unknown,
     pooled,
     unexplained,
     widened,
@@ -120,35 +123,42 @@ def identify_mechanics(
 
 def identify_with_path(
     records: tuple[Record, ...], path: SignalPath, quantity: Quantity, *, hold_known: bool,
-    inertia: KnownInertia | None = None,
+    inertia: KnownInertia | None = None, loop: ReferenceLoop | None = None,
 ) -> Identification:  # fmt: skip
     """As `identify_mechanics`, with what ``path`` does not tell found from the recording.
 
     The torque alone cannot always tell whether set-points are interpolated; the motion can: a
     wrong answer leaves a delay that is negative, or a roll-off that no mechanics have. Beside a
     closed loop, path and mechanics need each other, and are refined in turn. ``inertia`` is the
-    whole axis', where moves have told it.
+    whole axis', where moves have told it. ``loop`` is the closed loop, where its
+    reference has told it: the path, too, is known then.
     """
     closed = quantity == "torque_injection"
     corner_known = path.current_bandwidth_hz is not None
-    task = _Task(settled(records), quantity, inertia=inertia)
-    paths = find_paths(task.records, path, loop_closed=closed, hold_known=hold_known)
+    task = _Task(
+        settled(records), quantity, inertia=inertia, loop=None if loop is None else loop.controller
+    )
+    if loop is None:
+        paths = find_paths(task.records, path, loop_closed=closed, hold_known=hold_known)
+    else:
+        paths = (replace(loop.path, response_bandwidth_hz=path.response_bandwidth_hz),)
     trials = task.trials(paths)
     best = trials[0]
 
     def again(fit: SampledFit) -> SignalPath:
         known = replace(path, hold=fit.path.hold)
         return find_paths(
-            task.records, known, loop_closed=True, hold_known=True, motion=fit
+            task.records, known, loop_closed=True, hold_known=True, motion=fit, controller=task.loop
         )[0]  # fmt: skip
 
     task, found = task.balanced(task.refined(best, again))
     doubt = task.doubt(found, corner_known)
+    by_torque = found.path
     for _ in range(_PASSES if np.all(np.isfinite(doubt.path_step)) else 0):
         if np.all(np.abs(doubt.path_step) < _SETTLED * doubt.path_std):
             break
         found = task.moved(found, doubt)
-        doubt = task.doubt(found, corner_known)
+        doubt = task.doubt(found, corner_known, by_torque)
     found, doubt = task.with_sure_modes(found, doubt, corner_known)
     alike = [t for t in trials[1:] if _rank(t) < _rank(best) + _UNDECIDED]
     return _undecided(_identification(task, found, doubt), best, alike)
@@ -177,6 +187,7 @@ class _Task:
     max_modes: int = 4
     jitter_s: float = 0.0
     inertia: KnownInertia | None = None
+    loop: LoopModel | None = None
 
     def trial(
         self, path: SignalPath, coulomb_nm: float | None = None, motion: SampledFit | None = None,
@@ -276,12 +287,17 @@ class _Task:
         motion = trial.fit if self.quantity == "torque_injection" else None
         return self.trial(path, trial.views.velocity.coulomb_nm, motion, trial.solution)
 
-    def doubt(self, trial: _Trial, corner_known: bool) -> Doubt:
-        """How far path and mechanics may be off together."""
+    def doubt(
+        self, trial: _Trial, corner_known: bool, by_torque: SignalPath | None = None
+    ) -> Doubt:
+        """How far path and mechanics may be off together.
+
+        ``by_torque`` is the path that the torque alone tells, where the trial has another one.
+        """
         closed = self.quantity == "torque_injection"
         covariance = path_covariance(
             self.records, trial.path, loop_closed=closed, corner_known=corner_known,
-            motion=trial.fit if closed else None,
+            motion=trial.fit if closed else None, controller=self.loop,
         )  # fmt: skip
         problem = trial.solution.problem
         shifted = []
@@ -294,12 +310,15 @@ class _Task:
                 for v, o in zip(problem.views, seen, strict=True)
             )
             shifted.append(Shifted(views, _STEP))
-        return joint_doubt(problem, trial.solution.x, shifted, covariance)
+        moved = path_between(by_torque or trial.path, trial.path)[: len(covariance)]
+        return joint_doubt(problem, trial.solution.x, shifted, covariance, moved)
 
     def _loop(self, path: SignalPath, motion: SampledFit | None) -> LoopModel:
         """The controller that is closed meanwhile."""
         if self.quantity == "torque_mode":
             return LoopModel()
+        if self.loop is not None:
+            return self.loop
         own, velocity = loop_spectra(self.records, path)
         lines = self.records[0].excitation.line_hz
         if motion is not None:
@@ -350,6 +369,7 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
     if spoilt.play:
         lines = lines.cut(lines.valid_band_hz[1])
         return Identification(lines, lines, fit, False, spoilt)
+    best = ended_where_unknown(best)
     return Identification(lines, best, fit, True, spoilt, _mode_doubts(trial, doubt))
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares, minimize_scalar
 
 from backend.analysis.arrays import ComplexArray, FloatArray
 from backend.analysis.line_spectra import Record, mean_spectra
-from backend.analysis.sampled_model import SampledFit
+from backend.analysis.sampled_model import LoopModel, SampledFit
 from backend.analysis.sampling import (
     STEP_LEAD_S,
     Hold,
@@ -46,8 +46,6 @@ _NEARLY = 1.5
 _WHOLE = 0.06
 #: Deviations of delays (cycles) and of corners (logarithm) where nothing but habit tells them.
 _STEADY, _UNSTEADY, _TOLD, _UNTOLD = 0.02, 0.1, 0.03, 0.7
-#: A torque of which more than this share (power) is not made of the reference does not follow it.
-_UNRELATED = 0.5
 #: So much stays unexplained by rounding alone.
 _ROUNDING = 1.5e-7
 
@@ -59,6 +57,7 @@ def find_paths(
     loop_closed: bool,
     hold_known: bool,
     motion: SampledFit | None = None,
+    controller: LoopModel | None = None,
 ) -> tuple[SignalPath, ...]:
     """The paths that explain the reported torque, best first; one for each hold that may be.
 
@@ -66,7 +65,8 @@ def find_paths(
     delay is only used where no torque was recorded. Interpolation is recognised by the torque
     alone where the current loop is known or slow; else the mechanics' fit must tell. ``motion``
     is such a fit with a path found before: it tells how the samples of a closed loop's own torque
-    and of the speed differ from what they are samples of.
+    and of the speed differ from what they are samples of. ``controller`` is the closed loop's,
+    where it is known.
 
     Raises:
         ValueError: every period has a gap.
@@ -74,41 +74,19 @@ def find_paths(
     if any(r.torque is None for r in records):
         return (path,)
     holds: tuple[Hold, ...] = (path.hold,) if hold_known else ("zero", "linear")
-    return _ranked(_Fit.of(records, path, loop_closed, motion), holds)
-
-
-def reference_gain(
-    records: tuple[Record, ...], path: SignalPath, integral_rad_s: float, *, hold_known: bool
-) -> tuple[float, SignalPath]:
-    """Torque that a speed loop makes of one unit of its reference, and the reference's path.
-
-    ``records`` have the reference and ``integral_rad_s`` times its integral as what was sent. The
-    loop makes its torque of the reference less the speed, both by the same gain, so that the
-    gain is the only number that all lines share.
-
-    Raises:
-        ValueError: every period has a gap, or the torque does not follow the reference.
-    """
-    fit = _Fit.of(records, path, True, None)
-    size = float(np.linalg.norm(fit.torque * fit.weight))
-    fit = replace(fit, torque=fit.torque / size, integral_rad_s=integral_rad_s)
-    holds: tuple[Hold, ...] = (path.hold,) if hold_known else ("zero", "linear")
-    best = _ranked(fit, holds)[0]
-    gain, rest = fit.gain(best), fit.rest(best)
-    if gain <= 0 or float(rest @ rest) > _UNRELATED:
-        raise ValueError("the torque does not follow the reference: its gain cannot be read")
-    return gain * size, best
+    return ranked(PathFit.of(records, path, loop_closed, motion, controller), holds)
 
 
 def path_covariance(
     records: tuple[Record, ...], path: SignalPath, *, loop_closed: bool, corner_known: bool,
-    motion: SampledFit | None = None,
+    motion: SampledFit | None = None, controller: LoopModel | None = None,
 ) -> FloatArray:  # fmt: skip
     """How exactly the torque tells a path that it was found with: cycles and log of the corner.
 
     Covariance [2, 2], or [1, 1] without a corner. What the torque leaves open is as unusual as
     drives are: those in step with the bus take set-points at its cycles, and a corner that a
-    drive tells is meant to be one of first order.
+    drive tells is meant to be one of first order. ``controller`` is the closed loop's, where it is
+    known.
     """
     usual = [_STEADY if at_whole_cycles(path) else _UNSTEADY]
     if path.current_bandwidth_hz is not None:
@@ -116,7 +94,7 @@ def path_covariance(
     information = np.diag(np.array(usual) ** -2.0)
     if any(r.torque is None for r in records):
         return np.asarray(np.linalg.inv(information))
-    fit = _Fit.of(records, path, loop_closed, motion)
+    fit = PathFit.of(records, path, loop_closed, motion, controller)
     rest = fit.rest(path)
     steps = [moved_path(path, 0.02 * (n == 0), 0.02 * (n == 1)) for n in range(len(usual))]
     slopes = np.column_stack([(fit.rest(step) - rest) / 0.02 for step in steps])
@@ -133,7 +111,14 @@ def moved_path(path: SignalPath, cycles: float, log_corner: float) -> SignalPath
     return replace(path, command_delay_s=max(late_s, 0.0), current_bandwidth_hz=corner)
 
 
-def _ranked(fit: _Fit, holds: tuple[Hold, ...]) -> tuple[SignalPath, ...]:
+def path_between(one: SignalPath, other: SignalPath) -> FloatArray:
+    """What `moved_path` takes from one path to the other: cycles, and logarithm of the corner."""
+    cycles = (other.command_delay_s - one.command_delay_s) * one.sample_rate_hz
+    corners = (other.current_bandwidth_hz or 1.0) / (one.current_bandwidth_hz or 1.0)
+    return np.array([cycles, float(np.log(corners))])
+
+
+def ranked(fit: PathFit, holds: tuple[Hold, ...]) -> tuple[SignalPath, ...]:
     """The best path of each hold as far as they explain alike, those of whole cycles first.
 
     Noise and the samples of a stiff loop's torque make a fraction of a cycle look better than the
@@ -161,7 +146,7 @@ def at_whole_cycles(path: SignalPath) -> bool:
 
 
 @dataclass(frozen=True)
-class _Fit:
+class PathFit:
     """Torque and speed per unit of what was sent, [lines]."""
 
     f: FloatArray
@@ -170,20 +155,22 @@ class _Fit:
     weight: FloatArray
     path: SignalPath
     loop_closed: bool
-    integral_rad_s: float | None = None
-    """Corner of the loop's integral where the loop's reference is what was sent."""
+    controller: LoopModel | None = None
+    """Of the closed loop, where it is known."""
 
     @staticmethod
     def of(
-        records: tuple[Record, ...], path: SignalPath, loop_closed: bool, motion: SampledFit | None
-    ) -> _Fit:
+        records: tuple[Record, ...], path: SignalPath, loop_closed: bool,
+        motion: SampledFit | None, controller: LoopModel | None = None,
+    ) -> PathFit:  # fmt: skip
+        """From recordings, as `find_paths` has them."""
         f, sent, torque, velocity = mean_spectra(records)
         size = np.sqrt(np.abs(sent) / np.sum(np.abs(sent)))
         if loop_closed and motion is None:
             size = size / (1.0 + (f / (_OWN_SHARE * path.sample_rate_hz)) ** 4)
         elif loop_closed and motion is not None:
             velocity = velocity * motion.loop_image_factor(f)
-        return _Fit(f, torque / sent, velocity / sent, size, path, loop_closed)
+        return PathFit(f, torque / sent, velocity / sent, size, path, loop_closed, controller)
 
     def best(self, hold: Hold) -> tuple[SignalPath, float]:
         """The best delay and corner with this hold, and what they leave unexplained."""
@@ -248,36 +235,22 @@ class _Fit:
 
     def rest(self, path: SignalPath) -> FloatArray:
         """What the path leaves unexplained, real and imaginary parts."""
-        if self.integral_rad_s is not None:
-            column, target = self._by_reference(path)
-            return np.asarray(target - column * (column @ target / (column @ column)))
-        error = (self.torque - sampled_command_response(self.f, path)) * self.weight
+        error = self.torque - sampled_command_response(self.f, path)
+        if self.controller is not None:
+            error = error + self.answered(path) * self.controller.response(self.f)
+        error = error * self.weight
         target = np.concatenate([error.real, error.imag])
-        if not self.loop_closed:
+        if not self.loop_closed or self.controller is not None:
             return target
         s = 2j * np.pi * self.f
-        own = self._answered(path) * self.weight
+        own = self.answered(path) * self.weight
         columns = np.column_stack([own, own / s, own / s**2])
         matrix = np.concatenate([columns.real, columns.imag])
         matrix = matrix / np.linalg.norm(matrix, axis=0)
         q, _ = np.linalg.qr(matrix)
         return np.asarray(target - q @ (q.T @ target))
 
-    def _answered(self, path: SignalPath) -> ComplexArray:
-        """The speed as it comes back as torque, per unit of gain."""
+    def answered(self, path: SignalPath) -> ComplexArray:
+        """The speed as it comes back as torque, per unit of gain [lines]."""
         own = self.velocity * lag_response(self.f, path.current_bandwidth_hz)
         return np.asarray(own * delay_response(self.f, path.loop_delay_s))
-
-    def _by_reference(self, path: SignalPath) -> tuple[FloatArray, FloatArray]:
-        """Torque per unit of gain, and the torque; real and imaginary parts."""
-        s = 2j * np.pi * self.f
-        error = sampled_command_response(self.f, path)
-        error = error - self._answered(path) * (1.0 + (self.integral_rad_s or 0.0) / s)
-        both = error * self.weight, self.torque * self.weight
-        column, target = (np.concatenate([x.real, x.imag]) for x in both)
-        return column, target
-
-    def gain(self, path: SignalPath) -> float:
-        """Torque per unit of what was sent."""
-        column, target = self._by_reference(path)
-        return float(column @ target / (column @ column))

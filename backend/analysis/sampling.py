@@ -107,6 +107,50 @@ def sampled_command_response(frequency_hz: FloatArray, path: SignalPath) -> Comp
     return np.asarray(path.direct_gain * top / (1.0 - a * z), dtype=np.complex128)
 
 
+def rising_command(sent: FloatArray, path: SignalPath) -> FloatArray:
+    """What the *sampled* torque shows of a sequence's integral (s) beyond its mean per cycle.
+
+    A speed loop integrates the reference that it holds, so that the integral rises within each
+    cycle: a sawtooth around a mean that `sampled_command` knows. Exact for a first-order current
+    loop and any delay; a line that is interpolated is near its mean where it is sampled.
+    """
+    if path.hold == "linear":
+        return np.zeros_like(sent)
+    numerator, a, whole = _sawtooth(path)
+    filtered = np.asarray(lfilter(numerator, [1.0, -a], sent)) * path.direct_gain
+    return np.concatenate([np.zeros(whole), filtered])[: filtered.size]
+
+
+def sampled_integral_response(frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
+    """Response in s from the sent sequence to the samples of its integral, as a torque."""
+    f = np.asarray(frequency_hz, dtype=np.float64)
+    mean = -0.5j / path.sample_rate_hz / np.tan(np.pi * f / path.sample_rate_hz)
+    rises = np.zeros_like(mean)
+    if path.hold == "zero":
+        numerator, a, whole = _sawtooth(path)
+        z = np.exp(-2j * np.pi * f / path.sample_rate_hz)
+        rises = path.direct_gain * np.polyval(numerator[::-1], z) * z**whole / (1.0 - a * z)
+    return np.asarray(mean * sampled_command_response(f, path) + rises)
+
+
+def _sawtooth(path: SignalPath) -> tuple[FloatArray, float, int]:
+    """As `_difference_equation`, of time less half a cycle while a value is held."""
+    period_s = 1.0 / path.sample_rate_hz
+    whole, part = divmod(path.command_delay_s, period_s)
+    corner = path.current_bandwidth_hz
+    lag_s = 0.0 if corner is None else 1.0 / (2 * np.pi * corner)
+
+    def faded(t: float) -> float:
+        return 0.0 if not lag_s else float(np.exp(-t / lag_s))
+
+    def within(t: float) -> float:
+        return t - (0.5 * period_s + lag_s) * (1.0 - faded(t))
+
+    a, first = faded(period_s), within(period_s - part)
+    after = within(period_s) * faded(period_s - part)
+    return np.array([first, after - a * first]), a, int(whole) + 1
+
+
 def _difference_equation(path: SignalPath) -> tuple[FloatArray, float, int]:
     """Numerator, the one pole, and whole cycles of delay before them."""
     period_s = 1.0 / path.sample_rate_hz

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from backend.analysis.arrays import ComplexArray, FloatArray, neighbour_mean
 from backend.analysis.frf import Frf, valid_band_hz
 from backend.analysis.model_fit import Solution
-from backend.analysis.sampling import hold_response
+from backend.analysis.sampling import DIRECT_SHARE, hold_response
 
 #: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
 SYSTEMATIC_DB = 0.05
@@ -17,6 +18,9 @@ SYSTEMATIC_DEG = 0.35
 
 #: So much of what is taken out as images may be wrong beside what the model's doubt says.
 _IMAGES_LEFT = 0.08
+
+#: By a model, an answer holds while 95 of 100 cases lie within these limits of it.
+_KNOWN_DB, _KNOWN_DEG, _CI95 = 2.0, 15.0, 1.96
 
 #: What no model explains is shown to this share of the sample rate; its misfit is a mean over so
 #: many lines to each side.
@@ -43,6 +47,24 @@ def unexplained(raw: Frf, solution: Solution, view: int) -> Frf:
         std_deg=np.hypot(raw.std_deg, np.degrees(turn)),
         valid_band_hz=(low, min(high, _UNTRUSTED_SHARE * rate)),
     )
+
+
+def ended_where_unknown(frf: Frf) -> Frf:
+    """The band ends where a model alone tells the lines, and tells most of them too roughly.
+
+    A resonance beyond half the sample rate may fold back more than the axis itself does there.
+    Lines that are uncertain below others that are not, as beside an antiresonance, end no band.
+    """
+    f, (low, high) = frf.frequency_hz, frf.valid_band_hz
+    direct_hz = DIRECT_SHARE * frf.sample_rate_hz
+    above = (f > direct_hz) & (f <= high)
+    if not np.any(above):
+        return frf
+    rough = np.maximum(frf.std_db / _KNOWN_DB, frf.std_deg / _KNOWN_DEG)[above] * _CI95
+    known = f[above][median_filter(rough, 2 * _AROUND + 1, mode="nearest") <= 1.0]
+    if known.size and known[-1] == f[above][-1]:
+        return frf
+    return replace(frf, valid_band_hz=(low, float(np.max(known, initial=direct_hz))))
 
 
 def distorted(frf: Frf, share: FloatArray) -> Frf:

@@ -121,9 +121,7 @@ class _Beside:
                 f"{name}: {error}", drive=name,
                 remedy="permit more torque and speed, or free the computer if samples were lost",
             ) from error  # fmt: skip
-        corner = _TURN * found.integral_hz
-        self._loop = LoopModel(found.gain_nms, found.gain_nms * corner)
-        self._path = found.path
+        self._loop, self._path = found.loop.controller, found.loop.path
         fixed = gains.loops_of(self.axis.drive, replace(facts, torque_filter_hz=None))
         lowest = safe_centre_hz(self._loop, self.plant, fixed.response)
         if lowest is None:

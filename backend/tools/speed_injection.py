@@ -15,11 +15,11 @@ import numpy.typing as npt
 from backend.analysis.arrays import ComplexArray, FloatArray
 from backend.analysis.frf import Record, estimate_periodic
 from backend.analysis.line_spectra import good_periods, period_spectra
-from backend.analysis.path_fit import reference_gain
-from backend.analysis.sampling import SignalPath, delay_response
+from backend.analysis.reference_gain import ReferenceLoop, reference_gain
+from backend.analysis.sampled_model import SampledFit
+from backend.analysis.sampling import SignalPath, delay_response, rising_command
 from backend.tools import excite
 from backend.tools.recording import Recording
-from backend.tools.speed_integral import integral_hz as found_integral_hz
 from backend.tools.waveform import Band, Waveform
 
 _TURN = 2 * np.pi
@@ -111,60 +111,49 @@ def telling_weight(
 
 @dataclass(frozen=True)
 class SpeedGain:
-    """What a speed loop makes of its reference: ``gain_nms``·(1 + 2π·integral_hz/s), and the path
-    between the reference and that torque. ``played`` are the records with the integral's part."""
+    """What a speed loop makes of its reference.
 
-    gain_nms: float
-    integral_hz: float
-    path: SignalPath
+    ``played`` are the records as if their torque had been injected, in Nm.
+    """
+
+    loop: ReferenceLoop
     played: tuple[tuple[excite.Sequence, Recording], ...]
 
 
 def speed_gain(
     records: tuple[tuple[excite.Sequence, Recording], ...], path: SignalPath,
-    integral_hz: float | None, *, hold_known: bool,
+    integral_hz: float | None, *, hold_known: bool, motion: SampledFit | None = None,
 ) -> SpeedGain:  # fmt: skip
     """The gain that the recorded torque shows; ``integral_hz`` None: the recording tells it, too.
 
-    Raises:
-        ValueError: nothing of the torque follows the reference.
-    """
-    if integral_hz is None:
-        integral_hz = found_integral_hz(tuple(_record(s, r) for s, r in records), path)
-    corner_hz = integral_hz or 0.0
-    played = tuple((_with_integral(s, corner_hz), r) for s, r in records)
-    taken = tuple(_record(s, r) for s, r in played)
-    gain, found = reference_gain(taken, path, _TURN * corner_hz, hold_known=hold_known)
-    return SpeedGain(gain, corner_hz, found, played)
-
-
-def as_torque(
-    records: tuple[tuple[excite.Sequence, Recording], ...], path: SignalPath,
-    integral_hz: float | None, *, hold_known: bool,
-) -> tuple[tuple[excite.Sequence, Recording], ...]:  # fmt: skip
-    """The same recordings with the torque in Nm that the reference made in the excitation's place.
-
-    ``integral_hz`` is the corner of the loop's integral; None: the recording tells.
+    ``motion`` is a fit of the mechanics where there is one already.
 
     Raises:
         ValueError: nothing of the torque follows the reference.
     """
-    found = speed_gain(records, path, integral_hz, hold_known=hold_known)
-    return tuple((_scaled(s, found.gain_nms), r) for s, r in found.played)
+    taken = tuple(_record(s, r) for s, r in records)
+    corner = None if integral_hz is None else _TURN * integral_hz
+    loop = reference_gain(taken, path, corner, hold_known=hold_known, motion=motion)
+    return SpeedGain(loop, tuple(_as_torque(s, r, loop) for s, r in records))
 
 
-def _with_integral(sequence: excite.Sequence, integral_hz: float) -> excite.Sequence:
+def _as_torque(
+    sequence: excite.Sequence, recording: Recording, loop: ReferenceLoop
+) -> tuple[excite.Sequence, Recording]:
+    """A recording with the torque that the reference made in the excitation's place.
+
+    That torque is held, but for what the integral rises within a cycle: its mean is what moves
+    the axis, and what the samples show beyond the mean is taken out of them.
+    """
     e = sequence.excitation
-    if not integral_hz:
-        return sequence
-    steps = np.concatenate([[0.0], np.cumsum(e.samples)[:-1]]) + 0.5 * e.samples
-    total = e.samples + _TURN * integral_hz / e.sample_rate_hz * steps
-    return replace(sequence, excitation=replace(e, samples=total))
-
-
-def _scaled(sequence: excite.Sequence, gain: float) -> excite.Sequence:
-    e = sequence.excitation
-    return replace(sequence, excitation=replace(e, samples=e.samples * gain))
+    mean = np.concatenate([[0.0], np.cumsum(e.samples)[:-1]]) + 0.5 * e.samples
+    gain, integral = loop.controller.c0, loop.controller.c1
+    torque = gain * e.samples + integral / e.sample_rate_hz * mean
+    shown = recording.torque_nm - integral * rising_command(e.samples, loop.path)
+    return (
+        replace(sequence, excitation=replace(e, samples=torque)),
+        replace(recording, torque_nm=shown),
+    )
 
 
 def _record(sequence: excite.Sequence, recording: Recording) -> Record:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -55,6 +55,9 @@ async def sweep(
         LinkLost: samples were lost; nothing is concluded from the rest.
     """
     check(settings)
+    if settings.hold is None and axis.drive.id in session.by_speed:
+        # Profile velocity without ramps: what a reference is does not change between two cycles.
+        settings = replace(settings, hold="zero")
     loop = {"speed_loop": "speed", "position_loop": "position"}.get(settings.kind, settings.loop)
     if loop == "auto" and (settings.excitation == "stepped" or not takes_torque(axis, session)):
         loop = "speed"

@@ -18,14 +18,15 @@ from backend.analysis.mechanical_model import MechanicalModel
 from backend.analysis.mode_doubt import ModeDoubt
 from backend.analysis.reported import charged, commanded, current_doubt, mean_cycles
 from backend.analysis.resonance import Resonance
-from backend.analysis.sampling import STEP_LEAD_S, Hold, SignalPath, sampled_command
+from backend.analysis.sampling import MODEL_SHARE, STEP_LEAD_S, Hold, SignalPath, sampled_command
 from backend.axis import Envelope
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.recording import Recording
-from backend.tools.speed_injection import as_torque
+from backend.tools.speed_injection import speed_gain
 from backend.tools.waveform import Waveform
 
+Records = tuple[tuple[excite.Sequence, Recording], ...]
 Kind = Literal["mechanics", "speed_loop", "position_loop"]
 Loop = Literal["auto", "none", "speed", "position"]
 
@@ -38,10 +39,8 @@ _LOWEST_MODE_HZ = 15.0
 _WEAK_DB, _LEAST_DB, _LEAST_SHARE = 3.0, 1.0, 0.2
 #: A mode whose part in the response is not known to this (logarithm, one deviation) may be none.
 _UNSURE = 1.0 / 3.0
-#: What is charged to all lines where a speed loop's reference is the excitation, one deviation:
-#: size (logarithm), as the integral rises between two samples of the torque, and delay in s, as
-#: the loop's own torque hides part of what tells the current loop.
-_BY_REFERENCE, _BY_REFERENCE_S = 0.012, 15e-6
+#: A speed loop's gain and the mechanics are found in turn, so often at most.
+_ROUNDS = 3
 #: Deviations to either side that hold 95 of 100 cases.
 _CI95 = 1.96
 
@@ -106,7 +105,7 @@ class SweepResult:
 
 
 def evaluate(
-    records: tuple[tuple[excite.Sequence, Recording], ...],
+    records: Records,
     rate: float,
     facts: AxisFacts,
     settings: SweepSettings,
@@ -134,22 +133,18 @@ def evaluate(
     if settings.kind != "mechanics":
         return _evaluate_loop(records, path, settings, loop)
     known = settings.hold is not None or facts.interpolates
-    if by_speed:
-        records = as_torque(records, path, integral_hz, hold_known=known)
-    taken = tuple(
-        Record(s.excitation, r.velocity_rad_s, r.torque_nm, r.valid, r.position_rad)
-        for s, r in records
-    )
     quantity: Quantity = "torque_mode" if loop == "none" else "torque_injection"
+    inertia = _known_inertia(settings) if facts.torque_known else None
+    taken = _taken(records)
     if (cycles := mean_cycles(taken)) is not None:
         raise ValueError(
             f"the drive reports its speed as the mean of {cycles} cycles, from which mechanics "
             "cannot be told; switch that averaging off, or take another cycle time"
         )
-    found = identify_with_path(
-        taken, path, quantity, hold_known=known,
-        inertia=_known_inertia(settings) if facts.torque_known else None,
-    )  # fmt: skip
+    if by_speed:
+        found, taken = _by_reference(records, path, integral_hz, inertia, hold_known=known)
+    else:
+        found = identify_with_path(taken, path, quantity, hold_known=known, inertia=inertia)
     path = found.fit.path
     limit = settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm
     saturated = _saturated(taken, path, quantity, limit)
@@ -160,11 +155,6 @@ def evaluate(
         direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
         found = replace(found, direct=direct, corrected=corrected)
         warnings += (_COMMANDED,)
-    if by_speed:
-        lines = found.direct.frequency_hz
-        doubt = np.asarray(_BY_REFERENCE + 2j * np.pi * lines * _BY_REFERENCE_S)
-        direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
-        found = replace(found, direct=direct, corrected=corrected)
     return SweepResult(
         kind="mechanics",
         loop=loop,
@@ -190,6 +180,34 @@ def evaluate(
         speed_filter_hz=found.fit.path.response_bandwidth_hz,
         hold=path.hold,
     )
+
+
+def _taken(records: Records) -> tuple[Record, ...]:
+    return tuple(
+        Record(s.excitation, r.velocity_rad_s, r.torque_nm, r.valid, r.position_rad)
+        for s, r in records
+    )
+
+
+def _by_reference(
+    records: Records, path: SignalPath, integral_hz: float | None, inertia: KnownInertia | None, *,
+    hold_known: bool,
+) -> tuple[Identification, tuple[Record, ...]]:  # fmt: skip
+    """Mechanics by a speed loop's reference, and the records as if its torque had been injected.
+
+    The loop's gains need the mechanics, as a light axis' own speed is sampled, too.
+    """
+    told = speed_gain(records, path, integral_hz, hold_known=hold_known)
+    for _ in range(_ROUNDS):
+        taken = _taken(told.played)
+        found = identify_with_path(
+            taken, path, "torque_injection", hold_known=hold_known, inertia=inertia, loop=told.loop
+        )
+        again = speed_gain(records, path, integral_hz, hold_known=hold_known, motion=found.fit)
+        if told.loop.alike(again.loop):
+            break
+        told = again
+    return found, taken
 
 
 def _known_inertia(settings: SweepSettings) -> KnownInertia | None:
@@ -239,6 +257,12 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
         words.append(
             "no mechanical model explains the recording: only the part of the plot below a tenth "
             "of the sample rate is shown, and nothing is designed from it"
+        )
+    rate, (_low, highest) = found.corrected.sample_rate_hz, found.corrected.valid_band_hz
+    if found.trusted and highest < MODEL_SHARE * rate * (1.0 - 1e-6):
+        words.append(
+            f"above {highest:.0f} Hz the response is not known well enough: what is folded back "
+            "there hides it. Nothing is concluded from what lies above; a shorter cycle shows it"
         )
     if saturated > 0.02:
         words.append(
@@ -330,7 +354,7 @@ def margins_of(f: FloatArray, open_loop: ComplexArray) -> dict[str, float | bool
 
 
 def _evaluate_loop(
-    records: tuple[tuple[excite.Sequence, Recording], ...],
+    records: Records,
     path: SignalPath,
     settings: SweepSettings,
     loop: Literal["none", "speed", "position"],
@@ -367,7 +391,7 @@ def _evaluate_loop(
     )  # fmt: skip
 
 
-def _motion_s(records: tuple[tuple[excite.Sequence, Recording], ...]) -> float:
+def _motion_s(records: Records) -> float:
     return float(sum(s.excitation.duration_s for s, _ in records))
 
 

@@ -77,7 +77,7 @@ class Drive:
 
     ``command_late_steps`` and ``told_late_steps`` are delays in steps of 50 µs: of a torque until
     it acts, and of all signals until the bus samples them. ``interpolates``: torques are reached
-    linearly from cycle to cycle (60C2h).
+    linearly from cycle to cycle (60C2h). References of motion are, unless ``holds_motion``.
     """
 
     rated_nm: float = 1.27
@@ -90,6 +90,7 @@ class Drive:
     command_late_steps: int = 0
     told_late_steps: int = 0
     interpolates: bool = False
+    holds_motion: bool = False
     counts_per_rev: int = 2**23
     noise_counts: float = 0.5
     torque_step: float = 1e-3
@@ -109,7 +110,7 @@ class Run:
 @numba.njit(cache=True)
 def _simulate(
     steps, m, a, b_ref, b_dist, coulomb, gravity, limit, mode, kp, ki, kv, alpha,
-    torque_in, velocity_in, position_in, counts, noise, told_late, out,
+    torque_in, velocity_in, position_in, counts, noise, told_late, holds, out,
 ):  # fmt: skip
     n = a.shape[0]
     x = np.zeros(n)
@@ -135,7 +136,7 @@ def _simulate(
             ref += gravity
         else:
             # References of motion are interpolated from cycle to cycle, as 60C2h says.
-            part = (i % m + 1) / m
+            part = 1.0 if holds else (i % m + 1) / m
             before = max(k - 1, 0)
             wanted = velocity_in[before] + part * (velocity_in[k] - velocity_in[before])
             if mode == 2:
@@ -208,7 +209,7 @@ def simulate(mechanics, drive, sample_rate_hz, *, torque=None, velocity=None, po
         zero if velocity is None else np.asarray(velocity, float),
         zero if position is None else np.asarray(position, float),
         float(drive.counts_per_rev), rng.normal(0, max(drive.noise_counts, 1e-12), steps),
-        drive.told_late_steps, out,
+        drive.told_late_steps, drive.holds_motion, out,
     )  # fmt: skip
     lsb = drive.torque_step * drive.rated_nm
     return Run(

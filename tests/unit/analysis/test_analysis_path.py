@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drive_sim import TURN, Drive, Mechanics, simulate
+from drive_sim import TURN, Drive, Mechanics
 from random_axes import RATED_NM, Case, errors, played, result_of
 from scipy.optimize import least_squares
 
-from backend.analysis.excitation import choose_lines, multisine, scaled
 from backend.analysis.frf import estimate_periodic
 from backend.analysis.identify import (
     Identification,
@@ -18,7 +17,7 @@ from backend.analysis.identify import (
     identify_with_path,
 )
 from backend.analysis.line_spectra import Record
-from backend.analysis.path_fit import find_paths, moved_path, reference_gain
+from backend.analysis.path_fit import find_paths, moved_path
 from backend.analysis.robust_fit import minimise
 from backend.analysis.sampling import SignalPath, sampled_command, sampled_command_response
 from backend.analysis.stated_band import unexplained
@@ -172,39 +171,6 @@ def test_minimum_is_that_of_a_general_solver():
         assert own.cost == pytest.approx(other.cost, rel=1e-4)
         assert own.x == pytest.approx(other.x, abs=2e-3)
         assert np.all((own.x >= low) & (own.x <= high))
-
-
-@pytest.mark.parametrize("loop_hz", [15.0, 60.0])
-def test_the_gain_of_a_speed_loop_is_read_from_what_it_makes_of_its_reference(loop_hz):
-    """A light axis answers fast: its own speed makes much of the torque, far up."""
-    mechanics = Mechanics(loads=())
-    kp = TURN * loop_hz * mechanics.total_kgm2
-    corner = TURN * loop_hz / 8
-    drive = Drive(RATED_NM, 3 * RATED_NM, 1000.0, kp_nms=kp, ki_nm=kp * corner,
-                  speed_filter_hz=1000.0)  # fmt: skip
-    lines = choose_lines(5.0, 400.0, 1000 / 650, count=150)
-    records = []
-    for number in range(4):
-        e = scaled(
-            multisine(
-                sample_rate_hz=1000.0, period_samples=650, lines=lines, realisation=number // 2,
-                invert=bool(number % 2), iterations=40, integrations=1, ramp_samples=80,
-            ), 3.0,
-        )  # fmt: skip
-        run = simulate(mechanics, drive, 1000.0, velocity=e.samples)
-        steps = np.concatenate([[0.0], np.cumsum(e.samples)[:-1]]) + 0.5 * e.samples
-        sent = replace(e, samples=e.samples + corner / 1000.0 * steps)
-        records.append(Record(sent, run.velocity, run.torque))
-    gain, _path = reference_gain(tuple(records), SignalPath(1000.0), corner, hold_known=False)
-    assert gain == pytest.approx(kp, rel=0.01)
-
-
-def test_a_torque_that_does_not_follow_its_reference_has_no_gain():
-    records = tuple(
-        replace(r, torque=-r.torque) for r in records_of(case_of(1000.0, late_steps=20))
-    )
-    with pytest.raises(ValueError, match="does not follow"):
-        reference_gain(records, SignalPath(1000.0), 0.0, hold_known=False)
 
 
 def test_doubt_tells_how_far_a_path_that_is_off_bends_the_answer():

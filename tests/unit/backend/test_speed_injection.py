@@ -11,7 +11,7 @@ from backend.axis import Envelope
 from backend.tools import excite, speed_injection
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.recording import Recording
-from backend.tools.sweep_evaluation import SweepSettings, evaluate
+from backend.tools.sweep_evaluation import SweepSettings
 from backend.tools.sweep_plan import Setup
 from backend.tools.sweep_telling import _more_telling
 from backend.tools.waveform import Band
@@ -105,15 +105,6 @@ def test_lines_that_a_first_pair_tells_less_get_more() -> None:
     lines = np.abs(np.fft.rfft(e.one_period)[e.lines])
     assert lines / lines[0] == pytest.approx(weight / weight[0])
     assert e.realisation == 1
-
-
-def test_size_by_a_reference_is_not_known_better_than_its_loop() -> None:
-    records = tuple((s, played(s, 2e-4, noise_rad_s=0.5)) for s in sequences(20.0, 2))
-    facts = AxisFacts(1.27, True, 3000.0, None, None, None, None, False)
-    settings = SweepSettings(Envelope(4.0, 1500.0, 100.0, 60.0))
-    found = evaluate(records, RATE, facts, settings, "speed", dc=False, by_speed=True)
-    assert float(np.min(found.frf.std_db)) > 0.1
-    assert float(np.min(found.direct.std_db)) > 0.1
 
 
 def test_the_second_pair_is_as_large_as_the_first_became_and_has_other_lines() -> None:

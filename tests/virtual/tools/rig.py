@@ -155,9 +155,12 @@ class Errors:
 
 
 def errors(frf, spec: MechanicsSpec, low_hz: float, high_hz: float, truth=None) -> Errors:
-    """Median errors over coherent lines of a band, against the analytic response or ``truth``."""
+    """Median errors over coherent lines of a band, against the analytic response or ``truth``.
+
+    Lines beyond the band that the answer states for itself are none of it.
+    """
     f = np.asarray(frf.frequency_hz)
-    use = (f >= low_hz) & (f <= high_hz) & (frf.coherence >= 0.9)
+    use = (f >= low_hz) & (f <= high_hz) & (frf.coherence >= 0.9) & frf.in_band
     if not np.any(use):
         return Errors(np.nan, np.nan, np.nan, 0)
     true = analytic_response(spec, f[use]) if truth is None else truth(f[use])

@@ -162,6 +162,9 @@ async def test_mechanics_of_ds_c_by_its_profile_velocity(ds_c: CanBench) -> None
     assert part.lines > 40
     assert part.magnitude_db < 0.4
     assert part.phase_deg < 3.0
+    # The loop's integral (50/s) rises within a cycle: its samples are 1.1 % (0.09 dB) above the
+    # mean behind a current loop of 1 kHz, which is all that would be left of an error here.
+    assert part.magnitude_db < 0.07
     # sqrt(k (1/Jm + 1/Jl))/2π and sqrt(k/Jl)/2π
     true = {"resonance": 123.28, "antiresonance": 71.18}
     seen = {r.kind: r.frequency_hz for r in found.resonances}
