@@ -178,6 +178,7 @@ def beside_loop(
 def _referenced(
     rate: float, band: Band, room: Room, size: Callable[[FloatArray], FloatArray],
     realisations: int, position: bool, base: bool, waveform: Waveform, *, integrations: int,
+    first: int = 0,
 ) -> Iterator[tuple[Excitation, FloatArray]]:  # fmt: skip
     """Excitations of peak 1 with amplitudes ``size``, each with the loop's base motion.
 
@@ -191,7 +192,7 @@ def _referenced(
             e = stepped(rate, tones, size(tones), invert=invert)
             yield e, _stretched(reference, e, of.period // 8, position)
         return
-    for i in range(2 * realisations):
+    for i in range(2 * first, 2 * (first + realisations)):
         e = periodic(of, size(of.line_hz), i, integrations=integrations,
                      ramp_samples=of.period // 8)  # fmt: skip
         fade = e.samples.size - (e.first_sample + e.periods * e.period_samples)
@@ -242,11 +243,13 @@ def loop_reference(
     waveform: Waveform = "multisine",
     corner_hz: float | None = None,
     weight: npt.NDArray[np.floating] | None = None,
+    first: int = 0,
 ) -> tuple[Sequence, ...]:
     """An excitation on the reference of the closed loop itself, ``amplitude`` in rad/s or rad.
 
     Amplitudes fall with frequency, from ``corner_hz`` on, so that the torque they ask for does not
-    grow without end. ``weight`` [lines] comes on top of that; a stepped sine has none.
+    grow without end. ``weight`` [lines] comes on top of that; a stepped sine has none. ``first``
+    pairs of realisations are passed over: the phases that follow are other ones.
 
     Raises:
         ValueError: the room does not suffice.
@@ -261,7 +264,7 @@ def loop_reference(
         Sequence(scaled(e, amplitude, step), reference)
         for e, reference in _referenced(
             rate, band, room, size, realisations, position, base, waveform,
-            integrations=0 if position else 1,
+            integrations=0 if position else 1, first=first,
         )
     )  # fmt: skip
 

@@ -74,6 +74,8 @@ class SweepSettings:
     coulomb_nm: float | None = None
     """Friction that is taken out of a speed loop's response; None: the recording tells."""
     inertia_deviation: float | None = None
+    pairs_before: int = 0
+    """Of a loop's own response: pairs of realisations whose phases are not to be used again."""
 
 
 @dataclass(frozen=True)

@@ -151,7 +151,7 @@ def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence
             return excite.loop_reference(
                 setup.rate, band, setup.room, step, amplitude=amplitude,
                 realisations=settings.realisations, position=position, base=settings.base_motion,
-                waveform=settings.excitation,
+                waveform=settings.excitation, first=settings.pairs_before,
             )  # fmt: skip
         if setup.loop == "none":
             return excite.torque_mode(
