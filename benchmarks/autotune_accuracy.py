@@ -43,6 +43,9 @@ async def tuned(
     if applied is None or verified is None:
         return "nothing applied"
     m, p, n = verified.sweep.margins, verified.promised, applied.nominal
+    pm, gm = m.get("phase_margin_deg"), m.get("gain_margin_db")
+    assert found.expected is not None
+    deg, db = found.expected.phase_margin_deg, found.expected.gain_margin_db
     now = applied.gains.speed_bandwidth_hz
     predicted, measured = verified.predicted_bandwidth_hz, verified.measured_bandwidth_hz
     off = abs(measured / predicted - 1) if measured and predicted else np.inf
@@ -57,8 +60,8 @@ async def tuned(
         f"{found.load:9} {','.join(f'{hz:.0f}' for hz in limiting) or '–':12} "
         f"{len(applied.notches)} notches {_corners(applied):12} {now:5.1f} Hz {gain:12} bandwidth "
         f"{_hz(predicted)}→{_hz(measured)}{' ' if off <= 0.1 else '!'} "
-        f"PM {_kept(p.phase_margin_deg, n.phase_margin_deg, m.get('phase_margin_deg'), 1.0, 6.0)}° "
-        f"GM {_kept(p.gain_margin_db, n.gain_margin_db, m.get('gain_margin_db'), 1.0, 3.0)} dB "
+        f"PM {_kept(p.phase_margin_deg, n.phase_margin_deg, pm, 1.0, 6.0, deg)}° "
+        f"GM {_kept(p.gain_margin_db, n.gain_margin_db, gm, 1.0, 3.0, db)} dB "
         f"Ms {_kept(-p.ms, -n.ms, m.get('ms'), 0.03 * p.ms, np.inf)} "
         f"{marked(_moving_s(found), 60.0, '.0f')}s of motion, {took_s:.0f} s in all  "
         f"{'; '.join(found.notes + found.tried)}"
@@ -88,13 +91,20 @@ def _corners(applied: Candidate) -> str:
 
 
 def _kept(
-    promised: float, predicted: float | None, found: float | bool | None, slack: float, off: float
-) -> str:
+    promised: float, predicted: float | None, found: float | bool | None, slack: float, off: float,
+    here: float | None = None,
+) -> str:  # fmt: skip
     """Promise, prediction and measurement; the smaller a number is the worse.
 
-    ``!``: the promise is missed by more than ``slack``; ``?``: the prediction by more than ``off``.
+    The prediction is that of the whole loop, and in brackets where it is another one the prediction
+    ``here``, on the lines that were verified, which the measurement is held to. ``!``: the promise
+    is missed by more than ``slack``; ``?``: the prediction by more than ``off``.
     """
     before = f"{abs(promised):.3g}→{'–' if predicted is None else f'{abs(predicted):.3g}'}"
+    if here is not None:
+        if predicted is None or abs(here - predicted) > 0.5:
+            before += f" ({here:.3g})"
+        predicted = here
     if not isinstance(found, float):
         return f"{before}→–"
     found = found if promised > 0 else -found
@@ -107,6 +117,8 @@ def _kept(
 def _moving_s(found: AutotuneResult) -> float:
     """Seconds in which the axis is moved, by what was played."""
     motion = found.inertia.motion_s + found.mechanics.motion_s
+    if found.again is not None and found.again.verified_anew:
+        motion += found.again.motion_s
     if found.verified is not None:
         motion += found.verified.sweep.motion_s
     return motion + (found.step.time_s.size * float(found.step.time_s[1]) if found.step else 0.0)

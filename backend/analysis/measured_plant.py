@@ -19,7 +19,7 @@ DAMPING_FACTORS = (0.6, 1.0, 1.4)
 BEYOND = 1.25
 #: A line that is known to this (one deviation of its logarithm) tells as much as the model there:
 #: so much does a mode that is off by a per cent turn the lines beside it.
-_AS_THE_MODEL = np.radians(10.0)
+AS_THE_MODEL = np.radians(10.0)
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,8 @@ class MeasuredPlant:
     model: MechanicalModel
     measured_hz: float
     variants: tuple[MechanicalModel, ...] = ()
+    also: ComplexArray | None = None
+    """Responses [m, lines] that the axis has under other conditions."""
 
     def response(self, frequency_factor: float = 1.0, damping_factor: float = 1.0) -> ComplexArray:
         """Response with all modes moved; the measured deviation from the model stays."""
@@ -58,7 +60,16 @@ class MeasuredPlant:
         """Everything that the axis may be, [shifts, lines]."""
         moves = list(product(FREQUENCY_FACTORS, DAMPING_FACTORS)) if self.model.modes else [(1, 1)]
         rows = [self.response(*move) for move in moves]
-        return np.array([*rows, *(v.response(self.frequency_hz) for v in self.variants)])
+        rows += [v.response(self.frequency_hz) for v in self.variants]
+        return np.array([*rows, *(self.also if self.also is not None else ())])
+
+    def on(self, frequency_hz: FloatArray) -> MeasuredPlant:
+        """The same on other lines, ascending; without what it is under other conditions."""
+        x, xp, turns = np.log(frequency_hz), np.log(self.frequency_hz), np.log(self.correction)
+        joined = np.interp(x, xp, turns.real) + 1j * np.interp(x, xp, turns.imag)
+        return replace(
+            self, frequency_hz=frequency_hz, correction=np.exp(joined), variants=(), also=None
+        )
 
 
 def measured_plant(
@@ -99,4 +110,4 @@ def _own_share(frf: Frf) -> FloatArray:
     """
     parts = (np.log(10.0) / 20.0 * frf.std_db, np.radians(frf.std_deg))
     variance = 0.5 * sum(np.nan_to_num(part, nan=0.0) ** 2 for part in parts)
-    return np.asarray(1.0 / (1.0 + variance / _AS_THE_MODEL**2))
+    return np.asarray(1.0 / (1.0 + variance / AS_THE_MODEL**2))

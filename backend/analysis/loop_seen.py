@@ -1,0 +1,102 @@
+"""The plant as a closed loop shows it, where the loop answers otherwise than was predicted.
+
+With play an axis is another linear system for every way of driving it: a best linear approximation
+belongs to its class of excitations (Pintelon & Schoukens, *System Identification*, 2012, section
+3.4). What a design needs is the one within its own loop, so identification and design take turns
+(Van den Hof & Schrama, *Identification and control: closed-loop issues*, Automatica 31, 1995).
+The controller is known; what the open loop is off by is the plant's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray
+from backend.analysis.margins import open_from_closed
+from backend.analysis.measured_plant import AS_THE_MODEL, MeasuredPlant
+
+#: What a line of a closed loop may be off by, whatever its scatter says (logarithm): half of the
+#: 0.4 dB and 3° that such a measurement is held to.
+_OFF = 0.025
+#: Half width of the window that lines are averaged over, in octaves: the distortion of play
+#: scatters from line to line, what it does to the plant does not.
+_OCTAVES = 1.0 / 6.0
+#: Lines that are known to less take no part at all.
+_BLURRED = 2.0 * AS_THE_MODEL
+#: This share of the lines of such a window must be sharp.
+_DENSE = 0.75
+#: A plant is read from so many lines at least.
+_LINES = 12
+#: The correction ends this factor beyond the lines.
+_FADE = 1.26
+
+
+@dataclass(frozen=True)
+class LoopLines:
+    """A closed loop on its known lines; ``deviation`` is that of the logarithm of ``closed``."""
+
+    frequency_hz: FloatArray
+    closed: ComplexArray
+    deviation: FloatArray
+
+
+def seen_in_loop(plant: MeasuredPlant, lines: LoopLines, controller: ComplexArray) -> MeasuredPlant:
+    """The plant, corrected by what its loop showed; it stays what it was where the loop is mute.
+
+    ``controller`` is all of the loop but the plant, on the lines. Where the loop's gain is high its
+    answer is 1, whatever the plant is: log L is known by 1/|1 - T| times what log T is known to.
+    The plant that it was is kept as one that the axis may be as well.
+
+    Raises:
+        ValueError: too few lines tell the plant better than a model of it would.
+    """
+    f, steep = lines.frequency_hz, 1.0 / np.abs(1.0 - lines.closed)
+    deviation = np.nan_to_num(lines.deviation, nan=np.inf)
+    scatter, off = deviation * steep, _OFF * steep
+    known = _known(np.log2(f), deviation < AS_THE_MODEL) & (scatter < AS_THE_MODEL)
+    if np.count_nonzero(known) < _LINES:
+        raise ValueError("the lines of the loop do not tell the plant")
+    ratio = np.log(open_from_closed(lines.closed) / (plant.on(f).response() * controller))
+    # Blurred neighbours keep the mean of the last lines from leaning to one side.
+    use = scatter < _BLURRED
+    x = np.log2(f)
+    ratio, scatter = _averaged(x[known], x[use], ratio[use], scatter[use], off[use])
+    ratio = ratio / (1.0 + (scatter**2 + off[known] ** 2) / AS_THE_MODEL**2)
+    f = f[known]
+    ends = np.concatenate([[f[0] / _FADE], f, [f[-1] * _FADE]])
+    faded = np.concatenate([[0.0], ratio, [0.0]])
+    x, xp = np.log(plant.frequency_hz), np.log(ends)
+    joined = np.interp(x, xp, faded.real) + 1j * np.interp(x, xp, faded.imag)
+    return replace(plant, correction=plant.correction * np.exp(joined), also=plant.shifted())
+
+
+def _known(octaves: FloatArray, sharp: BoolArray) -> BoolArray:
+    """Sharp lines up to where they become few: single ones among blurred ones are so by chance."""
+    near = np.abs(octaves[:, None] - octaves) < _OCTAVES
+    dense = np.count_nonzero(near & sharp, axis=1) > _DENSE * near.sum(axis=1)
+    last = dense.size if np.all(dense) else int(np.argmin(dense))
+    return np.asarray(sharp & (np.arange(dense.size) < last))
+
+
+def _averaged(
+    centres: FloatArray, octaves: FloatArray, value: ComplexArray, scatter: FloatArray,
+    off: FloatArray,
+) -> tuple[ComplexArray, FloatArray]:  # fmt: skip
+    """A straight line through the neighbours of each centre, and what is left of their scatter."""
+    out = np.empty(centres.size, dtype=np.complex128)
+    left = np.empty(centres.size)
+    for i, centre in enumerate(centres):
+        x = (octaves - centre) / _OCTAVES
+        near = np.abs(x) < 1.0
+        weight = (1.0 - np.abs(x[near]) ** 3) ** 3 / (scatter[near] ** 2 + off[near] ** 2)
+        total, first = weight.sum(), weight @ x[near]
+        second = weight @ x[near] ** 2
+        spread = total * second - first**2
+        # Too few neighbours for a slope.
+        flat = spread <= 1e-3 * total * second
+        row = weight / total if flat else weight * (second - first * x[near]) / spread
+        out[i] = row @ value[near]
+        left[i] = np.sqrt(row**2 @ scatter[near] ** 2)
+    return out, left
