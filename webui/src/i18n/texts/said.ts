@@ -34,6 +34,7 @@ export const saidTexts = {
   'said.partResponse': ['frequency response', '频率响应'],
   'said.partNotches': ["what the drive's notches do", '测量驱动器陷波器的作用'],
   'said.design': ['notches and gains', '陷波器与增益'],
+  'said.designAgain': ['designing for the axis as its loop shows it', '按回路中测得的特性重新设计'],
   'said.applying': ['applying', '写入'],
   'said.standing': ['verifying that it stands still', '验证轴静止不振'],
   'said.verifying': ['measuring the tuned loop', '测量整定后的回路'],

@@ -528,6 +528,12 @@ export const tuning = {
   ],
   'autotune.verification': ['Verification', '验证'],
   'autotune.predicted': ['predicted', '预测'],
+  'autotune.predictedBefore': ['predicted without the loop', '未考虑回路的预测'],
+  'autotune.predictedAgain': ['predicted from the loop', '根据回路测量的预测'],
+  'autotune.bandwidthsBefore': [
+    'Before that: {predicted} predicted, {measured} measured. The axis was then taken as its loop showed it.',
+    '此前：预测 {predicted}，测得 {measured}。随后以回路中测得的特性作为该轴的依据。',
+  ],
   'autotune.bandwidths': [
     'Bandwidth: {predicted} predicted, {measured} measured.',
     '带宽：预测 {predicted}，测得 {measured}。',

@@ -104,6 +104,24 @@ export interface Step {
   torque_rms_percent: number
 }
 
+/** A loop that answered otherwise than predicted, and the prediction that was made from it. */
+export interface Again {
+  predicted: LoopFigures
+  measured: LoopFigures
+  outcome: string
+  gain_ratio: number | null
+  /** The closed loop that was predicted for the second verification; null without one. */
+  frequency_hz: number[] | null
+  closed_db: number[] | null
+  closed_deg: number[] | null
+}
+
+interface LoopFigures {
+  bandwidth_hz: number | null
+  phase_margin_deg: number | null
+  gain_margin_db: number | null
+}
+
 export interface Autotune {
   inertia: Inertia
   mechanics: Sweep
@@ -115,6 +133,8 @@ export interface Autotune {
     predicted_bandwidth_hz: number | null
     measured_bandwidth_hz: number | null
   } | null
+  /** What was made of a loop that answered otherwise than predicted; absent or null without. */
+  again?: Again | null
   step: Step | null
   before: Record<string, number>
   /** Raw values of what was applied; absent in jobs of an older server. */

@@ -5,7 +5,7 @@ import { known, useT } from '../../i18n'
 import { said } from '../../i18n/said'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
-import { hertz, measuredCurve } from '../response/bode'
+import { hertz, measuredCurve, wrapWhole } from '../response/bode'
 import { BodePlot } from '../response/BodePlot'
 import { Legend } from '../response/Legend'
 import { MarginList, ResonanceTable } from '../response/Readings'
@@ -112,7 +112,7 @@ function Verification({ drive, result }: { drive: string; result: Autotune }) {
   const t = useT()
   const dark = useComputedColorScheme('light') === 'dark'
   const colors = TRACE_COLORS[dark ? 'dark' : 'light']
-  const { applied, verified } = result
+  const { applied, verified, again } = result
   const file = filesOf(result).find((name) => name.includes('sweep-mechanics')) ?? null
   const inertia = result.inertia.inertia_kgm2
   const gains =
@@ -125,29 +125,34 @@ function Verification({ drive, result }: { drive: string; result: Autotune }) {
         }
       : null
   const predicted = usePrediction(drive, file, applied?.notches ?? [], gains)
+  const anew = useMemo(() => {
+    const { frequency_hz, closed_db, closed_deg } = again ?? {}
+    if (!frequency_hz || !closed_db || !closed_deg) return null
+    const label = t('autotune.predictedAgain')
+    const shown = { magnitude: closed_db, phase: wrapWhole(closed_deg, frequency_hz) }
+    return { label, color: colors[2] ?? '', dashed: true, frequency: frequency_hz, ...shown }
+  }, [again, dark, t('autotune.predictedAgain')])
   const curves = useMemo(() => {
     if (!verified) return []
     const measured = measuredCurve(verified.sweep, t('response.measured'), colors[0] ?? '')
     const [low, high] = verified.sweep.valid_band_hz
-    if (!predicted.found) return [measured]
+    if (!predicted.found) return anew ? [measured, anew] : [measured]
     const { frequency_hz, closed_db, closed_deg } = predicted.found
     const inside = <V,>(values: V[]) =>
       values.filter((_, i) => {
         const f = frequency_hz[i] ?? 0
         return f >= low && f <= high
       })
-    return [
-      measured,
-      {
-        label: t('autotune.predicted'),
-        color: colors[1] ?? '',
-        dashed: true,
-        frequency: inside(frequency_hz),
-        magnitude: inside(closed_db),
-        phase: inside(closed_deg),
-      },
-    ]
-  }, [verified, predicted.found, dark, t('autotune.predicted')])
+    const before = {
+      label: t(anew ? 'autotune.predictedBefore' : 'autotune.predicted'),
+      color: colors[1] ?? '',
+      dashed: true,
+      frequency: inside(frequency_hz),
+      magnitude: inside(closed_db),
+      phase: inside(closed_deg),
+    }
+    return anew ? [measured, anew, before] : [measured, before]
+  }, [verified, predicted.found, dark, anew, t('autotune.predicted')])
   if (!verified) return null
   return (
     <>
@@ -158,6 +163,14 @@ function Verification({ drive, result }: { drive: string; result: Autotune }) {
           measured: hertz(verified.measured_bandwidth_hz),
         })}
       </p>
+      {again && anew && (
+        <p className="num">
+          {t('autotune.bandwidthsBefore', {
+            predicted: hertz(again.predicted.bandwidth_hz),
+            measured: hertz(again.measured.bandwidth_hz),
+          })}
+        </p>
+      )}
       <Legend of={curves} />
       <BodePlot
         curves={curves}
