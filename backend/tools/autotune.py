@@ -8,12 +8,11 @@ as they were before.
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 from backend.analysis.design import Candidate
 from backend.analysis.loop_goals import LoadClass, Mark, goals_for
 from backend.analysis.loop_structure import Gains
-from backend.analysis.measured_plant import MeasuredPlant
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
@@ -28,6 +27,8 @@ from backend.tools.interrupted import ends_all
 from backend.tools.probe import holding_torque
 from backend.tools.recording import cycle_s, quiet
 from backend.tools.temporary import stopping_hard, temporary
+from backend.tools.tune_again import Again, Designing, Figures, expected, first_that_holds
+from backend.tools.tune_again import as_json as again_json
 from backend.tools.tune_apply import part
 from backend.tools.tune_candidates import (
     Design,
@@ -86,7 +87,8 @@ class AutotuneResult:
     ``before`` holds raw values that undo what was applied, empty when nothing was written, also
     because ``applied`` is what the axis had. ``tried`` says
     of designs that were taken back why; ``notes`` what the design does without. ``cautious``: no
-    model could be relied on.
+    model could be relied on. ``again``: what was made of a loop that answered otherwise than
+    predicted. ``expected`` is the prediction for ``applied``, read where the verification was.
     """
 
     inertia: inertia_evaluation.InertiaOutcome
@@ -100,6 +102,8 @@ class AutotuneResult:
     tried: tuple[str, ...]
     notes: tuple[str, ...]
     cautious: bool
+    again: Again | None = None
+    expected: Figures | None = None
 
 
 async def autotune(
@@ -306,17 +310,20 @@ async def apply_and_verify(
     clock = time_left or TimeLeft()
     trials = Trials(axis, session, check, promised, progress, keep, time_left=clock)
 
-    def plant() -> MeasuredPlant:
-        return plant_of(found.mechanics, inertia, facts, cautious=found.cautious)
+    def designing(mark: Mark) -> Designing:
+        plant = plant_of(found.mechanics, inertia, facts, cautious=found.cautious)
+        return Designing(plant, found.load, mark, found.cautious, 1.0 / cycle_s(session))
 
-    applied = await trials.first(_order(found, settings.mark), plant())
+    how = designing(settings.mark)
+    applied, again = await first_that_holds(trials, _order(found, settings.mark), how)
     if applied is None and not found.cautious and clock.verifications() >= 1:
         made = await asyncio.to_thread(
             cautious_design, axis.drive, facts, found.mechanics, inertia,
             1.0 / cycle_s(session), "no design on the model keeps its promise",
         )  # fmt: skip
         found = _with(found, made)
-        applied = await trials.first(_order(found, "robust"), plant())
+        how = designing("robust")
+        applied, again = await first_that_holds(trials, _order(found, "robust"), how)
     if applied is None:
         raise NotAllowed(
             f"{axis.drive.name}: no candidate kept its promise when it was verified: "
@@ -325,15 +332,23 @@ async def apply_and_verify(
             remedy="all parameters are as before; look for play and loose parts, measure again, "
             "or choose gains by hand",
         )
-    by_step = "" if applied.verified.sweep.margins else _BY_STEP
+    verified = applied.verified
+    twice = again.told(verified) if again else ""
     said = (
-        by_step, trials.note(applied), clock.told(), otherwise(applied.verified),
-        unseen(applied.candidate.nominal.crossover_hz, applied.verified),
+        "" if verified.sweep.margins else _BY_STEP, trials.note(applied), clock.told(), twice,
+        "" if again and not again.verified_anew else otherwise(verified),
+        unseen(applied.candidate.nominal.crossover_hz, verified),
     )  # fmt: skip
-    notes = (*found.notes, *(each for each in said if each))
+    if twice:
+        # With the measurement, for whoever reads it without the tuning.
+        warnings = (*verified.sweep.warnings, twice)
+        verified = replace(verified, sweep=replace(verified.sweep, warnings=warnings))
+    plant = again.plant if again and again.plant else how.plant
     return replace(
-        found, applied=applied.candidate, verified=applied.verified, step=applied.verified.step,
-        before=applied.before, tried=tuple(trials.tried), notes=notes,
+        found, applied=applied.candidate, verified=verified, step=verified.step,
+        before=applied.before, tried=tuple(trials.tried), again=again,
+        notes=(*found.notes, *(each for each in said if each)),
+        expected=expected(trials, applied, plant),
     )  # fmt: skip
 
 
@@ -371,7 +386,9 @@ def as_json(result: AutotuneResult) -> dict[str, object]:
             "sweep": sweep_evaluation.as_json(verified.sweep),
             "predicted_bandwidth_hz": verified.predicted_bandwidth_hz,
             "measured_bandwidth_hz": verified.measured_bandwidth_hz,
+            "expected": asdict(result.expected) if result.expected else None,
         },
+        "again": again_json(result.again) if result.again else None,
         "step": step_tool.as_json(result.step) if result.step else None,
         "before": result.before,
         "tried": list(result.tried),

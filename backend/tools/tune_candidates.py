@@ -55,21 +55,20 @@ def load_class(mechanics: SweepResult) -> LoadClass:
 def candidates_for(
     drive: Drive, facts: AxisFacts, plant: MeasuredPlant, inertia_kgm2: float, load: LoadClass,
     sample_rate_hz: float | None = None, *, filters: bool = False, notches: bool = True,
+    highest_hz: float | None = None,
 ) -> tuple[Candidate, ...]:  # fmt: skip
     """All candidates for a measured plant; with a sample rate only those that can be verified.
 
-    ``filters``: the drive's torque and speed filters may be set, too.
+    ``filters``: the drive's torque and speed filters may be set, too. No speed bandwidth comes out
+    above ``highest_hz``.
     """
     profile = drive.profile
     loops = gain_tool.loops_of(drive, facts)
     if filters:
         loops = replace(loops, choices=gain_tool.filter_choices(drive, loops.filters))
-    if sample_rate_hz is not None:
-        highest = _VERIFIABLE * sample_rate_hz
-        loops = replace(
-            loops,
-            highest_speed_bandwidth_hz=min(loops.highest_speed_bandwidth_hz or highest, highest),
-        )
+    verifiable = None if sample_rate_hz is None else _VERIFIABLE * sample_rate_hz
+    limits = [hz for hz in (loops.highest_speed_bandwidth_hz, verifiable, highest_hz) if hz]
+    loops = replace(loops, highest_speed_bandwidth_hz=min(limits, default=None))
     meaning = meaning_of(drive)
     known = meaning is not None or not notch_effect.unknown(drive)
     slots = len(profile.notch.slots) if profile.notch is not None and known and notches else 0

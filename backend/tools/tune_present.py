@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from backend.analysis.arrays import ComplexArray, FloatArray
 from backend.analysis.design import Candidate, described
 from backend.analysis.loop_goals import Goals, stable_with_less_gain, worst_of
 from backend.analysis.loop_structure import Gains, LoopFilters, speed_loop
@@ -99,7 +100,7 @@ async def present(
     )  # fmt: skip
     try:
         candidate, sound = await asyncio.to_thread(
-            _judged, axis, facts, plant, gains, tuple(notches),
+            judged, axis, facts, plant, gains, tuple(notches),
             LoopFilters(facts.speed_filter_hz, facts.torque_filter_hz), goals,
         )  # fmt: skip
     except (NotAllowed, ValueError):
@@ -107,7 +108,7 @@ async def present(
     return Present(now.speed_nms, candidate, sound)
 
 
-def _judged(
+def judged(
     axis: Axis, facts: AxisFacts, plant: MeasuredPlant, gains: Gains, notches: tuple[Notch, ...],
     filters: LoopFilters, goals: Goals,
 ) -> tuple[Candidate, bool]:  # fmt: skip
@@ -116,16 +117,29 @@ def _judged(
     Raises:
         NotAllowed, ValueError: a part of the loop has no known meaning.
     """
-    drive, f = axis.drive, plant.frequency_hz
-    fixed = gain_tool.loops_of(drive, facts).with_filters(filters).response(f)
-    if notches:
-        fixed = fixed * notch_tool.combined(drive.profile, notches, f, meaning_of(drive))
+    f = plant.frequency_hz
+    fixed = fixed_of(axis, facts, notches, filters, f)
     loops = speed_loop(f, plant.shifted(), fixed, gains)
     worst = worst_of(loops)
     candidate = described(
         f, plant.response(), fixed, gains, worst.promised, notches=notches, filters=filters
     )
     return candidate, worst.meets(goals) and stable_with_less_gain(loops)
+
+
+def fixed_of(
+    axis: Axis, facts: AxisFacts, notches: tuple[Notch, ...], filters: LoopFilters, f: FloatArray
+) -> ComplexArray:
+    """All of a drive's loop but its gains and the mechanics, on these lines.
+
+    Raises:
+        NotAllowed, ValueError: a part of the loop has no known meaning.
+    """
+    drive = axis.drive
+    fixed = gain_tool.loops_of(drive, facts).with_filters(filters).response(f)
+    if notches:
+        fixed = fixed * notch_tool.combined(drive.profile, notches, f, meaning_of(drive))
+    return fixed
 
 
 @dataclass
@@ -190,7 +204,7 @@ class Trials:
                 share * g.speed_bandwidth_hz,
             )  # fmt: skip
             made, sound = await asyncio.to_thread(
-                _judged, self.axis, self.check.facts, plant, gains, candidate.notches,
+                judged, self.axis, self.check.facts, plant, gains, candidate.notches,
                 candidate.filters, self.promised,
             )  # fmt: skip
             return replace(made, marks=candidate.marks) if sound else None

@@ -20,6 +20,8 @@ class TimeLeft:
     longest_s: float = 0.0
     """The longest verification so far, 0 before the first."""
     left_out: int = 0
+    extra_s: float = 0.0
+    """Spent on what only time that is left is spent on."""
 
     @classmethod
     def of(cls, budget_s: float) -> TimeLeft:
@@ -32,20 +34,36 @@ class TimeLeft:
             return math.inf
         return math.floor(max(self.until_s - time.monotonic(), 0.0) / self.longest_s)
 
-    def pairs(self, first_s: float, most: int) -> int:
-        """How many pairs of realisations there is time for, where the first took ``first_s``."""
+    def pairs(self, first_s: float, most: int, looks: int = 0) -> int:
+        """How many pairs of realisations there is time for, where the first took ``first_s``.
+
+        Beside so many ``looks``, further verifications, where there is time for all of them.
+        """
         left_s = self.until_s - time.monotonic() - _AROUND_S
+        spare_s = looks * (first_s + _AROUND_S)
+        if left_s >= spare_s:
+            left_s -= spare_s
         return max(0, int(min(left_s / max(first_s, 1e-3), float(most))))
 
     @contextmanager
-    def verifying(self) -> Iterator[None]:
-        """Measures what one verification takes."""
+    def extra(self) -> Iterator[None]:
+        """Counts as no part of what one verification takes."""
         begun_s = time.monotonic()
         try:
             yield
         finally:
+            self.extra_s += time.monotonic() - begun_s
+
+    @contextmanager
+    def verifying(self) -> Iterator[None]:
+        """Measures what one verification takes."""
+        begun_s, extra_s = time.monotonic(), self.extra_s
+        try:
+            yield
+        finally:
+            took_s = time.monotonic() - begun_s - (self.extra_s - extra_s)
             # One that fails early may be followed by one that does not.
-            took_s = max(time.monotonic() - begun_s, _AROUND_S)
+            took_s = max(took_s, _AROUND_S)
             self.longest_s = max(self.longest_s, took_s)
 
     def told(self) -> str:

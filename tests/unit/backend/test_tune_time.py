@@ -97,6 +97,27 @@ def test_as_many_realisations_as_there_is_time_for(clock: Clock, used_s: float, 
     assert left.pairs(7.0, 4) == pairs
 
 
+@pytest.mark.parametrize(
+    ("used_s", "pairs"),
+    # Two further verifications take 22 s; where they do not fit, nothing is kept for them.
+    [(5.0, 4), (12.0, 3), (27.0, 1), (34.0, 0), (36.0, 2), (100.0, 0)],
+)
+def test_time_is_kept_for_looking_again(clock: Clock, used_s: float, pairs: int) -> None:
+    left = TimeLeft.of(60.0)
+    clock.work(used_s)
+    assert left.pairs(7.0, 4, 2) == pairs
+
+
+def test_what_only_spare_time_is_spent_on_is_no_part_of_a_verification(clock: Clock) -> None:
+    left = TimeLeft.of(60.0)
+    with left.verifying():
+        clock.work(9.0)
+        with left.extra():
+            clock.work(20.0)
+    assert left.longest_s == 9.0
+    assert left.verifications() == 3
+
+
 async def test_what_it_had_is_not_measured_where_time_is_over(
     monkeypatch: pytest.MonkeyPatch, clock: Clock
 ) -> None:

@@ -172,6 +172,8 @@ async def test_another_bandwidth_than_predicted_is_measured_with_more_realisatio
     # Margins are read from the first, and all motion is counted.
     assert found.sweep.margins["crossover_hz"] == sharp_margins(first)["crossover_hz"]
     assert found.sweep.motion_s == first.motion_s + more.motion_s
+    # What is known of the response is what all of them tell.
+    assert found.seen is more.frf
 
 
 async def test_the_predicted_bandwidth_is_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
