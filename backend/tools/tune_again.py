@@ -24,7 +24,7 @@ from backend.analysis.loop_structure import speed_loop
 from backend.analysis.margins import closed_from_open
 from backend.analysis.measured_plant import MeasuredPlant
 from backend.tools.temporary import write_settings
-from backend.tools.tune_apply import Applied, first_kept, take_back
+from backend.tools.tune_apply import Applied, first_kept, nothing_stays, take_back
 from backend.tools.tune_candidates import candidates_for
 from backend.tools.tune_present import Trials, fixed_of, judged
 from backend.tools.tune_verify import LOOKS, MOST_PAIRS, Verified, sharp_margins
@@ -183,22 +183,24 @@ async def again(
     if not first.before:
         return first, None  # What the axis had: nothing was designed.
     candidate = first.candidate
-    told = Again(
-        expected(trials, first, how.plant), _measured(first.verified), "unclear",
-        first.verified.sweep.motion_s,
-    )  # fmt: skip
-    if not contradictions(told.predicted, told.measured):
-        return first, None
-    # Where the second one fails, a more careful design must still be possible.
-    if trials.time_left.verifications() < LOOKS:
-        return first, replace(told, outcome="time")
-    trials.progress(0.6, "4 of 6: designing for the axis as its loop shows it")
-    lines = loop_lines(first.verified.seen)
-    try:
-        plant = seen_in_loop(how.plant, lines, _controller(trials, candidate, lines.frequency_hz))
-    except ValueError:
-        return first, told
-    second = await asyncio.to_thread(_designed, trials, candidate, how, plant)
+    async with nothing_stays(trials.axis, first.before):
+        told = Again(
+            expected(trials, first, how.plant), _measured(first.verified), "unclear",
+            first.verified.sweep.motion_s,
+        )  # fmt: skip
+        if not contradictions(told.predicted, told.measured):
+            return first, None
+        # Where the second one fails, a more careful design must still be possible.
+        if trials.time_left.verifications() < LOOKS:
+            return first, replace(told, outcome="time")
+        trials.progress(0.6, "4 of 6: designing for the axis as its loop shows it")
+        lines = loop_lines(first.verified.seen)
+        controller = _controller(trials, candidate, lines.frequency_hz)
+        try:
+            plant = seen_in_loop(how.plant, lines, controller)
+        except ValueError:
+            return first, told
+        second = await asyncio.to_thread(_designed, trials, candidate, how, plant)
     if second is None or (trials.had.slower(second) and not trials.had.slower(candidate)):
         return first, replace(told, outcome="none")
     told = replace(told, gain_ratio=second.gains.speed_nms / candidate.gains.speed_nms)
@@ -322,7 +324,8 @@ async def _in_place_of(
     ``fall_back``: the first one may stay; not so where it is the second one.
     """
     axis = trials.axis
-    raw = {key: await axis.drive.raw(key) for key in first.before}
+    async with nothing_stays(axis, first.before):
+        raw = {key: await axis.drive.raw(key) for key in first.before}
     await take_back(axis, first.before)
     check = replace(trials.check, pairs_before=MOST_PAIRS)
     applied = await first_kept(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 from backend.analysis.design import Candidate
@@ -111,6 +112,16 @@ def stages(progress: Progress) -> tuple[Progress, Progress, Progress]:
 async def take_back(axis: Axis, before: dict[str, int]) -> None:
     """Put these raw values back, whatever happens meanwhile."""
     await put_back_in_time(axis, before)
+
+
+@asynccontextmanager
+async def nothing_stays(axis: Axis, before: dict[str, int]) -> AsyncIterator[None]:
+    """What ends the tuning in here takes back what is written."""
+    try:
+        yield
+    except BaseException:
+        await take_back(axis, before)
+        raise
 
 
 def part(progress: Progress, low: float, high: float, step: str) -> Progress:

@@ -29,7 +29,7 @@ from backend.tools.interrupted import ends_all
 from backend.tools.notch_effect import unknown
 from backend.tools.notch_meaning import meaning_of
 from backend.tools.temporary import write_settings
-from backend.tools.tune_apply import Applied, first_kept, stages, take_back
+from backend.tools.tune_apply import Applied, first_kept, nothing_stays, stages, take_back
 from backend.tools.tune_time import TimeLeft
 from backend.tools.tune_verify import Check, Keep, otherwise, verify
 from drivers.errors import DriveError, NotAllowed
@@ -188,7 +188,8 @@ class Trials:
         """
         if not self._may_stay():
             return slower
-        raw = {key: await self.axis.drive.raw(key) for key in slower.before}
+        async with nothing_stays(self.axis, slower.before):
+            raw = {key: await self.axis.drive.raw(key) for key in slower.before}
         await take_back(self.axis, slower.before)
         kept = await self._as_it_was()
         if kept is not None and kept.verified.sweep.margins:

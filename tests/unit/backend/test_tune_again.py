@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -15,7 +16,7 @@ from backend.analysis.measured_plant import MeasuredPlant
 from backend.analysis.mechanical_model import MechanicalModel
 from backend.axis import Envelope
 from backend.jobs import Progress
-from backend.tools import tune_again
+from backend.tools import tune_again, tune_apply
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.excite import Room, band_for, loop_reference
 from backend.tools.tune_again import Again, Designing, Figures, contradictions
@@ -60,10 +61,11 @@ def test_words_say_what_was_predicted_first_and_what_was_verified_then() -> None
 
 async def outcome(
     monkeypatch: pytest.MonkeyPatch, *, gain: float, keeps: bool, time_left: TimeLeft,
-    read: Figures = SECOND,
+    read: Figures = SECOND, held: dict[str, int] | None = None, ended_at: str = "",
 ) -> tuple[Applied | None, Again | None, dict[str, int], list[int]]:  # fmt: skip
     """What stays, what is told, what the drive holds then, and which pairs were passed over."""
-    held, pairs = dict(NEW), list[int]()
+    held = dict(NEW) if held is None else held
+    pairs = list[int]()
     first = design(10.0)
     swept = loop_swept(1.0)
     verified: Any = SimpleNamespace(
@@ -90,10 +92,19 @@ async def outcome(
         monkeypatch.setattr(tune_again, replaced.__name__, replaced)
     monkeypatch.setattr(tune_again, "expected", lambda *_: FIRST)
     monkeypatch.setattr(tune_again, "_measured", lambda _: read)
-    monkeypatch.setattr(tune_again, "_designed", lambda *_: design(gain))
+    monkeypatch.setattr(tune_apply, "take_back", take_back)
+
+    def designed(*_: Any) -> Candidate:
+        if ended_at == "design":
+            raise asyncio.CancelledError
+        return design(gain)
+
+    monkeypatch.setattr(tune_again, "_designed", designed)
     monkeypatch.setattr(tune_again, "fixed_of", lambda *given: np.ones(given[-1].size, complex))
 
     async def raw(key: str) -> int:
+        if ended_at == "reading":
+            raise asyncio.CancelledError
         return held[key]
 
     axis: Any = SimpleNamespace(drive=SimpleNamespace(name="X", raw=raw))
@@ -169,6 +180,18 @@ async def test_the_same_design_that_fails_the_second_time_does_not_stay(
         monkeypatch, gain=10.0, keeps=False, time_left=TimeLeft()
     )
     assert applied is None
+    assert held == WAS
+
+
+@pytest.mark.parametrize("where", ["design", "reading"])
+async def test_ended_between_two_verifications_nothing_stays(
+    monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    held = dict(NEW)
+    with pytest.raises(asyncio.CancelledError):
+        await outcome(
+            monkeypatch, gain=10.0, keeps=True, time_left=TimeLeft(), held=held, ended_at=where
+        )
     assert held == WAS
 
 

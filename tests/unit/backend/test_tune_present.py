@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 
 from backend.analysis.design import Candidate
 from backend.jobs import Progress
-from backend.tools import tune_present
+from backend.tools import tune_apply, tune_present
 from backend.tools.tune_apply import Applied
 from tests.unit.backend.test_tune_hum import GOALS, design
 
@@ -18,10 +19,14 @@ WAS, NEW = {"2005:03": 700}, {"2005:03": 200}
 
 
 async def outcome(
-    monkeypatch: pytest.MonkeyPatch, *, measured_hz: float, as_it_was_keeps: bool
-) -> tuple[Applied, dict[str, int], list[str], str]:
-    """What stays, what the drive holds then, what was tried, and what the result says."""
-    held = dict(NEW)
+    monkeypatch: pytest.MonkeyPatch, *, measured_hz: float, as_it_was_keeps: bool,
+    held: dict[str, int] | None = None, cancelled: bool = False,
+) -> tuple[Applied, dict[str, int], list[str], str]:  # fmt: skip
+    """What stays, what the drive holds then, what was tried, and what the result says.
+
+    ``cancelled``: while the design is read, before it is taken back.
+    """
+    held = dict(NEW) if held is None else held
     had = tune_present.Present(7.0, design(7.0), sound=False)
     slow: Any = SimpleNamespace(
         predicted_bandwidth_hz=60.0, measured_bandwidth_hz=measured_hz, kept=True, why=""
@@ -50,8 +55,11 @@ async def outcome(
 
     for replaced in (present, first_kept, verify, take_back, write_settings):
         monkeypatch.setattr(tune_present, replaced.__name__, replaced)
+    monkeypatch.setattr(tune_apply, "take_back", take_back)
 
     async def raw(key: str) -> int:
+        if cancelled:
+            raise asyncio.CancelledError
         return held[key]
 
     axis: Any = SimpleNamespace(drive=SimpleNamespace(name="X", raw=raw))
@@ -84,3 +92,14 @@ async def test_a_prediction_that_was_right_is_believed(monkeypatch: pytest.Monke
     applied, held, _tried, note = await outcome(monkeypatch, measured_hz=61.0, as_it_was_keeps=True)
     assert (applied.candidate.gains.speed_nms, held) == (2.0, NEW)
     assert "too little margin" in note
+
+
+async def test_cancelled_between_two_verifications_nothing_stays(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    held = dict(NEW)
+    with pytest.raises(asyncio.CancelledError):
+        await outcome(
+            monkeypatch, measured_hz=90.0, as_it_was_keeps=True, held=held, cancelled=True
+        )
+    assert held == WAS
