@@ -41,6 +41,25 @@ _SAME = 0.02
 #: lines of the loop are known.
 Outcome = Literal["same", "other", "not kept", "none", "time", "unclear"]
 
+#: Said where a prediction did not stand.
+_OTHERWISE = (
+    "the tuned loop answered otherwise than the axis as it was measured before lets expect, as "
+    "with play (gear, coupling, key) or a resonance too narrow for the lines"
+)
+_OUTCOMES: dict[Outcome, str] = {
+    "same": "the design keeps all goals for the axis as its loop shows it, too",
+    "not kept": (
+        "a design for the axis as its loop shows it did not keep its promise, so the first one, "
+        "which did, is in force again"
+    ),
+    "none": (
+        "no design keeps all goals for the axis both as it was measured and as its loop shows it "
+        "and is faster than what it had, so this one stays, which kept its promise"
+    ),
+    "time": "there was no time to design for the axis as its loop shows it",
+    "unclear": "too few lines of the loop are known to design for the axis as it shows it",
+}
+
 
 @dataclass(frozen=True)
 class Figures:
@@ -79,45 +98,22 @@ class Again:
 
     def told(self, verified: Verified) -> str:
         """Everything in words; ``verified`` is the last verification that counts."""
-        off = ", ".join(contradictions(self.predicted, self.measured))
-        first = (
-            "the tuned loop answered otherwise than the axis as it was measured before lets "
-            f"expect ({off}), as with play (gear, coupling, key) or a resonance too narrow for the "
-            "lines"
-        )
-        return f"{first}: {self._then(verified)}"
-
-    def _then(self, verified: Verified) -> str:
-        if self.outcome == "time":
-            return (
-                "there was no time to design for the axis as its loop shows it; tuned again, there "
-                "may be, as what is known of the drive need not be learned twice"
-            )
-        if self.outcome == "unclear":
-            return "too few lines of the loop are known to design for the axis as it shows it"
-        if self.outcome == "none":
-            return (
-                "no design keeps all goals for the axis both as it was measured and as its loop "
-                "shows it and is faster than what it had, so this one stays, which kept its promise"
-            )
-        if self.outcome == "not kept":
-            return (
-                "a design for the axis as its loop shows it did not keep its promise, so the first "
-                "one, which did, is in force again"
-            )
+        parts = [*contradictions(self.predicted, self.measured), self._outcome()]
         have, want = verified.measured_bandwidth_hz, verified.predicted_bandwidth_hz
-        now = "the design keeps all goals for the axis as its loop shows it, too"
-        if self.outcome == "other":
-            now = (
-                "it was designed again for the axis both as it was measured and as its loop shows "
-                f"it, with {self.gain_ratio:.0%} of the speed gain"
+        if self.verified_anew and have is not None and want is not None:
+            parts.append(
+                f"verified with other realisations at {have:.0f} Hz, predicted from the loop at "
+                f"{want:.0f} Hz"
             )
-        if have is None or want is None:
-            return f"{now}, and was verified with other realisations"
-        return (
-            f"{now}, and was verified with other realisations at {have:.0f} Hz, predicted from the "
-            f"loop at {want:.0f} Hz"
-        )
+        return f"{_OTHERWISE}: {'; '.join(parts)}"
+
+    def _outcome(self) -> str:
+        if self.outcome == "other":
+            return (
+                "designed again for the axis both as it was measured and as its loop shows it, "
+                f"with {self.gain_ratio:.0%} of the speed gain"
+            )
+        return _OUTCOMES[self.outcome]
 
 
 def as_json(again: Again) -> dict[str, object]:
@@ -261,13 +257,13 @@ def contradictions(predicted: Figures, measured: Figures) -> list[str]:
     words = []
     want, have = predicted.bandwidth_hz, measured.bandwidth_hz
     if want and have and abs(have / want - 1.0) > _WIDTH:
-        words.append(f"-3 dB point {have:.0f} Hz instead of {want:.0f} Hz")
+        words.append(f"-3 dB point at {have:.0f} Hz where {want:.0f} Hz was predicted")
     want, have = predicted.phase_margin_deg, measured.phase_margin_deg
     if want is not None and have is not None and abs(have - want) > _DEG:
-        words.append(f"phase margin {have:.0f}° instead of {want:.0f}°")
+        words.append(f"phase margin of {have:.0f}° where {want:.0f}° was predicted")
     want, have = predicted.gain_margin_db, measured.gain_margin_db
     if want is not None and have is not None and abs(have - want) > _DB:
-        words.append(f"gain margin {have:.1f} dB instead of {want:.1f} dB")
+        words.append(f"gain margin of {have:.1f} dB where {want:.1f} dB was predicted")
     return words
 
 

@@ -37,6 +37,16 @@ describe('what the server says of a job', () => {
       ),
     ).toBe('转矩达到限值：请提高限值或降低加速度\n运动不符合惯量与摩擦模型（R² 低于 0.8）')
   })
+  it('is told part by part where a loop contradicts its prediction', () => {
+    expect(
+      said(
+        zh,
+        'the tuned loop answered otherwise than the axis as it was measured before lets expect, as with play (gear, coupling, key) or a resonance too narrow for the lines: -3 dB point at 110 Hz where 128 Hz was predicted; phase margin of 59° where 52° was predicted; designed again for the axis both as it was measured and as its loop shows it, with 87% of the speed gain; verified with other realisations at 113 Hz, predicted from the loop at 115 Hz',
+      ),
+    ).toBe(
+      '整定后回路的响应与此前测得的轴特性所预期的不同，可能因间隙（齿轮、联轴器、键）或谐振窄于谱线间隔：−3 dB 点在 110 Hz，预测为 128 Hz；相位裕度 59°，预测为 52°；已针对测得的和回路中显示的轴特性重新设计，速度增益为原方案的 87%；以其他激励验证为 113 Hz，根据回路预测为 115 Hz',
+    )
+  })
   it('is told whole where a sentence has a colon or a semicolon of its own', () => {
     expect(
       said(zh, 'coherence is low: raise the excitation, or look for backlash and friction'),

@@ -243,6 +243,50 @@ export const saidOfTuning = {
     'the bandwidth was verified at {measured} Hz instead of the {predicted} Hz that were predicted, with the margins kept: the axis answers otherwise than as it was measured, as with play (gear, coupling, key) or a resonance too narrow for the lines',
     '验证的带宽为 {measured} Hz，而预测为 {predicted} Hz，裕度仍满足：轴的响应与测量时不同，可能因间隙（齿轮、联轴器、键）或谐振窄于谱线间隔',
   ],
+  'said.tOtherwise': [
+    'the tuned loop answered otherwise than the axis as it was measured before lets expect, as with play (gear, coupling, key) or a resonance too narrow for the lines',
+    '整定后回路的响应与此前测得的轴特性所预期的不同，可能因间隙（齿轮、联轴器、键）或谐振窄于谱线间隔',
+  ],
+  'said.tWasWidth': [
+    '-3 dB point at {have} Hz where {want} Hz was predicted',
+    '−3 dB 点在 {have} Hz，预测为 {want} Hz',
+  ],
+  'said.tWasPhase': [
+    'phase margin of {have}° where {want}° was predicted',
+    '相位裕度 {have}°，预测为 {want}°',
+  ],
+  'said.tWasGain': [
+    'gain margin of {have} dB where {want} dB was predicted',
+    '幅值裕度 {have} dB，预测为 {want} dB',
+  ],
+  'said.tAgainSame': [
+    'the design keeps all goals for the axis as its loop shows it, too',
+    '对于回路中测得的轴特性，该方案同样满足所有目标',
+  ],
+  'said.tAgainOther': [
+    'designed again for the axis both as it was measured and as its loop shows it, with {share} of the speed gain',
+    '已针对测得的和回路中显示的轴特性重新设计，速度增益为原方案的 {share}',
+  ],
+  'said.tAgainVerified': [
+    'verified with other realisations at {have} Hz, predicted from the loop at {want} Hz',
+    '以其他激励验证为 {have} Hz，根据回路预测为 {want} Hz',
+  ],
+  'said.tAgainFailed': [
+    'a design for the axis as its loop shows it did not keep its promise, so the first one, which did, is in force again',
+    '针对回路中轴特性的方案未达到预期，因此恢复使用达到预期的第一个方案',
+  ],
+  'said.tAgainNone': [
+    'no design keeps all goals for the axis both as it was measured and as its loop shows it and is faster than what it had, so this one stays, which kept its promise',
+    '没有方案能同时满足测得的和回路中显示的轴特性的所有目标且快于原有设置，因此保留已达到预期的本方案',
+  ],
+  'said.tAgainTime': [
+    'there was no time to design for the axis as its loop shows it',
+    '没有时间针对回路中的轴特性进行设计',
+  ],
+  'said.tAgainUnclear': [
+    'too few lines of the loop are known to design for the axis as it shows it',
+    '回路中可用的谱线太少，无法据此进行设计',
+  ],
   'said.tUnseen': [
     'the loop crosses 0 dB for the last time at {hz} Hz, above the {highest} Hz that were verified with this cycle time: its margins there are predicted, and seen by the standstill and the step alone; a shorter cycle shows them',
     '回路最后一次穿越 0 dB 在 {hz} Hz，高于当前周期下已验证的 {highest} Hz：该处裕度为预测值，仅由静止和阶跃检验；更短的周期可测得',
