@@ -123,7 +123,7 @@ async def verify(
     swept = await sweep_tool.sweep(axis, session, settings, measuring, keep)
     read = sharp_margins(swept)
     # To verify once more what this loop says is worth more than to measure it for longer.
-    looks = LOOKS if read and not check.pairs_before else 0
+    looks = LOOKS - bool(check.pairs_before) if read else 0
     pairs = clock.pairs(time.monotonic() - begun_s, MOST_PAIRS, looks)
     missed = worse_than(promised, read)
     unsure = not read or not _as_predicted(candidate.bandwidth_hz, _width_of(read), _DOUBTED)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -129,15 +129,27 @@ def test_a_crossover_above_the_verified_lines_is_told(
         assert "400 Hz" in words
 
 
+@dataclass
+class Kept(TimeLeft):
+    """Notes for how many verifications time was kept."""
+
+    looks: list[int] = field(default_factory=list)
+
+    def pairs(self, first_s: float, most: int, looks: int = 0) -> int:
+        self.looks.append(looks)
+        return super().pairs(first_s, most, looks)
+
+
 async def verified_of(
     monkeypatch: pytest.MonkeyPatch, predicted_hz: float, answers: list[SweepResult],
-    time_left: TimeLeft | None = None,
+    time_left: TimeLeft | None = None, pairs_before: int = 0,
 ) -> tuple[Verified, list[int]]:  # fmt: skip
     """What a verification makes of these answers, and how many pairs were played for each."""
     pairs: list[int] = []
 
     async def sweep(_axis: object, _session: object, settings: SweepSettings, *_: object):
         pairs.append(settings.realisations)
+        assert settings.pairs_before == pairs_before
         return answers[len(pairs) - 1]
 
     async def stepped(*_: object) -> StepResult:
@@ -153,7 +165,10 @@ async def verified_of(
     nominal = Margins(40.0, 65.0, 40.0, None, None, 1.3, 60.0, True)
     candidate = Candidate((), gains, predicted_hz, None, nominal, PROMISED, 0.0, 5.0, 0.1)
     facts = AxisFacts(1.27, True, 3000.0, 1000.0, None, None, None, False)
-    check = Check(Envelope(4.0, 1500.0, 100.0, 60.0), facts, 1e-4, None, None, None)
+    check = Check(
+        Envelope(4.0, 1500.0, 100.0, 60.0), facts, 1e-4, None, None, None,
+        pairs_before=pairs_before,
+    )  # fmt: skip
     told = (Progress(lambda: None), Progress(lambda: None), Progress(lambda: None))
     found = await verify(None, None, check, candidate, PROMISED, told, None, time_left)
     return found, pairs
@@ -187,6 +202,21 @@ async def test_no_time_is_left_for_more_realisations(monkeypatch: pytest.MonkeyP
     assert pairs == [1]
     assert found.kept
     assert otherwise(found)
+
+
+@pytest.mark.parametrize(("pairs_before", "left_s"), [(0, 12.2), (4, 8.2)])
+async def test_time_for_verifications_that_may_follow_is_kept(
+    monkeypatch: pytest.MonkeyPatch, pairs_before: int, left_s: float
+) -> None:
+    """A pair takes no time here, and each verification 4 s around it: two, or one, may follow."""
+    answers = [loop_swept(1.0), loop_swept(1.0)]
+    _found, pairs = await verified_of(
+        monkeypatch, 80.0, answers, TimeLeft.of(left_s), pairs_before=pairs_before
+    )
+    assert pairs == [1, 4]
+    left = Kept.of(left_s)
+    await verified_of(monkeypatch, 80.0, answers, left, pairs_before=pairs_before)
+    assert left.looks == [2 if not pairs_before else 1]
 
 
 async def test_margins_that_more_realisations_miss_are_missed(
