@@ -37,9 +37,9 @@ from backend.tools.tune_candidates import (
     design_for,
     plant_of,
 )
-from backend.tools.tune_notches import Learning, learn_notches
+from backend.tools.tune_notches import Learning, learn_notches, learning_s
 from backend.tools.tune_present import Trials
-from backend.tools.tune_time import TimeLeft
+from backend.tools.tune_time import NOT_AGAIN, TimeLeft
 from backend.tools.tune_verify import Check, Keep, Verified, otherwise, unseen
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
@@ -56,6 +56,11 @@ _TOO_MUCH_TORQUE = "is beyond the limit"
 #: Gains that hardly any axis oscillates with, for measuring one that does with its own.
 #: With the inertia that the drive holds, and with that of the motor alone.
 _SOFT_HZ, _SOFT_ALONE_HZ = 5.0, 20.0
+#: Said where a load that swings was not moved a second time.
+_ONE_MOVE = (
+    "the load swings, and the axis was not moved a second time, gently, as the time for one tuning "
+    "was used up"
+)
 #: Deviations to either side that hold 95 of 100 cases.
 _CI95 = 1.96
 
@@ -123,7 +128,8 @@ async def autotune(
     progress(0.0, "1 of 6: pre-checks")
     facts = await _pre_checks(axis, settings)
     async with stopping_hard(axis, settings.envelope.speed_rpm):
-        return await _tuned(axis, session, settings, facts, progress, keep, time_left)
+        found = await _tuned(axis, session, settings, facts, progress, keep, time_left)
+    return replace(found, notes=(*found.notes, *time_left.given_up))
 
 
 async def _tuned(
@@ -134,14 +140,16 @@ async def _tuned(
     home = await axis.position_raw()
     gains = await _steady_gains(axis, session, facts)
     try:
-        found = await _measured(axis, session, settings, facts, gains, progress, keep)
+        found = await _measured(axis, session, settings, facts, gains, progress, keep, time_left)
     except NotAllowed as error:
         faulty = await axis.state() in (State.FAULT, State.FAULT_REACTION)
         if gains or faulty or _TOO_MUCH_TORQUE not in error.message:
             raise
         # It stood still, but its own gains answer a motion with all the torque there is.
         gains = _soft_gains(axis, facts)
-        found = await _measured(axis, session, settings, facts, gains, progress, keep, home)
+        found = await _measured(
+            axis, session, settings, facts, gains, progress, keep, time_left, home
+        )
     facts = sweep_evaluation.completed(facts, found.mechanics)
     progress(0.6, "4 of 6: notches and gains")
     found = _with(found, await _design(axis, session, settings, facts, found))
@@ -152,7 +160,8 @@ async def _tuned(
 
 async def _measured(
     axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
-    gains: dict[str, int], progress: Progress, keep: Keep | None, begun_raw: int | None = None,
+    gains: dict[str, int], progress: Progress, keep: Keep | None, time_left: TimeLeft,
+    begun_raw: int | None = None,
 ) -> AutotuneResult:  # fmt: skip
     """Inertia, frequency response and what the notches do, with these gains meanwhile.
 
@@ -162,6 +171,7 @@ async def _measured(
         if begun_raw is not None:
             await quiet(axis)
             await go_back(axis, session, begun_raw, settings.envelope, facts)
+        moving = time_left.moving()
         outcome = await inertia_tool.inertia(
             axis, session,
             inertia_evaluation.InertiaSettings(
@@ -169,18 +179,25 @@ async def _measured(
                 rated_torque_nm=settings.rated_torque_nm,
                 motor_inertia_kgm2=settings.motor_inertia_kgm2,
             ),
-            part(progress, 0.05, 0.3, "2 of 6: inertia and friction"), keep,
+            part(progress, 0.05, 0.3, "2 of 6: inertia and friction"), keep, moving,
         )  # fmt: skip
+        if moving.left_out:
+            time_left.give_up(_ONE_MOVE)
         _require_inertia(axis, outcome)
+        how = Learning(settings.envelope, settings.loop, settings.scheme)
+        playing = time_left.measuring(learning_s(axis, how, facts, outcome))
         mechanics = await sweep_tool.sweep(
             axis, session, _sweep_settings(settings, outcome),
-            part(progress, 0.3, 0.5, "3 of 6: frequency response"), keep,
+            part(progress, 0.3, 0.5, "3 of 6: frequency response"), keep, playing,
         )  # fmt: skip
+        time_left.lossy = playing.lossy
+        if playing.left_out:
+            time_left.give_up(NOT_AGAIN)
         _require_torque(axis, mechanics)
         plain = await learn_notches(
-            axis, session, Learning(settings.envelope, settings.loop, settings.scheme),
+            axis, session, how,
             sweep_evaluation.completed(facts, mechanics), outcome, mechanics,
-            part(progress, 0.5, 0.6, "3 of 6: what the drive's notches do"),
+            part(progress, 0.5, 0.6, "3 of 6: what the drive's notches do"), time_left,
         )  # fmt: skip
     return AutotuneResult(
         outcome, mechanics, "medium", (), None, None, None, {}, (), (plain,) if plain else (), False

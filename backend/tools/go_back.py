@@ -11,9 +11,13 @@ from backend.tools.recording import Play, bus_limits, cycle_s, enabled, play, qu
 from drivers.cia402 import Mode
 
 _TURN = 2 * np.pi
-#: Nearer than this (in turns) is near enough.
-_NEAR_REV = 0.02
+#: Nearer than the larger of these (turns, share of the travel) is near enough.
+_NEAR_REV, _NEAR = 0.02, 0.0125
 _ATTEMPTS = 3
+#: So much more is asked for at most, in turns and as a share of the travel.
+_MISSED_REV, _MISSED = 0.3, 0.2
+#: What share of a way a loop goes, and moves that are different enough to tell.
+_SHARES, _TOLD_APART_REV = (0.4, 1.5), 0.02
 
 
 async def go_back(
@@ -21,14 +25,20 @@ async def go_back(
 ) -> None:
     """Move to ``goal_raw`` in CSV with a raised-cosine profile; repeats where the loop is soft.
 
+    A load that pulls takes the same way of each move, until the loop's integral holds it, and a
+    loop without an integral goes a share of what is asked: the next move is asked for more.
+
     Raises:
         NotAllowed: the motion was ended by the envelope or a fault.
     """
     units = await axis.units()
+    rest = units.position(goal_raw - await axis.position_raw())
+    most = min(_MISSED_REV, _MISSED * envelope.travel_rev)
+    moves: list[tuple[float, float]] = []
     for _ in range(_ATTEMPTS):
-        distance = units.position(goal_raw - await axis.position_raw())
-        if abs(distance) < _NEAR_REV:
+        if abs(rest) < max(_NEAR_REV, _NEAR * envelope.travel_rev):
             return
+        distance = float(np.clip(_to_ask(rest, moves), rest - most, rest + most))
         rate = 1.0 / cycle_s(session)
         # Peak speed of a raised cosine is twice its mean.
         highest_rps = 0.25 * envelope.speed_rpm / 60.0
@@ -38,7 +48,7 @@ async def go_back(
         speed_rpm = distance / duration_s * 60.0 * (1.0 - np.cos(_TURN * turn))
         values = np.array([units.velocity_raw(v) for v in speed_rpm], dtype=np.int64)
         values = np.concatenate([values, np.zeros(round(0.1 * rate), dtype=np.int64)])
-        around = abs(distance) + envelope.travel_rev
+        around = abs(rest) + envelope.travel_rev
         wide = Envelope(around, envelope.speed_rpm, envelope.torque_percent, duration_s + 1.0)
         async with enabled(axis, session, Mode.CSV):
             await quiet(axis)
@@ -47,3 +57,17 @@ async def go_back(
                 facts.rated_torque_nm, lambda _fraction: None,
             )  # fmt: skip
             await quiet(axis)
+        before, rest = rest, units.position(goal_raw - await axis.position_raw())
+        moves.append((distance, before - rest))
+
+
+def _to_ask(rest: float, moves: list[tuple[float, float]]) -> float:
+    """What to ask of a loop for it to go ``rest``, by what it went of the moves before (turns)."""
+    if not moves:
+        return rest
+    asked, gone = moves[-1]
+    share = 1.0
+    if len(moves) > 1 and abs(asked - moves[-2][0]) > _TOLD_APART_REV:
+        share = (gone - moves[-2][1]) / (asked - moves[-2][0])
+        share = float(np.clip(share, *_SHARES))
+    return (rest + share * asked - gone) / share

@@ -15,10 +15,12 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from backend.analysis.inertia import InertiaResult
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.tools.axis_facts import read_facts
+from backend.tools.computing import meanwhile
 from backend.tools.end_search import find_ends
 from backend.tools.go_back import go_back
 from backend.tools.inertia_evaluation import (
@@ -33,12 +35,15 @@ from backend.tools.inertia_evaluation import (
 from backend.tools.inertia_moves import Shape, first_look, identification_moves
 from backend.tools.probe import RoughFit
 from backend.tools.recording import require_signals, share
+from backend.tools.repeats import Repeats
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
 _END_MARGIN_REV = 0.15
+#: Gentle moves last about so many times as long; seconds beside them, such as going back.
+_GENTLY, _AROUND_S = 1.5, 2.0
 
 
 async def inertia(
@@ -47,8 +52,11 @@ async def inertia(
     settings: InertiaSettings,
     progress: Progress,
     keep: Keep | None = None,
+    repeats: Repeats | None = None,
 ) -> InertiaOutcome:
     """Measure; the axis ends where it began, with its settings as they were.
+
+    ``repeats`` bounds when a load that swings may be moved a second time; without it always.
 
     Raises:
         OutOfRange: settings that make no sense; nothing has moved.
@@ -71,16 +79,26 @@ async def inertia(
     if settings.scheme == "limited":
         ends = await find_ends(axis, session, settings, facts, look.rough, progress)
     travel, start = _where(settings, ends, units.position(home))
-    if abs(start - units.position(home)) > 0.01:
-        await go_back(axis, session, units.position_raw(start), _wide(settings, ends), facts)
+    begin = home if abs(start - units.position(home)) <= 0.01 else units.position_raw(start)
+
+    async def back_to(place_raw: int) -> None:
+        await go_back(axis, session, place_raw, _wide(settings, ends), facts)
+
+    if begin != home:
+        await back_to(begin)
     told = share(progress, 0.35, 0.65, "moving forth and back")
     recording = await identification_moves(
         axis, session, settings, facts, look, travel, Shape(), told
     )
-    progress(0.65, "evaluating")
-    result = await asyncio.to_thread(evaluate, recording, settings, facts)
-    swing_hz = await asyncio.to_thread(oscillation_hz, recording, result)
-    if swing_hz is not None:
+    progress(0.65, "going back and evaluating")
+
+    def evaluated() -> tuple[InertiaResult, float | None]:
+        found = evaluate(recording, settings, facts)
+        return found, oscillation_hz(recording, found)
+
+    result, swing_hz = await meanwhile(evaluated, back_to(home))
+    played_s = recording.velocity_rad_s.size / recording.sample_rate_hz
+    if swing_hz is not None and (repeats or Repeats()).allow(_GENTLY * played_s + _AROUND_S):
         # A load that swings in another way than couplings let it is moved again so that it does
         # not.
         gentle = Shape.against(swing_hz)
@@ -90,6 +108,7 @@ async def inertia(
         rough = look.rough
         heavier = max(result.inertia_kgm2.value, rough.inertia_kgm2)
         better = replace(look, rough=RoughFit(heavier, rough.coulomb_nm, rough.gravity_nm))
+        await back_to(begin)
         again = await identification_moves(
             axis, session, settings, facts, better, travel, gentle, told
         )
@@ -98,7 +117,7 @@ async def inertia(
             calm = await asyncio.to_thread(evaluate, again, settings, facts)
             if doubt_of(calm) < doubt_of(result):
                 recording, result = again, calm
-    await go_back(axis, session, home, _wide(settings, ends), facts)
+        await back_to(home)
     if keep is not None:
         keep("inertia", *raw_of(recording, settings, facts))
     return InertiaOutcome(

@@ -10,8 +10,9 @@ back.
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -30,6 +31,7 @@ from backend.tools.go_back import go_back
 from backend.tools.interrupted import too_fast
 from backend.tools.notch import plan_notches
 from backend.tools.notch_meaning import NotchMeaning
+from backend.tools.notch_trials import BEFORE, Trial, least_of, limits_of, raw_of, trials_of
 from backend.tools.recording import (
     Play,
     Recording,
@@ -41,16 +43,14 @@ from backend.tools.recording import (
     require_signals,
     share,
 )
+from backend.tools.repeats import Repeats
 from backend.tools.temporary import stopping_hard, temporary
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
-from profiles.schema import NotchSlot
 
 _TURN = 2 * np.pi
 #: Where the notch is tried: share of the sample rate, and limits in Hz.
 _PLACE, _LOWEST_HZ, _HIGHEST_HZ = 0.12, 55.0, 400.0
-#: Widths in shares of the centre (Hz), or level pairs (width, depth).
-_WIDTHS = (0.5, 0.2)
 _SHARE_OF_TORQUE = 0.35
 #: What was too fast for the envelope is played with so much less torque and speed.
 _SLOWER = 0.7
@@ -63,14 +63,6 @@ _NEAR = 0.4
 _STILL_FROM_HZ, _STILL_REV, _STILL_RPM = 30.0, 0.3, 150.0
 #: Less than this to the nearest end is too little for it.
 _LEAST_ROOM_REV = 0.1
-
-
-@dataclass(frozen=True)
-class _Trial:
-    """Values of one slot that are tried: levels or Hz."""
-
-    width: int
-    depth: int | None
 
 
 def unknown(drive: Drive) -> bool:
@@ -89,6 +81,7 @@ async def measure_meaning(
     progress: Progress,
     *,
     still: bool = False,
+    repeats: Repeats | None = None,
 ) -> NotchMeaning:
     """Try values of the first notch on an axis that no load pulls, without a loop.
 
@@ -107,9 +100,10 @@ async def measure_meaning(
 
     sequence = await asyncio.to_thread(designed, 0)
     home = await axis.position_raw()
-    free = _Free(axis, session, envelope, facts, path, sequence, home, designed)
+    repeats = repeats or Repeats()
+    free = _Free(axis, session, envelope, facts, path, sequence, home, designed, repeats)
     near_rev = 0.0 if still else _NEAR * envelope.travel_rev
-    return await tried_with(free, axis, session, envelope, facts, progress, near_rev)
+    return await tried_with(free, axis, session, envelope, facts, progress, near_rev, repeats)
 
 
 class Player(Protocol):
@@ -134,11 +128,12 @@ class Player(Protocol):
 
 async def tried_with(
     player: Player, axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts,
-    progress: Progress, near_rev: float = 0.0,
+    progress: Progress, near_rev: float = 0.0, repeats: Repeats | None = None,
 ) -> NotchMeaning:  # fmt: skip
     """Try values of the first notch; all are put back, and the axis where it was.
 
     Nearer to there than ``near_rev`` the next trial begins where the one before has ended.
+    Values beyond those that it takes at least are tried as ``repeats`` allows.
 
     Raises:
         NotAllowed: the axis cannot be measured so, or the notch does nothing that can be seen.
@@ -153,26 +148,38 @@ async def tried_with(
     slot = spec.slots[0]
     units, home = await axis.units(), await axis.position_raw()
     off = await plan_notches(drive, [])
-    count = len(_trials(drive, slot, 1))
+    count = len(trials_of(drive, slot, 1))
     part = 1.0 / (count + 1)
+    clock, longest_s = repeats or Repeats(), 0.0
     async with stopping_hard(axis, envelope.speed_rpm):
+        begun_s = time.monotonic()
         async with temporary(axis, off):
             lowest = await player.plain(share(progress, 0.0, part, "trying without a notch"))
         centre = round(min(max(_PLACE / cycle_s(session), _LOWEST_HZ, lowest), _HIGHEST_HZ))
-        effects: list[tuple[_Trial, NotchEffect | None]] = []
-        for number, trial in enumerate(_trials(drive, slot, centre), 1):
-            low = number * part
+        if not clock.allow(least_of(slot) * (time.monotonic() - begun_s) / BEFORE):
+            raise samples_lost(axis, 0)
+        effects: list[tuple[Trial, NotchEffect | None]] = []
+        for number, trial in enumerate(trials_of(drive, slot, centre), 1):
+            enough = len(effects) >= least_of(slot)
+            if enough and not clock.allow(longest_s):
+                break
+            begun_s, low = time.monotonic(), number * part
             told = share(progress, low, low + part, f"trying notch {number} of {count}")
             away_rev = units.position(await axis.position_raw() - home)
             if abs(away_rev) > near_rev:
                 await go_back(axis, session, home, envelope, facts)
-            async with temporary(axis, off | _raw(slot, centre, trial)):
+            async with temporary(axis, off | raw_of(slot, centre, trial)):
                 try:
                     effects.append((trial, await player.notched(told)))
                 except ValueError:
                     effects.append((trial, None))
+                except SamplesLost:
+                    if not enough:
+                        raise
+                    break
+            longest_s = max(longest_s, time.monotonic() - begun_s)
         await go_back(axis, session, home, envelope, facts)
-    return _meaning(drive, centre, effects)
+    return replace(_meaning(drive, centre, effects), left_out=count - len(effects))
 
 
 def room_to_tremble(
@@ -185,31 +192,6 @@ def room_to_tremble(
         return None
     speed_rpm = min(envelope.speed_rpm, _STILL_RPM)
     return replace(envelope, travel_rev=room_rev, speed_rpm=speed_rpm)
-
-
-def _trials(drive: Drive, slot: NotchSlot, centre: int) -> list[_Trial]:
-    """Values that show how width and depth go."""
-    if slot.depth_key is None:
-        return [_Trial(round(share * centre), None) for share in _WIDTHS]
-    low_w, high_w = _limits(drive, slot.width_key)
-    low_d, high_d = _limits(drive, slot.depth_key)
-    middle = round(0.5 * (low_w + high_w))
-    span = high_d - low_d
-    depths = [round(low_d + part * span) for part in (0.0, 0.08, 0.2, 0.4, 0.7)]
-    some = [_Trial(middle, depth) for depth in depths]
-    wide = [round(low_w + part * (high_w - low_w)) for part in (0.15, 1.0)]
-    return some + [_Trial(width, depths[1]) for width in wide]
-
-
-def _limits(drive: Drive, key: str | None) -> tuple[int, int]:
-    low, high = drive.parameter(key or "").raw_limits
-    return int(low or 0), int(high or 0)
-
-
-def _raw(slot: NotchSlot, centre: int, trial: _Trial) -> dict[str, int]:
-    pairs = ((slot.frequency_key, centre), (slot.width_key, trial.width),
-             (slot.depth_key, trial.depth))  # fmt: skip
-    return {key: value for key, value in pairs if key is not None and value is not None}
 
 
 def _sequence(
@@ -270,6 +252,7 @@ class _Free:
     home: int
     smaller: Callable[[int], excite.Sequence] | None = None
     """The sequence after so many that were too fast; nothing where there is one alone."""
+    repeats: Repeats = field(default_factory=Repeats)
     _plain: ComplexArray | None = None
     _sign: int = 1
     _lessened: int = 0
@@ -315,7 +298,11 @@ class _Free:
         axis, facts = self.axis, self.facts
         units = await axis.units()
         step = units.torque(1.0) / 100.0 * facts.rated_torque_nm
-        for _attempt in range(ATTEMPTS):
+        begun_s, tries = time.monotonic(), 0
+        while tries < ATTEMPTS:
+            if tries and not self.repeats.allow((time.monotonic() - begun_s) / tries):
+                break
+            tries += 1
             sign, self._sign = self._sign, -self._sign
             raw = sign * np.round(self.sequence.excitation.samples / step).astype(np.int64)
             async with enabled(axis, self.session, Mode.CST):
@@ -326,7 +313,7 @@ class _Free:
             torque, _ = periods_of(self.sequence, recording)
             if len(torque):
                 return np.asarray(sign * np.mean(torque, axis=0))
-        raise samples_lost(axis)
+        raise samples_lost(axis, tries)
 
 
 def periods_of(
@@ -344,17 +331,24 @@ def periods_of(
     return np.asarray(torque), np.asarray(velocity)
 
 
-def samples_lost(axis: Axis) -> NotAllowed:
-    """No trial of a notch had as many periods without a gap as it needs."""
-    return NotAllowed(
-        f"{axis.drive.name}: samples were lost in {ATTEMPTS} tries of a notch in a row",
+class SamplesLost(NotAllowed):
+    """No try of a notch had as many periods without a gap as it needs."""
+
+
+def samples_lost(axis: Axis, tries: int) -> SamplesLost:
+    """That so many tries of one value all lost samples."""
+    words = f"samples were lost in {tries} tries of a notch in a row"
+    if tries < ATTEMPTS:
+        words = "there was no time to try its notches again where samples were lost"
+    return SamplesLost(
+        f"{axis.drive.name}: {words}",
         drive=axis.drive.name,
         remedy="look at the link quality; the computer or the bus is overloaded",
     )
 
 
 def _meaning(
-    drive: Drive, centre: int, effects: list[tuple[_Trial, NotchEffect | None]]
+    drive: Drive, centre: int, effects: list[tuple[Trial, NotchEffect | None]]
 ) -> NotchMeaning:
     """What the trials say together."""
     seen = [(trial, effect.notch) for trial, effect in effects if effect is not None]
@@ -378,7 +372,7 @@ def _meaning(
         weights: FloatArray = np.array([-n.depth_db for n in deep])
         ratio = float(np.average([n.width_hz / n.center_hz for n in deep], weights=weights))
         ratios.append((level, ratio))
-    middle = seen[0][0].width
+    middle = effects[0][0].width
     depths = [(t.depth or 0, n.depth_db) for t, n in seen if t.width == middle]
     flat = [(t.depth or 0, 0.0) for t, e in effects if e is None and t.width == middle]
     return NotchMeaning(
@@ -390,7 +384,7 @@ def _every_level(drive: Drive, points: list[tuple[int, float]]) -> tuple[tuple[i
     """Depth of each level between those that were tried, by what is left of the amplitude."""
     spec = drive.profile.notch
     assert spec is not None
-    low, high = _limits(drive, spec.slots[0].depth_key)
+    low, high = limits_of(drive, spec.slots[0].depth_key)
     ordered = sorted(points)
     levels = np.arange(max(low, ordered[0][0]), min(high, ordered[-1][0]) + 1)
     left = np.interp(levels, [p[0] for p in ordered], [10 ** (p[1] / 20) for p in ordered])

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from backend.tools.axis_facts import AxisFacts
 from backend.tools.notch_effect import ATTEMPTS, periods_of, samples_lost, tried_with
 from backend.tools.notch_meaning import NotchMeaning
 from backend.tools.recording import Recording, require_signals
+from backend.tools.repeats import Repeats
 from backend.tools.sweep import filters_off
 from backend.tools.sweep_evaluation import SweepResult, SweepSettings
 from backend.tools.sweep_plan import Setup, sequences_of, setup_of
@@ -55,6 +57,7 @@ _FEWEST_PERIODS = 2
 async def measure_meaning_in_loop(
     axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts,
     mechanics: SweepResult, inertia_kgm2: float, progress: Progress,
+    repeats: Repeats | None = None,
 ) -> NotchMeaning:  # fmt: skip
     """As `notch_effect.measure_meaning`, with the speed loop closed all the time.
 
@@ -79,10 +82,11 @@ async def measure_meaning_in_loop(
         told = await gains.read_gains(axis, facts)
         setup = replace(setup, by_speed=True, integral_hz=told.integral_hz)
     plant = measured_plant(mechanics.frf, mechanics.model)
-    player = _Beside(axis, session, settings, setup, plant, await axis.position_raw())
+    repeats = repeats or Repeats()
+    player = _Beside(axis, session, settings, setup, plant, await axis.position_raw(), repeats)
     async with temporary(axis, await filters_off(axis, settings)):
         return await tried_with(
-            player, axis, session, envelope, facts, progress, _NEAR * envelope.travel_rev
+            player, axis, session, envelope, facts, progress, _NEAR * envelope.travel_rev, repeats
         )
 
 
@@ -96,6 +100,7 @@ class _Beside:
     setup: Setup
     plant: MeasuredPlant
     home: int
+    repeats: Repeats = field(default_factory=Repeats)
     _sequence: excite.Sequence | None = None
     _lines: LoopLines | None = None
     _loop: LoopModel | None = None
@@ -149,18 +154,28 @@ class _Beside:
         Raises:
             NotAllowed: also where samples are lost each time, so that nothing tells the noise.
         """
-        for _attempt in range(ATTEMPTS):
+        begun_s, tries = time.monotonic(), 0
+        kept: tuple[ComplexArray, ComplexArray] | None = None
+        before: FloatArray | None = None
+        while tries < ATTEMPTS:
+            if tries and not self.repeats.allow((time.monotonic() - begun_s) / tries):
+                break
+            tries += 1
             ((sent, recording),) = await play_fitting(
                 self.axis, self.session, self.settings, self.setup, (sequence,), self.home,
                 _progress(told),
             )  # fmt: skip
             e = sent.excitation
             period = e.samples[e.first_sample :][: e.period_samples]
-            torque, velocity = periods_of(sent, recording)
-            if len(torque) >= _FEWEST_PERIODS:
-                lines = LoopLines.of(np.fft.rfft(period)[e.lines], torque, velocity)
+            found = periods_of(sent, recording)
+            if kept and before is not None and np.array_equal(before, e.samples):
+                # The same was played before: its periods tell as much.
+                found = (np.concatenate([kept[0], found[0]]), np.concatenate([kept[1], found[1]]))
+            kept, before = (found, e.samples) if len(found[0]) else (kept, before)
+            if len(found[0]) >= _FEWEST_PERIODS:
+                lines = LoopLines.of(np.fft.rfft(period)[e.lines], *found)
                 return sent, recording, lines
-        raise samples_lost(self.axis)
+        raise samples_lost(self.axis, tries)
 
 
 def safe_centre_hz(

@@ -21,13 +21,14 @@ class NotchMeaning:
     """Measured at ``centre_hz``.
 
     ``levels`` for families of levels; else the width in Hz is ``width_scale`` times the value and
-    every notch is ``depth_db`` deep.
+    every notch is ``depth_db`` deep. ``left_out`` counts values that there was no time to try.
     """
 
     centre_hz: float
     levels: LevelCalibration | None = None
     width_scale: float = 1.0
     depth_db: float = 0.0
+    left_out: int = 0
 
     def encoded(
         self, notch: Notch, frequency: IntegerRange, width: IntegerRange, depth: IntegerRange | None

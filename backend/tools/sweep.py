@@ -19,9 +19,11 @@ from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.tools import notch as notch_tool
 from backend.tools.axis_facts import AxisFacts, read_facts
+from backend.tools.computing import meanwhile
 from backend.tools.go_back import go_back
 from backend.tools.probe import PULLED, Probed, holding_torque, probe_axis
 from backend.tools.recording import require_signals, takes_torque
+from backend.tools.repeats import Repeats
 from backend.tools.sweep_evaluation import SweepResult, SweepSettings, evaluate
 from backend.tools.sweep_plan import (
     Setup,
@@ -46,8 +48,11 @@ async def sweep(
     settings: SweepSettings,
     progress: Progress,
     keep: Keep | None = None,
+    repeats: Repeats | None = None,
 ) -> SweepResult:
     """Measure; ``keep`` is handed the raw data before they are evaluated.
+
+    ``repeats`` bounds when what lost samples may be played again; without it always.
 
     Raises:
         OutOfRange: settings that make no sense; nothing has moved.
@@ -78,7 +83,7 @@ async def sweep(
                     axis, session, settings.envelope, facts, home, settings.inertia_kgm2
                 )
                 loop = chosen_loop(axis, settings, probed)
-        how = _Sweep(axis, session, settings, facts, home, probed)
+        how = _Sweep(axis, session, settings, facts, home, probed, repeats)
         try:
             setup, records = await how.measured(loop, progress)
         except NotAllowed as error:
@@ -88,16 +93,21 @@ async def sweep(
                 raise
             await go_back(axis, session, home, settings.envelope, facts)
             setup, records = await how.measured("speed", progress)
-    await go_back(axis, session, home, settings.envelope, facts)
-    raw, meta = _raw(records, setup, settings, session)
-    if keep is not None:
-        keep(f"sweep-{settings.kind}", raw, meta)
-    progress(0.95, "evaluating")
-    try:
-        return await asyncio.to_thread(
-            evaluate, records, setup.rate, facts, settings, setup.loop, _dc(session),
-            setup.by_speed, setup.integral_hz,
+    progress(0.95, "going back and evaluating")
+
+    def evaluated() -> SweepResult:
+        return evaluate(
+            records, setup.rate, facts, settings, setup.loop, _dc(session), setup.by_speed,
+            setup.integral_hz,
         )  # fmt: skip
+
+    async def back() -> None:
+        await go_back(axis, session, home, settings.envelope, facts)
+        if keep is not None:
+            keep(f"sweep-{settings.kind}", *_raw(records, setup, settings, session))
+
+    try:
+        return await meanwhile(evaluated, back())
     except ValueError as error:
         raise NotAllowed(
             f"{axis.drive.name}: the recording cannot be evaluated: {error}",
@@ -116,6 +126,7 @@ class _Sweep:
     facts: AxisFacts
     home: int
     probed: Probed | None
+    repeats: Repeats | None
 
     async def measured(self, loop: str, progress: Progress) -> tuple[Setup, Records]:
         """Everything that is played with one loop."""
@@ -133,7 +144,7 @@ class _Sweep:
         # A stepped sine takes too long for a second time.
         spare = 0 if settings.excitation == "stepped" else len(sequences)
         return setup, await play_telling(
-            axis, session, settings, setup, sequences, home, progress, spare
+            axis, session, settings, setup, sequences, home, progress, spare, self.repeats
         )  # fmt: skip
 
 

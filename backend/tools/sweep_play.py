@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeAlias
@@ -17,6 +18,7 @@ from backend.tools import excite, speed_injection
 from backend.tools.go_back import go_back
 from backend.tools.interrupted import Interrupted, too_fast
 from backend.tools.recording import Play, Recording, bus_limits, enabled, play, quiet, share
+from backend.tools.repeats import Repeats
 from backend.tools.sweep_evaluation import SweepSettings
 from backend.tools.sweep_plan import Setup, sequences_of
 from drivers.cia402 import Mode
@@ -72,10 +74,12 @@ async def _play_all(
     progress: Progress,
     spare: int,
     place: tuple[int, int] | None,
+    repeats: Repeats,
 ) -> Records:
     """Every realisation, from the same place as far as the travel asks for it.
 
     One that lost samples is played again, ``spare`` times over all of them; the best one counts.
+    One that has a whole period already is, only where ``repeats`` allows it.
     """
     records: list[Recorded] = []
     before, count = place or (0, len(sequences))
@@ -91,11 +95,17 @@ async def _play_all(
     for number, sequence in enumerate(sequences, before):
         low, high = (0.1 + 0.85 * part / count for part in (number, number + 1))
         step = f"measuring, realisation {number + 1} of {count}"
+        begun_s = time.monotonic()
         tries = [await one(sequence, share(progress, low, high, step))]
+        takes_s = time.monotonic() - begun_s
         while spare > 0 and _worth_another(tries):
+            if any(_kept(*each)[0] for each in tries) and not repeats.allow(takes_s):
+                break
             spare -= 1
+            repeats.repeated += 1
             again = share(progress, low, high, f"{step}: once more, since samples were lost")
             tries.append(await one(sequence, again))
+        repeats.played += 1
         records.append(max(tries, key=lambda each: _kept(*each)))
     return tuple(records)
 
@@ -156,7 +166,7 @@ def _whole(sequence: excite.Sequence, recording: Recording) -> bool:
 async def play_fitting(
     axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
     sequences: tuple[excite.Sequence, ...], home_raw: int, progress: Progress, spare: int = 0,
-    place: tuple[int, int] | None = None,
+    place: tuple[int, int] | None = None, repeats: Repeats | None = None,
 ) -> Records:  # fmt: skip
     """As `_play_all`; where the axis comes to its envelope the excitation becomes smaller.
 
@@ -170,7 +180,8 @@ async def play_fitting(
     for attempt in range(1, _ATTEMPTS + 1):
         try:
             return await _play_all(
-                axis, session, settings, setup, sequences, home_raw, progress, spare, place
+                axis, session, settings, setup, sequences, home_raw, progress, spare, place,
+                repeats or Repeats(),
             )  # fmt: skip
         except NotAllowed as error:
             if attempt == _ATTEMPTS or not _too_much(error, setup):

@@ -14,6 +14,7 @@ from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.tools import excite, speed_injection
+from backend.tools.repeats import Repeats
 from backend.tools.sweep_evaluation import SweepSettings
 from backend.tools.sweep_plan import Setup
 from backend.tools.sweep_play import Records, play_fitting, sized
@@ -25,6 +26,7 @@ _PAIR = 2
 async def play_telling(
     axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
     sequences: tuple[excite.Sequence, ...], home: int, progress: Progress, spare: int = 0,
+    repeats: Repeats | None = None,
 ) -> Records:  # fmt: skip
     """As `play_fitting`; where a reference is played, the lines after the first pair differ.
 
@@ -34,16 +36,17 @@ async def play_telling(
     count = len(sequences)
     if not setup.by_speed or count <= _PAIR or settings.excitation == "stepped":
         return await play_fitting(
-            axis, session, settings, setup, sequences, home, progress, spare
+            axis, session, settings, setup, sequences, home, progress, spare, None, repeats
         )  # fmt: skip
     pair = sequences[:_PAIR]
     first = await play_fitting(
-        axis, session, settings, setup, pair, home, progress, min(spare, _PAIR), (0, count)
-    )
+        axis, session, settings, setup, pair, home, progress, min(spare, _PAIR), (0, count),
+        repeats,
+    )  # fmt: skip
     further = await asyncio.to_thread(_more_telling, first, sequences[_PAIR:], settings, setup)
     return first + await play_fitting(
         axis, session, settings, setup, further, home, progress, min(spare, count - _PAIR),
-        (_PAIR, count),
+        (_PAIR, count), repeats,
     )  # fmt: skip
 
 

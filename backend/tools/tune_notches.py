@@ -9,7 +9,7 @@ import numpy as np
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.jobs import Progress
-from backend.tools import excite, inertia_evaluation, notch_effect, sweep_evaluation
+from backend.tools import excite, inertia_evaluation, notch_effect, notch_trials, sweep_evaluation
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.go_back import go_back
 from backend.tools.interrupted import ends_all
@@ -17,10 +17,22 @@ from backend.tools.notch_in_loop import measure_meaning_in_loop
 from backend.tools.notch_meaning import NotchMeaning, meaning_of, remember
 from backend.tools.probe import PULLED
 from backend.tools.recording import cycle_s, quiet
+from backend.tools.repeats import Repeats
+from backend.tools.tune_time import TimeLeft
 from drivers.errors import NotAllowed
 
 #: A resonance that rises by less bounds no gain.
 _RISES_DB = 6.0
+#: Without a loop learning takes this share of the time: no trial for its size, one period less.
+_FREE = 0.7
+_NO_TIME = (
+    "designed without notches: what they do was not measured, as the time for one tuning was used "
+    "up; tune again, where it was lost samples that took it with a better link"
+)
+_PARTLY = (
+    "what the drive's notches do was measured with fewer of their values, as the time for one "
+    "tuning was used up; the next tuning measures it again"
+)
 
 
 @dataclass(frozen=True)
@@ -35,7 +47,7 @@ class Learning:
 async def learn_notches(
     axis: Axis, session: CyclicSession, how: Learning, facts: AxisFacts,
     outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
-    progress: Progress,
+    progress: Progress, time_left: TimeLeft | None = None,
 ) -> str:  # fmt: skip
     """Measure what no manual prints, where it is worth it: beside the loop where one is needed.
 
@@ -43,25 +55,33 @@ async def learn_notches(
 
     Returns why the design goes without notches; empty where it does not.
     """
-    if not notch_effect.unknown(axis.drive) or meaning_of(axis.drive) is not None:
+    if _known(axis):
         return ""
     if not any(r.kind == "resonance" for r in mechanics.resonances):
         return out_of_sight(mechanics)
     if mechanics.model is None:
         return ""
     found = outcome.result
+    clock = time_left or TimeLeft()
+    repeats = clock.learning()
+    if not repeats.allow((1.0 + clock.lossy) * notch_trials.least_s(axis.drive)):
+        if meaning_of(axis.drive) is None:
+            return _NO_TIME
+        clock.give_up(_PARTLY)
+        return ""
     home = await axis.position_raw()
-    held = abs(found.gravity_nm.value) > PULLED * facts.rated_torque_nm
     # Where friction rules, a torque that is off by little makes a speed that is off by much.
-    held = held or (how.scheme == "free" and mechanics.loop != "none")
+    ruled = how.scheme == "free" and mechanics.loop != "none"
     try:
-        if held or how.loop not in ("auto", "none"):
+        if _held(how, facts, outcome) or ruled:
             meaning = await measure_meaning_in_loop(
                 axis, session, how.envelope, facts, mechanics, found.inertia_kgm2.value,
-                progress,
+                progress, repeats,
             )  # fmt: skip
         else:
-            meaning = await _learn_free(axis, session, how, facts, outcome, mechanics, progress)
+            meaning = await _learn_free(
+                axis, session, how, facts, outcome, mechanics, progress, repeats
+            )
     except NotAllowed as error:
         if await ends_all(axis, error):
             raise
@@ -70,7 +90,31 @@ async def learn_notches(
         await go_back(axis, session, home, how.envelope, facts)
         return f"designed without notches: {error.message}"
     remember(axis.drive, meaning)
+    if meaning.left_out:
+        clock.give_up(_PARTLY)
     return ""
+
+
+def learning_s(
+    axis: Axis, how: Learning, facts: AxisFacts, outcome: inertia_evaluation.InertiaOutcome
+) -> float:
+    """About how long `learn_notches` will take, from what is known before the mechanics are."""
+    if _known(axis):
+        return 0.0
+    takes_s = notch_trials.every_s(axis.drive)
+    return takes_s if _held(how, facts, outcome) else _FREE * takes_s
+
+
+def _known(axis: Axis) -> bool:
+    """Whether nothing of the drive's notches is left to be measured."""
+    known = meaning_of(axis.drive)
+    return not notch_effect.unknown(axis.drive) or (known is not None and not known.left_out)
+
+
+def _held(how: Learning, facts: AxisFacts, outcome: inertia_evaluation.InertiaOutcome) -> bool:
+    """Whether a load pulls, or the user wants a loop."""
+    pulled = abs(outcome.result.gravity_nm.value) > PULLED * facts.rated_torque_nm
+    return pulled or how.loop not in ("auto", "none")
 
 
 def out_of_sight(mechanics: sweep_evaluation.SweepResult) -> str:
@@ -92,7 +136,7 @@ def out_of_sight(mechanics: sweep_evaluation.SweepResult) -> str:
 async def _learn_free(
     axis: Axis, session: CyclicSession, how: Learning, facts: AxisFacts,
     outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
-    progress: Progress,
+    progress: Progress, repeats: Repeats,
 ) -> NotchMeaning:  # fmt: skip
     """On an axis that no load pulls, without a loop."""
     envelope: Envelope | None = how.envelope
@@ -111,5 +155,5 @@ async def _learn_free(
     rate = 1.0 / cycle_s(session)
     path = notch_effect.path_of(rate, facts, mechanics.hold, mechanics.delay_s)
     return await notch_effect.measure_meaning(
-        axis, session, envelope, facts, rigid, path, progress, still=still
+        axis, session, envelope, facts, rigid, path, progress, still=still, repeats=repeats
     )

@@ -1,4 +1,4 @@
-"""How long a tuning may take, and what of its verification still fits into that."""
+"""How long a tuning may take, and what still fits into that: first of all one verification."""
 
 from __future__ import annotations
 
@@ -6,10 +6,23 @@ import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from backend.tools.repeats import Repeats
 
 #: Writing a design, standing still and a step, beside the measurement of the loop.
 _AROUND_S = 4.0
+#: What follows the measurements: computing designs, writing one and verifying it.
+_DESIGNED_AND_VERIFIED_S = 12.0
+#: What a verification takes longer at most where samples are lost all the time.
+_LOST_S = 6.0
+#: A frequency response, as far as it must be.
+_SWEEP_S = 16.0
+#: Said where realisations that lost samples count as they are.
+NOT_AGAIN = (
+    "what lost samples was not all measured again, as the time for one tuning was used up: look at "
+    "the link quality"
+)
 
 
 @dataclass
@@ -22,6 +35,10 @@ class TimeLeft:
     left_out: int = 0
     extra_s: float = 0.0
     """Spent on what only time that is left is spent on."""
+    lossy: float = 0.0
+    """How much of the frequency response was measured again for lost samples, 0 to 1."""
+    given_up: list[str] = field(default_factory=list)
+    """What was not measured as well as it could be, in words."""
 
     @classmethod
     def of(cls, budget_s: float) -> TimeLeft:
@@ -44,6 +61,27 @@ class TimeLeft:
         if left_s >= spare_s:
             left_s -= spare_s
         return max(0, int(min(left_s / max(first_s, 1e-3), float(most))))
+
+    def learning(self) -> Repeats:
+        """What may be measured before the designs, as long as one is verified in time."""
+        return Repeats(self.until_s - _DESIGNED_AND_VERIFIED_S - self.lossy * _LOST_S)
+
+    def measuring(self, learning_s: float) -> Repeats:
+        """What of a frequency response, where learning what notches do takes so long after it."""
+        return Repeats(self.until_s - _DESIGNED_AND_VERIFIED_S - learning_s)
+
+    def moving(self) -> Repeats:
+        """What of moves for the inertia; the frequency response comes after them."""
+        return Repeats(self.until_s - _DESIGNED_AND_VERIFIED_S - _SWEEP_S)
+
+    def verifying_again(self) -> Repeats:
+        """What of a tuned loop."""
+        return Repeats(self.until_s - _AROUND_S)
+
+    def give_up(self, words: str) -> None:
+        """Note once what was not done for its time."""
+        if words not in self.given_up:
+            self.given_up.append(words)
 
     @contextmanager
     def extra(self) -> Iterator[None]:

@@ -24,7 +24,7 @@ from backend.tools.axis_facts import AxisFacts
 from backend.tools.go_back import go_back
 from backend.tools.probe import holding_torque
 from backend.tools.recording import quiet
-from backend.tools.tune_time import TimeLeft
+from backend.tools.tune_time import NOT_AGAIN, TimeLeft
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
@@ -120,7 +120,8 @@ async def verify(
     )  # fmt: skip
     clock = time_left or TimeLeft()
     begun_s = time.monotonic()
-    swept = await sweep_tool.sweep(axis, session, settings, measuring, keep)
+    again = clock.verifying_again()
+    swept = await sweep_tool.sweep(axis, session, settings, measuring, keep, again)
     read = sharp_margins(swept)
     # To verify once more what this loop says is worth more than to measure it for longer.
     looks = LOOKS - bool(check.pairs_before) if read else 0
@@ -131,10 +132,12 @@ async def verify(
     if unsure and pairs > 1 and not missed:
         settings = replace(settings, realisations=pairs)
         with clock.extra():
-            more = await sweep_tool.sweep(axis, session, settings, measuring, keep)
+            more = await sweep_tool.sweep(axis, session, settings, measuring, keep, again)
         every = more.frf
         missed = worse_than(promised, sharp_margins(more))
         swept, read = _joined(swept, read, more)
+    if again.left_out:
+        clock.give_up(NOT_AGAIN)
     measured = _width_of(read)
     why = _named(candidate, "; ".join(missed))
     step: step_tool.StepResult | None = None

@@ -135,6 +135,7 @@ async def test_tuning_goes_on_without_notches_only_where_the_axis_kept_them_back
     monkeypatch.setattr(tune_notches, "_learn_free", learn)
     monkeypatch.setattr(tune_notches, "meaning_of", lambda _drive: None)
     monkeypatch.setattr("backend.tools.notch_effect.unknown", lambda _drive: True)
+    monkeypatch.setattr("backend.tools.notch_trials.least_s", lambda _drive: 11.6)
     axis: Any = Axis()
     resonant: Any = SimpleNamespace(
         resonances=[SimpleNamespace(kind="resonance")], model=object(), loop="none"

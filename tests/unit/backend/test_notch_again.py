@@ -41,14 +41,21 @@ def beside(monkeypatch: pytest.MonkeyPatch, whole: list[int]) -> tuple[Any, list
 
 
 async def test_one_that_lost_samples_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    trial, left = beside(monkeypatch, [1, 2, 9])
+    trial, left = beside(monkeypatch, [0, 2, 9])
     lines = (await trial._played(None, lambda _: None))[2]
     assert lines.torque.shape == LINES.shape
     assert left == [9], "once more, and no more than that"
 
 
+async def test_whole_periods_of_two_tries_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    trial, left = beside(monkeypatch, [1, 0, 1, 9])
+    lines = (await trial._played(None, lambda _: None))[2]
+    assert lines.torque.shape == LINES.shape
+    assert left == [9]
+
+
 async def test_a_line_that_loses_samples_each_time_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    trial, left = beside(monkeypatch, [1, 1, 1, 9])
+    trial, left = beside(monkeypatch, [0, 1, 0, 9])
     with pytest.raises(NotAllowed, match="X: samples were lost in 3 tries") as told:
         await trial._played(None, lambda _: None)
     assert told.value.remedy

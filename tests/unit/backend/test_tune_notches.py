@@ -16,6 +16,7 @@ from backend.tools import tune_notches
 from backend.tools.notch_meaning import NotchMeaning
 from backend.tools.sweep_evaluation import SweepResult
 from backend.tools.tune_notches import out_of_sight
+from backend.tools.tune_time import TimeLeft
 
 
 def measured(*modes: tuple[float, float, float]) -> SweepResult:
@@ -73,6 +74,17 @@ async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
     monkeypatch.setattr(tune_notches, "meaning_of", lambda _drive: None)
     monkeypatch.setattr(tune_notches, "remember", lambda *_: None)
     monkeypatch.setattr("backend.tools.notch_effect.unknown", lambda _drive: True)
+    monkeypatch.setattr("backend.tools.notch_trials.least_s", lambda _drive: 11.6)
+
+    assert await said_of(loop, scheme, gravity_nm) == ""
+    assert ways == [beside]
+
+
+async def said_of(
+    loop: str = "none", scheme: str = "free", gravity_nm: float = 0.0,
+    time_left: TimeLeft | None = None,
+) -> str:  # fmt: skip
+    """What learning says, of an axis with a resonance."""
 
     async def stands() -> int:
         return 0
@@ -85,8 +97,38 @@ async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
     )
     how: Any = SimpleNamespace(loop="auto", envelope=None, scheme=scheme)
     facts: Any = SimpleNamespace(rated_torque_nm=1.27)
-    said = await tune_notches.learn_notches(
-        axis, cast(Any, None), how, facts, outcome, mechanics, Progress(lambda: None)
+    return await tune_notches.learn_notches(
+        axis, cast(Any, None), how, facts, outcome, mechanics, Progress(lambda: None), time_left
     )
-    assert said == ""
-    assert ways == [beside]
+
+
+@pytest.mark.parametrize(("left_s", "before", "fits"), [
+    (24.0, None, True), (23.0, None, False), (23.0, NotchMeaning(120.0, left_out=3), False),
+    (24.0, NotchMeaning(120.0, left_out=3), True),
+])  # fmt: skip
+async def test_notches_are_learned_only_where_a_design_can_be_verified_after_it(
+    left_s: float, before: NotchMeaning | None, fits: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """12 s are for the design and its verification, 11.6 s for the least of learning."""
+    known: list[NotchMeaning] = [] if before is None else [before]
+    clock = SimpleNamespace(monotonic=lambda: 1000.0)
+    monkeypatch.setattr("backend.tools.tune_time.time", clock)
+    monkeypatch.setattr("backend.tools.repeats.time", clock)
+
+    async def free(*given: Any) -> NotchMeaning:
+        assert given[-1].by_s == pytest.approx(1000.0 + left_s - 12.0)
+        return NotchMeaning(130.0, left_out=2)
+
+    monkeypatch.setattr(tune_notches, "_learn_free", free)
+    monkeypatch.setattr(tune_notches, "meaning_of", lambda _drive: known[-1] if known else None)
+    monkeypatch.setattr(tune_notches, "remember", lambda _drive, meaning: known.append(meaning))
+    monkeypatch.setattr("backend.tools.notch_effect.unknown", lambda _drive: True)
+    monkeypatch.setattr("backend.tools.notch_trials.least_s", lambda _drive: 11.6)
+    left = TimeLeft.of(left_s)
+    said = await said_of(time_left=left)
+    assert [meaning.centre_hz for meaning in known][-1:] == (
+        [130.0] if fits else [120.0] if before else []
+    )
+    told = " ".join([said, *left.given_up])
+    assert ("designed without notches" in told) is (not fits and before is None)
+    assert ("fewer of their values" in told) is (fits or before is not None)

@@ -1,0 +1,71 @@
+"""Which values of a notch are tried to learn what it does, and about how long that takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from backend.drive import Drive
+from profiles.schema import NotchSlot
+
+#: Widths in shares of the centre (Hz), or level pairs (width, depth).
+_WIDTHS = (0.5, 0.2)
+#: Values that are tried at least, of a width alone and of levels; plays before the first of them;
+#: seconds that each takes with all that comes around it.
+_LEAST_WIDTHS, _LEAST_LEVELS, BEFORE, _TRIAL_S = 1, 4, 2, 2.9
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Values of one slot that are tried: levels or Hz."""
+
+    width: int
+    depth: int | None
+
+
+def trials_of(drive: Drive, slot: NotchSlot, centre: int) -> list[Trial]:
+    """Values that show how width and depth go."""
+    if slot.depth_key is None:
+        return [Trial(round(share * centre), None) for share in _WIDTHS]
+    low_w, high_w = limits_of(drive, slot.width_key)
+    low_d, high_d = limits_of(drive, slot.depth_key)
+    middle = round(0.5 * (low_w + high_w))
+    span = high_d - low_d
+    deepest, deep, *others = (round(low_d + part * span) for part in (0.0, 0.08, 0.2, 0.4, 0.7))
+    narrow, wide = (round(low_w + part * (high_w - low_w)) for part in (0.15, 1.0))
+    least = [(middle, deepest), (middle, others[0]), (wide, deep), (middle, others[2])]
+    further = [(narrow, deep), (middle, others[1]), (middle, deep)]
+    return [Trial(width, depth) for width, depth in (*least, *further)]
+
+
+def least_of(slot: NotchSlot) -> int:
+    """How many of the trials, from the first, tell what there is to tell."""
+    return _LEAST_WIDTHS if slot.depth_key is None else _LEAST_LEVELS
+
+
+def least_s(drive: Drive) -> float:
+    """About how long it takes to try what must be tried."""
+    slot = _slot(drive)
+    return 0.0 if slot is None else _TRIAL_S * (BEFORE + least_of(slot))
+
+
+def every_s(drive: Drive) -> float:
+    """About how long it takes to try all that is worth it, beside a loop."""
+    slot = _slot(drive)
+    return 0.0 if slot is None else _TRIAL_S * (BEFORE + len(trials_of(drive, slot, 1)))
+
+
+def _slot(drive: Drive) -> NotchSlot | None:
+    return drive.profile.notch.slots[0] if drive.profile.notch is not None else None
+
+
+def limits_of(drive: Drive, key: str | None) -> tuple[int, int]:
+    """Lowest and highest raw value."""
+    low, high = drive.parameter(key or "").raw_limits
+    return int(low or 0), int(high or 0)
+
+
+def raw_of(slot: NotchSlot, centre: int, trial: Trial) -> dict[str, int]:
+    """The raw values that make it."""
+    pairs = ((slot.frequency_key, centre), (slot.width_key, trial.width),
+             (slot.depth_key, trial.depth))  # fmt: skip
+    return {key: value for key, value in pairs if key is not None and value is not None}

@@ -1,0 +1,69 @@
+"""A tuning on a computer that loses samples ends in its minute, with a design that was verified.
+
+Time is the drive's own: how busy the computer is that simulates it does not count.
+"""
+
+from __future__ import annotations
+
+import random
+from types import SimpleNamespace
+
+import pytest
+
+from backend.tools import (
+    notch_effect,
+    notch_in_loop,
+    repeats,
+    sweep_play,
+    tune_time,
+    tune_verify,
+)
+from backend.tools.autotune import AutotuneSettings, autotune
+from drivers.cia402 import State
+from tests.virtual.tools import direct as direct_module
+from tests.virtual.tools.direct import DirectBench, direct
+from tests.virtual.tools.rig import WIDE, mechanics, silent
+from tests.virtual.tools.test_notches_held import vertical
+
+#: Seconds that designing takes here at most while no drive waits for it.
+_COMPUTING_S = 3.0
+
+
+def late(b: DirectBench, every_s: float) -> None:
+    """The computer is late for up to 12 cycles, after such a time in the mean."""
+    number, following, chance = 0, 400, random.Random(5)
+
+    def cycles() -> int:
+        nonlocal number, following
+        number += 1
+        if number < following:
+            return 0
+        following = number + 1 + round(chance.expovariate(1e-3 / every_s))
+        return chance.randint(2, 12)
+
+    b.link.late = cycles
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(("drive", "every_s"), [("r6l", 0.7), ("r6l", 2.0)])
+async def test_a_vertical_axis_whose_computer_is_late(
+    drive: str, every_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Up to 1 % of all cycles, which leaves hardly a realisation whole."""
+    # 4 ms for each parameter, as over EtherCAT at 1 kHz.
+    monkeypatch.setattr(direct_module, "_TURN_NS", 4_000_000)
+    async with direct(vertical(), drive=drive) as b:
+        clock = SimpleNamespace(monotonic=lambda: b.link.now_ns / 1e9)
+        for tool in (notch_effect, notch_in_loop, repeats, sweep_play, tune_time, tune_verify):
+            monkeypatch.setattr(tool, "time", clock)
+        if await b.axis.state() is State.FAULT:
+            await b.axis.reset_fault()
+        late(b, every_s)
+        begun_s = clock.monotonic()
+        settings = AutotuneSettings(WIDE, motor_inertia_kgm2=mechanics().motor.inertia_kgm2)
+        found = await autotune(b.axis, b.session, settings, silent())
+        took_s = clock.monotonic() - begun_s
+    assert found.verified is not None
+    assert found.verified.kept
+    assert took_s < 60.0 - _COMPUTING_S
+    assert not found.cautious
