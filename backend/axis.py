@@ -61,7 +61,7 @@ class Axis(PowerState):
         self._left_enabled = False
         #: The page by which that was done; None where it was no page.
         self.enabled_by: str | None = None
-        drive.listen(self._units_may_have_changed)
+        drive.listeners.add(self._units_may_have_changed)
 
     async def units(self) -> AxisUnits:
         """Units with the present gearing, read once until `forget`."""

@@ -16,6 +16,7 @@ from backend.axis_store import AxisStore
 from backend.buses import Buses
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
+from backend.drive_identity import read_serial
 from backend.drive_list import DriveList, SavedDrive, SavedPort
 from backend.exchanges import Exchanges
 from backend.files import StorageFailed
@@ -214,9 +215,9 @@ class Bench:
         )
         member = Member(drive, axis, monitor)
         self.members[drive_id] = member
-        drive.listen(lambda readings: self._readings(drive_id, readings))
-        drive.listen_writes(self.witness.wrote)
-        drive.listen_commands(self.witness.commanded)
+        drive.listeners.add(lambda readings: self._readings(drive_id, readings))
+        drive.listeners.add_writes(self.witness.wrote)
+        drive.listeners.add_commands(self.witness.commanded)
         drive.owed.listen(self.drives_changed)
         self.returning.begin(axis)
         monitor.start()
@@ -314,7 +315,7 @@ class Bench:
         """The user says that the drive at this place is the right one."""
         member = self.member(drive_id)
         drive = member.drive
-        serial = await drive.read_serial()
+        serial = await read_serial(drive)
         drive.found = replace(drive.found or Found(drive.ports[0].station), serial=serial)
         drive.identity_warning = ""
         # What was left in the drive that was here before is no matter of this one.

@@ -14,6 +14,7 @@ from contextlib import asynccontextmanager
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
+from backend.drive_identity import confirm_identity
 from backend.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
@@ -88,7 +89,7 @@ async def _choose(axis: Axis, session: CyclicSession, key: str, mode: int) -> No
         )
     if power is None or not session.running:
         # The link may have been lost meanwhile, and another drive be there now.
-        await drive.confirm_identity()
+        await confirm_identity(drive)
         await drive.write(key, mode)
         return
     await power.drive_to(session.station(drive), State.SWITCH_ON_DISABLED, mode)

@@ -8,13 +8,16 @@ counts is the value that came back.
 from __future__ import annotations
 
 import time
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from backend.batches import asked_in_batches
+from backend.change_marks import ChangeMarks
+from backend.drive_listeners import DriveListeners
+from backend.motion_keys import command_keys, motion_keys
 from backend.owed import Owed
 from backend.ports import Port, address_of, carries
 from backend.readings import CommandRecord, Reading, WriteRecord
-from backend.rest import Rest, Resting
+from backend.rest import Rest
 from backend.value_check import checked, named
 from drivers import cia402
 from drivers.codec import decode, encode
@@ -22,44 +25,17 @@ from drivers.errors import (
     DriveError,
     LinkTimeout,
     NotAllowed,
-    NotAsked,
     NotInUse,
     OutOfRange,
-    Rejected,
 )
-from drivers.link import Address, Found, LinkQuality
+from drivers.link import Found, LinkQuality
 from profiles.schema import Parameter, Profile, Raw
-
-#: A drive that left so many objects in a row without an answer, in two batches at least, is asked
-#: for nothing more of a list.
-_SILENT_OBJECTS = 64
-
-#: Roles that command motion; they are never "changed but not saved".
-_COMMAND_ROLES = frozenset({
-    "control_word", "mode", "position_target", "position_offset", "velocity_target",
-    "velocity_offset", "torque_target", "torque_offset",
-})  # fmt: skip
-
-#: Roles that a motion sets for its own length, or that change what its numbers mean.
-_MOTION_ROLES = frozenset({
-    "profile_velocity", "profile_acceleration", "profile_deceleration", "max_torque",
-    "torque_limit_positive", "torque_limit_negative", "home_offset", "quick_stop_deceleration",
-})  # fmt: skip
-
-
-@dataclass(slots=True)
-class _Changes:
-    """What was changed since the drive's memory was last written, and what waits to act."""
-
-    stored: dict[str, Raw] = field(default_factory=dict)
-    pending: dict[str, str] = field(default_factory=dict)
 
 
 class Drive:
     """One drive of the bench.
 
-    ``readings`` holds the last answer for every parameter that was read. Listeners are called
-    with lists of new readings, on the event loop.
+    ``readings`` holds the last answer for every parameter that was read.
     """
 
     def __init__(self, drive_id: str, name: str, profile: Profile, ports: Sequence[Port]) -> None:
@@ -73,35 +49,13 @@ class Drive:
         self.found: Found | None = None
         self.identity_warning = ""
         self.readings: dict[str, Reading] = {}
-        self._changes = _Changes()
-        self._listeners: list[Callable[[list[Reading]], None]] = []
-        self._write_listeners: list[Callable[[WriteRecord], None]] = []
-        self._command_listeners: list[Callable[[CommandRecord], None]] = []
-        self._transient = {
-            signal.key for signal in profile.signals if signal.role in _COMMAND_ROLES
-        } | {step.key for proc in profile.procedures for step in proc.steps if step.do == "write"}
-        self._motion_keys = (
-            {s.key for s in profile.signals if s.role in _MOTION_ROLES}
-            | profile.unit_keys
-            | {"607E:00"}  # polarity (CiA 402-2 clause 7)
-            | {q.key for q in profile.quirks if q.kind == "unit_switch" and q.key is not None}
-        )
+        self._changes = ChangeMarks()
+        self.listeners = DriveListeners()
+        self._command_keys = command_keys(profile)
+        self._motion_keys = motion_keys(profile)
         self._own_status = profile.quirk("own_status_word") is not None
 
     # --- what it is ------------------------------------------------------------------
-
-    def listen(self, listener: Callable[[list[Reading]], None]) -> Callable[[], None]:
-        """Call ``listener`` with every batch of new readings."""
-        self._listeners.append(listener)
-        return lambda: self._listeners.remove(listener)
-
-    def listen_writes(self, listener: Callable[[WriteRecord], None]) -> None:
-        """Call ``listener`` after everything that `write` sent, whatever came of it."""
-        self._write_listeners.append(listener)
-
-    def listen_commands(self, listener: Callable[[CommandRecord], None]) -> None:
-        """Call ``listener`` after everything that `command` sent, whatever came of it."""
-        self._command_listeners.append(listener)
 
     def parameter(self, key: str) -> Parameter:
         """The parameter of this key or maker's number.
@@ -198,24 +152,16 @@ class Drive:
 
     def commands_motion(self, key: str) -> bool:
         """Whether writing this parameter commands motion or a procedure at once."""
-        return key in self._transient
+        return key in self._command_keys
 
     def matters_to_motion(self, key: str) -> bool:
-        """Whether a motion under way relies on this parameter staying as it is.
-
-        These are commands, the gearing and unit switches, and what a motion sets for its own
-        length: ramps and torque limits. Gains may be changed while the axis moves.
-        """
-        return key in self._motion_keys or self.commands_motion(key)
+        """Whether a motion under way relies on this parameter staying as it is."""
+        return key in self._motion_keys
 
     @property
     def unsaved(self) -> frozenset[str]:
         """Keys whose value in the drive is not yet in its memory."""
-        return frozenset(
-            key
-            for key, raw in self._changes.stored.items()
-            if (now := self.readings.get(key)) is not None and now.raw != raw
-        )
+        return self._changes.unsaved(self.readings)
 
     @property
     def pending(self) -> dict[str, str]:
@@ -229,22 +175,16 @@ class Drive:
 
     def mark_applied(self, *what: str) -> None:
         """What waited for one of ``what`` (write_settings, reenable, power_cycle) acts now."""
-        waiting = self._changes.pending
-        for key in [key for key, reason in waiting.items() if reason in what]:
-            del waiting[key]
+        self._changes.applied(*what)
         self._announce_all()
 
     def forget(self) -> None:
         """The drive restarted: nothing that was read before may be believed."""
-        self._changes = _Changes()
+        self._changes.forget()
         self.readings.clear()
 
     def _announce_all(self) -> None:
-        self._announce(list(self.readings.values()))
-
-    def _announce(self, readings: list[Reading]) -> None:
-        for listener in list(self._listeners):
-            listener(readings)
+        self.listeners.read(list(self.readings.values()))
 
     # --- reading ---------------------------------------------------------------------
 
@@ -311,38 +251,15 @@ class Drive:
                 groups.setdefault(position, []).append(parameter)
         done = len(result)
         for position, group in groups.items():
-            async for readings in self._batches_of(self.ports[position], group):
+            batches = asked_in_batches(self.ports[position], group, self.rest)
+            async for chunk, answers in batches:
+                readings = self._taken(chunk, answers)
                 result.update({reading.key: reading for reading in readings})
                 done += len(readings)
                 if progress:
                     share = min(1.0, done / len(parameters))
                     progress(share, f"{len(result)} of {len(parameters)} parameters")
         return result
-
-    async def _batches_of(
-        self, port: Port, group: Sequence[Parameter]
-    ) -> AsyncIterator[list[Reading]]:
-        """Readings in batches; those left out while the drive was silent come once more."""
-        silent: list[Sequence[bytes | DriveError]] = []
-        left_out: list[Parameter] = []
-        for chunk in port.batches(group):
-            if len(silent) < 2 or sum(map(len, silent)) < _SILENT_OBJECTS:
-                answers = await self._ask(port, chunk)
-                silent = [*silent, answers] if _silence(answers) else []
-            else:
-                answers = [silent[-1][-1]] * len(chunk)
-            pairs = zip(chunk, answers, strict=True)
-            left_out += [parameter for parameter, answer in pairs if isinstance(answer, NotAsked)]
-            yield self._taken(chunk, answers)
-        for chunk in port.batches(left_out) if not silent else []:
-            yield self._taken(chunk, await self._ask(port, chunk))
-
-    async def _ask(self, port: Port, chunk: Sequence[Parameter]) -> Sequence[bytes | DriveError]:
-        try:
-            async with self.rest.asking():
-                return await port.link.read_many(port.station, [address_of(p) for p in chunk])
-        except Resting as error:
-            return [error] * len(chunk)
 
     def _taken(
         self, chunk: Sequence[Parameter], answers: Sequence[bytes | DriveError]
@@ -381,7 +298,7 @@ class Drive:
         for reading in readings:
             self.readings[reading.key] = reading
         self.owed.seen(readings)
-        self._announce(readings)
+        self.listeners.read(readings)
 
     # --- writing ---------------------------------------------------------------------
 
@@ -444,7 +361,10 @@ class Drive:
             reading = Reading(parameter.key, value, parameter.to_value(value), time.time())
             self._store([reading])
             return reading
-        if parameter.effective not in ("now", "stopped") and parameter.key not in self._transient:
+        if (
+            parameter.effective not in ("now", "stopped")
+            and parameter.key not in self._command_keys
+        ):
             self._changes.pending[parameter.key] = parameter.effective
         return await self.read(parameter.key)
 
@@ -460,8 +380,7 @@ class Drive:
         record = WriteRecord(
             self.id, self.name, parameter.key, parameter.name, before, wanted, after, problem
         )
-        for listener in self._write_listeners:
-            listener(record)
+        self.listeners.wrote(record)
 
     def require_identity(self) -> None:
         """The drive at this place is the one that was connected.
@@ -475,35 +394,6 @@ class Drive:
                 drive=self.name,
                 remedy="check the cables; if it was exchanged, accept it on the Connect page",
             )
-
-    async def read_serial(self) -> int | None:
-        """Serial number of the drive that answers now (1018h:04), or None where it has none."""
-        for port in self.ports:
-            if port.link.kind == "modbus":
-                continue
-            try:
-                async with self.rest.asking():
-                    data = await port.link.read(port.station, Address(0x1018, 4, "UINT32"))
-            except (Rejected, NotAllowed):
-                continue
-            return int.from_bytes(data, "little") or None
-        return None
-
-    async def confirm_identity(self) -> None:
-        """Ask for the serial number again, where it is known and the drive tells it.
-
-        Raises:
-            NotAllowed: another drive answers here.
-        """
-        known = self.found.serial if self.found else None
-        if known is not None:
-            serial = await self.read_serial()
-            if serial is not None and serial != known:
-                self.identity_warning = (
-                    f"{self.name} had serial number {known}; the drive that answers here now "
-                    f"has {serial}"
-                )
-        self.require_identity()
 
     async def command(self, key: str, raw: int) -> None:
         """Write a motion object without reading back (set-points, control word).
@@ -528,8 +418,7 @@ class Drive:
 
     def _tell_command(self, parameter: Parameter, raw: int, problem: str = "") -> None:
         record = CommandRecord(self.id, self.name, parameter.key, parameter.name, raw, problem)
-        for listener in self._command_listeners:
-            listener(record)
+        self.listeners.commanded(record)
 
     async def _send(self, port: Port, parameter: Parameter, value: Raw) -> None:
         """Write; a time-out is unknown, so it is read back and never blindly repeated."""
@@ -545,7 +434,7 @@ class Drive:
 
     async def _before_change(self, parameter: Parameter) -> None:
         """Remember what the drive's memory holds, for the "not saved" mark."""
-        if parameter.key in self._transient or parameter.access != "rw":
+        if parameter.key in self._command_keys or parameter.access != "rw":
             return
         if parameter.key in self._changes.stored:
             return
@@ -578,8 +467,3 @@ class Drive:
         if key != self.key("status_word"):
             return None
         return cia402.fault_bit(echoes_control=self._own_status)
-
-
-def _silence(answers: Sequence[bytes | DriveError]) -> bool:
-    """Whether nothing of a batch was answered; one object alone tells nothing."""
-    return len(answers) > 1 and all(isinstance(answer, LinkTimeout) for answer in answers)

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 
 from backend.drive import Drive
+from backend.drive_identity import confirm_identity
 from drivers.errors import DriveError, LinkTimeout
 from profiles.schema import Raw
 
@@ -78,7 +79,7 @@ async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
                 if (await drive.read(key)).raw != raw:
                     if not same:
                         # The link may have been lost meanwhile, and another drive be there now.
-                        await drive.confirm_identity()
+                        await confirm_identity(drive)
                         same = True
                     await drive.write(key, raw)
                 del left[key]

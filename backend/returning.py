@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from backend.axis import Axis
 from backend.drive import Drive
+from backend.drive_identity import confirm_identity
 from backend.files import StorageFailed
 from backend.jobs import Job, JobResult, Progress
 from backend.monitor import Snapshot
@@ -88,7 +89,7 @@ class Returning:
         if _serial(drive) is None:
             return True
         try:
-            await drive.confirm_identity()
+            await confirm_identity(drive)
         except NotAllowed:
             self._bench.tell(drive.identity_warning, member, "error")
             return False

@@ -23,6 +23,7 @@ from backend.api.models_ethercat import (
     SegmentStation,
 )
 from backend.bench import Bench
+from backend.drive_identity import confirm_identity
 from backend.jobs import JobResult, Progress
 from backend.member import Member
 from drivers.cia402 import State
@@ -131,7 +132,7 @@ async def write_alias(
     _require_confirmed(request.confirmed, _ALIAS_WARNING)
     for member in _members(bench, link):
         if _station_of(member, link) == request.station:
-            await member.drive.confirm_identity()
+            await confirm_identity(member.drive)
     await link.set_alias(request.station, request.alias)
     bench.journal.add(
         f"{request.url}: alias {request.alias} written to station {request.station};"
@@ -200,7 +201,7 @@ async def _require_loadable(member: Member, link: EthercatLink, station: int) ->
                 remedy="check the cables, then scan",
             )
         return
-    await drive.confirm_identity()
+    await confirm_identity(drive)
     if await member.axis.state() in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
         raise NotAllowed(f"{drive.name} is enabled", drive=drive.name, remedy="disable it first")
 

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 
 from backend import parameter_set
 from backend.drive import Drive
+from backend.drive_identity import confirm_identity
 from backend.jobs import JobResult
 from backend.library import SetStore
 from backend.library.identity import doubts
@@ -126,7 +127,7 @@ async def load_set(
         NotAllowed: another family's or drive's file without consent, or a chosen row that cannot
             be written; nothing was written.
     """
-    await drive.confirm_identity()
+    await confirm_identity(drive)
     other = _check_identity(drive, content, accept_other_identity)
     if other and not accept_motor_individual:
         _refuse_motor_individual(drive, keys)

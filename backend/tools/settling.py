@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from backend.axis import Axis
+from backend.drive_identity import confirm_identity
 from backend.jobs import JobResult
 from backend.tools.temporary import put_back_in_time
 from drivers.cia402 import State
@@ -29,7 +30,7 @@ async def settle(axis: Axis, *, asked: bool) -> JobResult:
             drive=drive.name,
             remedy="stop and disable the axis first",
         )
-    await drive.confirm_identity()
+    await confirm_identity(drive)
     back: dict[str, Raw] = {}
     left: dict[str, str] = {}
     for debt in drive.owed.debts:

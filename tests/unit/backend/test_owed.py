@@ -13,6 +13,7 @@ import pytest
 
 from backend.axis import Envelope
 from backend.bench import Bench
+from backend.drive_identity import read_serial
 from backend.member import Member
 from backend.restoring import RestoreFailed
 from backend.tools.temporary import temporary
@@ -257,7 +258,7 @@ async def test_what_is_back_but_does_not_act_is_owed_too(
 
 async def killed(x: Member, servo: Servo, state: Path, left_by_it: Path) -> None:
     """What a server killed in the middle of a motion leaves: its state folder and the drive."""
-    x.drive.found = Found(1, serial=await x.drive.read_serial())
+    x.drive.found = Found(1, serial=await read_serial(x.drive))
     async with x.axis.restoring(TORQUE), temporary(x.axis, {SPEED: 200}):
         await x.drive.write(TORQUE, 800)
         shutil.copytree(state, left_by_it)

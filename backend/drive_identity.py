@@ -1,0 +1,42 @@
+"""Whether the drive that answers at a place is the one that was connected there."""
+
+from __future__ import annotations
+
+from backend.drive import Drive
+from drivers.errors import NotAllowed, Rejected
+from drivers.link import Address
+
+
+async def read_serial(drive: Drive) -> int | None:
+    """Serial number of the drive that answers now (1018h:04), or None where it has none.
+
+    Raises:
+        LinkTimeout, LinkLost: it does not answer.
+    """
+    for port in drive.ports:
+        if port.link.kind == "modbus":
+            continue
+        try:
+            async with drive.rest.asking():
+                data = await port.link.read(port.station, Address(0x1018, 4, "UINT32"))
+        except (Rejected, NotAllowed):
+            continue
+        return int.from_bytes(data, "little") or None
+    return None
+
+
+async def confirm_identity(drive: Drive) -> None:
+    """Ask for the serial number again, where it is known and the drive tells it.
+
+    Raises:
+        NotAllowed: another drive answers here.
+    """
+    known = drive.found.serial if drive.found else None
+    if known is not None:
+        serial = await read_serial(drive)
+        if serial is not None and serial != known:
+            drive.identity_warning = (
+                f"{drive.name} had serial number {known}; the drive that answers here now "
+                f"has {serial}"
+            )
+    drive.require_identity()

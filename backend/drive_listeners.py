@@ -1,0 +1,44 @@
+"""Who is told what was read from a drive, written to it and commanded; on the event loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from backend.readings import CommandRecord, Reading, WriteRecord
+
+
+class DriveListeners:
+    """Of one drive."""
+
+    def __init__(self) -> None:
+        self._readings: list[Callable[[list[Reading]], None]] = []
+        self._writes: list[Callable[[WriteRecord], None]] = []
+        self._commands: list[Callable[[CommandRecord], None]] = []
+
+    def add(self, listener: Callable[[list[Reading]], None]) -> Callable[[], None]:
+        """Call ``listener`` with every batch of new readings, until what is returned is called."""
+        self._readings.append(listener)
+        return lambda: self._readings.remove(listener)
+
+    def add_writes(self, listener: Callable[[WriteRecord], None]) -> None:
+        """Call ``listener`` after everything that `Drive.write` sent, whatever came of it."""
+        self._writes.append(listener)
+
+    def add_commands(self, listener: Callable[[CommandRecord], None]) -> None:
+        """Call ``listener`` after everything that `Drive.command` sent, whatever came of it."""
+        self._commands.append(listener)
+
+    def read(self, readings: list[Reading]) -> None:
+        """Tell new readings."""
+        for listener in list(self._readings):
+            listener(readings)
+
+    def wrote(self, record: WriteRecord) -> None:
+        """Tell a write."""
+        for listener in self._writes:
+            listener(record)
+
+    def commanded(self, record: CommandRecord) -> None:
+        """Tell a command."""
+        for listener in self._commands:
+            listener(record)
