@@ -1,14 +1,14 @@
 import type { ScopeStart } from '../api/schema'
 import { decodeBlocks, type ScopeBlock } from './blocks'
-import { columns, thinned } from './decimate'
+import { columns } from './decimate'
 import { MathsChannel } from './maths'
 import { measure, stretch } from './measure'
 import { Ring, Trace } from './ring'
+import { csv, overlays, xy } from './scope-answers'
+import { ScopeSweeps } from './scope-sweeps'
 import { EVEN, spectrogram, spectrum } from './spectrum'
-import { type Sweep, Trigger } from './trigger'
 import type {
   Losses,
-  Overlay,
   QuestionKind,
   Questions,
   ScopeConfig,
@@ -20,11 +20,6 @@ import type {
 
 /** Rows kept per channel: at 4 kHz 80 s, and 16 channels of it take 82 MB. */
 const GREATEST_ROWS = 320_000
-const MOST_SWEEPS = 50
-/** Traces that lag by more than this are not waited for when a single picture is complete. */
-const LAG_S = 1
-/** With no trigger for so long the automatic mode shows what there is. */
-const AUTO_S = 0.5
 
 interface Subscription {
   number: number
@@ -58,17 +53,17 @@ export class ScopeStore {
   private traces = new Map<string, Trace>()
   private maths: { id: string; expression: string; channel: MathsChannel }[] = []
   private readonly losses: Losses = { dropped: 0, blocks: 0, away: 0 }
-  private finder: { trigger: ScopeTrigger; search: Trigger } | null = null
-  private sweeps: Sweep[] = []
-  private sweepCount = 0
-  private armedAt = 0
+  private readonly sweeps: ScopeSweeps
   /** A single picture was caught whole: nothing more is taken, so that it stays however long. */
   private held = false
-  private told: TriggerState = 'off'
   private count = 0
   private period = 0
 
-  constructor(private readonly ports: Ports) {}
+  constructor(private readonly ports: Ports) {
+    this.sweeps = new ScopeSweeps((state) => {
+      ports.triggered(state)
+    })
+  }
 
   // --- what is sampled ----------------------------------------------------------------
 
@@ -157,8 +152,7 @@ export class ScopeStore {
 
   private forget(): void {
     this.losses.dropped = this.losses.blocks = this.losses.away = 0
-    this.sweeps = []
-    this.sweepCount = 0
+    this.sweeps.forget()
   }
 
   clear(): void {
@@ -188,18 +182,8 @@ export class ScopeStore {
       }
     }
     for (const { channel } of this.maths) channel.advance()
-    this.look()
-    this.held ||= this.caught()
-  }
-
-  /** Whether the one picture that was wanted is there, of all traces that bring anything. */
-  private caught(): boolean {
-    const [sweep] = this.sweeps
-    if (this.finder?.trigger.mode !== 'single' || !sweep) return false
-    if ((this.newest() ?? 0) > sweep.to + LAG_S) return true
-    return [...this.rings.values()].every(
-      ({ ring }) => ring.newest === null || ring.newest >= sweep.to,
-    )
+    this.sweeps.look((id) => this.find(id))
+    this.held ||= this.sweeps.caught(this.newest(), this.rings.values())
   }
 
   private take(drive: string, subscription: Subscription, block: ScopeBlock): void {
@@ -241,40 +225,10 @@ export class ScopeStore {
     if (place) place.heard = now
   }
 
-  // --- trigger ------------------------------------------------------------------------
-
   /** Arm; null looks for none. Arming again begins a new search from now on. */
   setTrigger(trigger: ScopeTrigger | null): void {
-    this.sweeps = []
-    this.sweepCount = 0
     this.held = false
-    this.armedAt = this.newest() ?? 0
-    const ring = trigger && this.find(trigger.id)?.ring
-    this.finder = trigger && {
-      trigger,
-      search: new Trigger(trigger.settings, ring?.newest ?? this.armedAt, ring?.begun),
-    }
-    this.tell()
-  }
-
-  private look(): void {
-    if (!this.finder) return
-    const { trigger, search } = this.finder
-    const trace = this.find(trigger.id)
-    if (!trace || (trigger.mode === 'single' && this.sweeps.length > 0)) return
-    for (let found = search.look(trace); found; found = search.look(trace)) {
-      this.sweeps.push(found)
-      this.sweepCount++
-      if (trigger.mode === 'single') break
-    }
-    this.sweeps = this.sweeps.slice(-Math.min(MOST_SWEEPS, trigger.persistence + 1))
-    this.tell()
-  }
-
-  private tell(): void {
-    const state = !this.finder ? 'off' : this.sweeps.length === 0 ? 'waiting' : 'triggered'
-    if (state !== this.told) this.ports.triggered(state)
-    this.told = state
+    this.sweeps.arm(trigger, this.newest() ?? 0, trigger && this.find(trigger.id)?.ring)
   }
 
   private newest(): number | null {
@@ -293,7 +247,12 @@ export class ScopeStore {
   ): Questions[Kind]['get'] {
     const answers: { [K in QuestionKind]: (ask: Questions[K]['ask']) => Questions[K]['get'] } = {
       view: (view) => this.frame(view),
-      csv: ({ ids, names, from, to, origin }) => this.csv(ids, names, from, to, origin),
+      csv: ({ ids, names, from, to, origin }) =>
+        csv(
+          ids.map((id) => this.found(id)),
+          names,
+          { from, to, origin },
+        ),
       samples: ({ ids, from, to }) =>
         ids
           .map((id) => stretch(this.found(id), from, to))
@@ -309,7 +268,7 @@ export class ScopeStore {
         const { times, values } = stretch(this.found(id), from, to)
         return spectrogram(times, values, wide, EVEN[synchronous ? 'synchronous' : 'polled'])
       },
-      xy: ({ x, y, from, to, most }) => this.xy(x, y, from, to, most),
+      xy: ({ x, y, from, to, most }) => xy(this.found(x), stretch(this.found(y), from, to), most),
     }
     return answers[what](ask)
   }
@@ -320,7 +279,7 @@ export class ScopeStore {
 
   private frame(view: ScopeView): ScopeFrame {
     const newest = this.newest()
-    const { from, to } = this.stretch(view, newest)
+    const { from, to } = 'from' in view.show ? view.show : this.sweeps.shown(view.show, newest)
     // A picture that stands is not to crumble while somebody talks about it.
     for (const { ring } of this.rings.values()) {
       ring.keep = 'from' in view.show ? Math.min(ring.keep, from) : Number.POSITIVE_INFINITY
@@ -333,8 +292,8 @@ export class ScopeStore {
       from,
       to,
       newest,
-      trigger: this.triggered(newest),
-      overlays: view.persistence ? this.overlays(traces, view.bins) : [],
+      trigger: this.sweeps.state(newest),
+      overlays: view.persistence ? overlays(this.sweeps.earlier, traces, view.bins) : [],
       measurements: over && traces.map((trace) => measure(trace, over.from, over.to)),
       cursorValues: view.cursors.map((time) => traces.map((trace) => trace.at(time))),
       losses: { ...this.losses },
@@ -347,80 +306,6 @@ export class ScopeStore {
         return place?.heard == null ? null : now - place.heard
       }),
     }
-  }
-
-  private triggered(newest: number | null): ScopeFrame['trigger'] {
-    const at = this.sweeps.at(-1)?.at ?? null
-    const count = this.sweepCount
-    if (!this.finder) return { state: 'off', at: null, count }
-    if (this.free(newest)) return { state: 'auto', at: null, count }
-    return { state: at === null ? 'waiting' : 'triggered', at, count }
-  }
-
-  /** Whether the automatic mode shows what there is, for want of a trigger. */
-  private free(newest: number | null): boolean {
-    if (this.finder?.trigger.mode !== 'auto' || newest === null) return false
-    const last = this.sweeps.at(-1)?.to ?? this.armedAt
-    // Earlier than the last one: the clock is another one since.
-    return newest < last || newest - last > Math.max(AUTO_S, this.finder.trigger.settings.window)
-  }
-
-  private stretch(view: ScopeView, newest: number | null): { from: number; to: number } {
-    if ('from' in view.show) return view.show
-    const end = newest ?? 0
-    if ('window' in view.show) return { from: end - view.show.window, to: end }
-    const window = this.finder?.trigger.settings.window ?? 1
-    if (this.free(newest)) return { from: end - window, to: end }
-    // Until the first trigger: what would lie before it if it came now.
-    const before = window * (this.finder?.trigger.settings.before ?? 0)
-    return this.sweeps.at(-1) ?? { from: end - before, to: end - before + window }
-  }
-
-  /** Sweeps before the newest one, oldest first. */
-  private overlays(traces: Trace[], bins: number): Overlay[] {
-    return this.sweeps.slice(0, -1).flatMap((sweep) => {
-      const [times, ...series] = columns(traces, sweep.from, sweep.to, bins)
-      return series.map((values, trace) => {
-        const shown = Array.from(times, (_, i) => i).filter((i) => values[i] != null)
-        return {
-          trace,
-          times: shown.map((i) => (times[i] as number) - sweep.at),
-          values: shown.map((i) => values[i] as number),
-        }
-      })
-    })
-  }
-
-  /** Raw samples as CSV: one row per time, empty where a trace has no sample then. */
-  private csv(ids: string[], names: string[], from: number, to: number, origin: number): string {
-    const traces = ids.map((id) => this.found(id))
-    const [times, ...series] = columns(traces, from, to, Number.MAX_SAFE_INTEGER)
-    const quoted = ['time_s', ...names].map((name) => `"${name.replaceAll('"', '""')}"`)
-    const lines = [quoted.join(',')]
-    for (let i = 0; i < times.length; i++) {
-      const values = series.map((column) => column[i] ?? '')
-      lines.push([((times[i] as number) - origin).toFixed(6), ...values].join(','))
-    }
-    return `${lines.join('\r\n')}\r\n`
-  }
-
-  /** One channel over another, at the times of the first; the extremes of both are kept. */
-  private xy(x: string, y: string, from: number, to: number, most: number) {
-    const [over, of] = [this.found(x), stretch(this.found(y), from, to)]
-    const across = Float64Array.from(of.times, (time) => over.between(time))
-    const kept = new Set([
-      ...thinned(of.times, of.values, most / 2).times,
-      ...thinned(of.times, across, most / 2).times,
-    ])
-    const points: Questions['xy']['get'] = { x: [], y: [], times: [] }
-    for (let i = 0; i < of.times.length; i++) {
-      const [px, py] = [across[i] as number, of.values[i] as number]
-      if (!kept.has(of.times[i] as number) || !Number.isFinite(px)) continue
-      points.x.push(px)
-      points.y.push(py)
-      points.times.push(of.times[i] as number)
-    }
-    return points
   }
 }
 
