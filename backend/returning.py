@@ -13,7 +13,7 @@ from backend.monitor import Snapshot
 from backend.owed_store import OwedStore
 from backend.tools.settling import settle
 from drivers.cia402 import State
-from drivers.errors import NotAllowed
+from drivers.errors import Busy, NotAllowed
 from drivers.link import Found
 
 if TYPE_CHECKING:
@@ -105,7 +105,13 @@ class Returning:
         if enabled or not await member.axis.standstill(_STANDS_S):
             self._awaited.add(drive_id)
             return
-        await self.start(member, asked=False).wait()
+        try:
+            job = self.start(member, asked=False)
+        except Busy:
+            # The drive fell silent and answered once more while it was looked at.
+            self._awaited.add(drive_id)
+            return
+        await job.wait()
 
     def seen(self, member: Member, snapshot: Snapshot) -> None:
         """An axis that was enabled when its drive answered stands free now: put back what is owed.

@@ -132,6 +132,18 @@ async def test_it_is_named_and_put_back_by_itself(bench: Bench, x: Member, servo
     assert any("put back: " in line and f"{TORQUE} = 3000" in line for line in lines)
 
 
+async def test_a_drive_that_answers_twice_in_a_row_is_read_and_put_back(
+    bench: Bench, x: Member, servo: Servo
+) -> None:
+    await lost_in_the_middle(x, servo)
+    bench.returning.returned("x")
+    await back(bench, servo)
+    await asyncio.gather(*(job.wait() for job in bench.jobs.all()))
+    assert [job.state for job in bench.jobs.all() if job.state != "done"] == []
+    assert held(servo) == WAS
+    assert not x.drive.owed
+
+
 async def test_a_drive_that_restarted_with_its_stored_values_owes_nothing(
     bench: Bench, x: Member, servo: Servo
 ) -> None:
