@@ -186,10 +186,32 @@ def _evaluated(file: Path, _changed_ns: int) -> sweep_evaluation.SweepResult:
         raise BadMeasurement(f"{file.name}: {error}", value=file.name) from error
 
 
+#: Evaluations that run now, each on its event loop.
+_Running = dict[
+    tuple[asyncio.AbstractEventLoop, Path, int], asyncio.Task[sweep_evaluation.SweepResult]
+]
+_running: _Running = {}
+
+
+async def _evaluated_once(file: Path, changed_ns: int) -> sweep_evaluation.SweepResult:
+    """As `_evaluated`; who asks while another's evaluation runs waits for that one.
+
+    A page that opens a response asks several questions about it at once, each of which would
+    take a processor for itself.
+    """
+    place = (asyncio.get_running_loop(), file, changed_ns)
+    task = _running.get(place)
+    if task is None:
+        task = asyncio.create_task(asyncio.to_thread(_evaluated, file, changed_ns))
+        _running[place] = task
+        task.add_done_callback(lambda _: _running.pop(place, None))
+    return await asyncio.shield(task)
+
+
 async def _plant(bench: Bench, name: str) -> tuple[MeasuredPlant, sweep_evaluation.SweepResult]:
     await asyncio.to_thread(measurement_head, bench, name)
     file = bench.measurements.path(name)
-    found = await asyncio.to_thread(_evaluated, file, file.stat().st_mtime_ns)
+    found = await _evaluated_once(file, file.stat().st_mtime_ns)
     if found.model is None:
         raise NotAllowed(
             f"{name}: nothing can be designed on it: "
