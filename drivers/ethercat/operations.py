@@ -385,7 +385,7 @@ class Operations:
 
     def _halt(self, message: Message, done: Done) -> None:
         if self.loop is not None:
-            self.loop.stop_axes("stopped by the user", message["station"])
+            self.loop.stop_axes("the motion was ended", message["station"])
         done(None, None)
 
     def _drive_to(self, message: Message, done: Done) -> None:

@@ -128,6 +128,7 @@ export const saidOfTuning = {
     '请检查负载、限值和增益；仅在机器允许时放宽限值',
   ],
   'said.eCable': ["look at the cable and at the drive's supply", '请检查电缆和驱动器供电'],
+  'said.eEnded': ['the motion was ended', '运动已结束'],
   'said.eRestored': ['not restored', '未恢复'],
   'said.eServer': ['the server is gone', '服务器已退出'],
   // Inertia and friction: why there is no answer.
