@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray, IntArray, neighbour_mean
+from backend.analysis.arrays import ComplexArray, FloatArray, IntArray, neighbour_mean
+from backend.analysis.excitation import Excitation
 from backend.analysis.frf import Frf
 from backend.analysis.line_spectra import (
     Quantity,
@@ -23,13 +24,16 @@ from backend.analysis.line_spectra import (
     own_torque,
     period_spectra,
     speed_lag_s,
+    velocity_from_position,
 )
-from backend.analysis.sampling import SignalPath, reported_response
+from backend.analysis.sampling import SignalPath, delay_response, reported_response
 
 #: Empty bins that a level is taken over, to each side, and the fewest that tell anything.
 _REACH, _FEWEST = 6, 12
 #: What a bin that is left out may hold of what an excited one does: rounding, and nothing else.
 _SILENT = 1e-3
+#: Places of the axis that differ by less, relative to its way, are the same.
+_ROUNDING = 1e-9
 #: Play is looked for above this share of the sample rate: below, friction rules.
 _LOWEST = 0.1
 #: So much of the motion is too much, in any case or where friction explains none of it.
@@ -40,9 +44,6 @@ _SLOW, _ABOUT_S = 0.1, 0.002
 _AT_REVERSALS, _LEAST_TIME = 1.4, 0.01
 #: Power on the empty bins over that of the noise in it, from which on it tells of play.
 _ABOVE_NOISE = 4.0
-#: Where noise rules below, as behind a coarse encoder, play may show above this share of the sample
-#: rate, where it moves the motor alone; so much above the noise there.
-_HIGHEST, _FAR_ABOVE_NOISE = 0.3, 5.0
 
 
 @dataclass(frozen=True)
@@ -88,26 +89,31 @@ def distortion(
         np.interp(f, frf.frequency_hz, np.log(np.abs(frf.response)))
         + 1j * np.interp(f, frf.frequency_hz, np.unwrap(np.angle(frf.response)))
     )
-    late, lag_s = reported_response(f, path), speed_lag_s(records, path)
+    # Behind a coarse encoder the reported speed is noisier by far than the way of a cycle.
+    placed = all(record.position is not None for record in records)
+    late = delay_response(f, path.response_delay_s) if placed else reported_response(f, path)
+    lag_s = speed_lag_s(records, path)
     rest, before, noise, lines, falls = [], [], [], [], []
     for record in records:
         good, _ = good_periods(record)
         if len(good) < 2:
             continue
         between = replace(record.excitation, lines=empty)
-        moved = period_spectra(record.response, between, good)
+        moved = _motion(record, between, good, path, placed)
         if quantity == "torque_injection":
             own = period_spectra(own_torque(record, path), between, good)
             moved = moved - plant * late * own
         mean = moved.mean(axis=0)
         direction = friction_direction(record, between, good, path, lag_s)
         by_friction = frf.coulomb_nm * plant * late * direction
-        noise.append(np.sum(np.abs(moved - mean) ** 2, axis=0) / (len(good) * (len(good) - 1)))
+        scatter = np.sum(np.abs(moved - mean) ** 2, axis=0) / (len(good) * (len(good) - 1))
+        # A motion that repeats itself repeats the steps of its encoder: that is no scatter.
+        noise.append(np.maximum(scatter, _steps(record, f) if placed else 0.0))
         before.append(np.abs(mean) ** 2)
         left = mean + by_friction.mean(axis=0)
         rest.append(np.abs(left) ** 2)
         falls.append(_at_reversals(record, good, empty, left / plant))
-        lines.append(np.abs(period_spectra(record.response, record.excitation, good).mean(axis=0)))
+        lines.append(np.abs(_motion(record, record.excitation, good, path, placed).mean(axis=0)))
     if not rest:
         return none
     around = np.interp(f, frf.frequency_hz, neighbour_mean(np.mean(lines, axis=0), _REACH))
@@ -120,12 +126,10 @@ def distortion(
     upper = f >= _LOWEST * path.sample_rate_hz
     if np.count_nonzero(upper) < _FEWEST:
         return none
-    # Where noise rules (the coarse encoder of DS_C), what is left after it is taken out is noise.
-    highest = f >= _HIGHEST * path.sample_rate_hz
-    if not _stands_out(rest, noise, upper, _ABOVE_NOISE):
-        if not _stands_out(rest, noise, highest, _FAR_ABOVE_NOISE):
-            return none
-        upper = highest
+    # Where noise rules, what is left after it is taken out is noise.
+    power, of_noise = (float(np.median(np.mean(p, axis=0)[upper])) for p in (rest, noise))
+    if power < _ABOVE_NOISE * of_noise:
+        return none
     return Distortion(
         # What lies below the first empty bins is told by all of them, not by one beside a valley.
         np.asarray(np.interp(frf.frequency_hz, f, share, left=float(np.median(share)))),
@@ -133,14 +137,31 @@ def distortion(
     )  # fmt: skip
 
 
-def _stands_out(
-    rest: list[FloatArray], noise: list[FloatArray], use: BoolArray, factor: float
-) -> bool:
-    """Whether what is left on these bins is more than noise."""
-    if np.count_nonzero(use) < _FEWEST:
-        return False
-    power, of_noise = (float(np.median(np.mean(p, axis=0)[use])) for p in (rest, noise))
-    return power >= factor * of_noise
+def _motion(
+    record: Record, e: Excitation, good: list[int], path: SignalPath, placed: bool
+) -> ComplexArray:
+    """Spectra [periods, lines] of the velocity, by the position where there is one."""
+    if placed:
+        return velocity_from_position(record, e, good, path.sample_rate_hz)
+    return period_spectra(record.response, e, good)
+
+
+def _steps(record: Record, f: FloatArray) -> FloatArray:
+    """Power [lines] that the steps of the encoder have in a velocity by the position.
+
+    As independent errors of 1/12 of a squared step (Widrow & Kollár, *Quantization Noise*, 2008,
+    chapter 4).
+    """
+    assert record.position is not None
+    e = record.excitation
+    places = np.diff(np.unique(record.position))
+    # What is no step is rounding of the numbers.
+    places = places[places > _ROUNDING * float(np.ptp(record.position))]
+    if not places.size:
+        return np.zeros(f.size)
+    x = f / e.sample_rate_hz
+    slope = 2.0 * e.sample_rate_hz * np.sin(np.pi * x) / np.sinc(x)
+    return np.asarray(e.period_samples * float(np.min(places)) ** 2 / 12.0 * slope**2)
 
 
 def _at_reversals(

@@ -168,7 +168,7 @@ def period_spectra(signal: FloatArray, e: Excitation, periods: list[int]) -> Com
     return np.asarray(np.fft.rfft(blocks, axis=1)[:, e.lines])
 
 
-def _velocity_from_position(
+def velocity_from_position(
     record: Record, e: Excitation, periods: list[int], rate: float
 ) -> ComplexArray:
     """Spectra [periods, lines] of the velocity by way of the reported position.
@@ -211,7 +211,7 @@ def collect(
         realisation.append(e.realisation)
         sent.append(period_spectra(e.samples, e, good))
         response.append(
-            _velocity_from_position(record, e, good, path.sample_rate_hz)
+            velocity_from_position(record, e, good, path.sample_rate_hz)
             if position
             else period_spectra(record.response, e, good)
         )
@@ -253,7 +253,7 @@ def speed_lag_s(records: tuple[Record, ...], path: SignalPath) -> float:
         use = e.line_hz <= _TELLING * path.sample_rate_hz
         w = 2 * np.pi * e.line_hz[use]
         seen = period_spectra(record.response, e, good).mean(axis=0)[use]
-        moved = _velocity_from_position(record, e, good, path.sample_rate_hz).mean(axis=0)[use]
+        moved = velocity_from_position(record, e, good, path.sample_rate_hz).mean(axis=0)[use]
         weight = np.abs(seen) * np.abs(moved)
         turned -= float(np.sum(weight * w * np.angle(seen * moved.conj())))
         weights += float(np.sum(weight * w**2))

@@ -72,29 +72,33 @@ def test_an_axis_with_play_gets_no_model_and_no_lines_beyond_the_direct_band():
 
 
 @pytest.mark.parametrize("play", [True, False])
-def test_play_is_seen_above_the_noise_of_a_coarse_encoder(play):
-    """Noise hides the empty bins below 290 Hz; above, motion of every period is play, none is not.
+def test_play_is_told_from_the_steps_of_a_coarse_encoder(play):
+    """A motion that repeats itself repeats its steps as well, as on a DS_C.
 
-    So it is on a DS_C: 2500 lines, and a motor that rattles alone within the gap.
+    They do not scatter from period to period then, and are all that lies between the lines.
     """
     linear = tuple(records_of(Mechanics(loads=((1e-4, 60.0, 0.006),), coulomb_nm=0.0)))
     rng = np.random.default_rng(5)
     e = linear[0].excitation
     empty = np.setdiff1d(np.arange(e.lines[0], e.lines[-1] + 1), e.lines)
     sizes = np.abs(np.fft.rfft(linear[0].response[e.first_sample + PERIOD :][:PERIOD]))
-    around = np.interp(empty, e.lines, sizes[e.lines])
     spectrum = np.zeros(PERIOD // 2 + 1, dtype=complex)
-    high = empty * RATE / PERIOD > 300.0
-    spectrum[empty[high]] = 0.5 * around[high] * np.exp(1j * rng.uniform(0, TURN, high.sum()))
+    around = np.interp(empty, e.lines, sizes[e.lines])
+    spectrum[empty] = 0.5 * around * np.exp(1j * rng.uniform(0, TURN, empty.size))
     own = np.tile(np.fft.irfft(spectrum, PERIOD), 8)
     start = PERIOD - e.first_sample % PERIOD
+    step = TURN / 2_500
     records = []
     for r in linear:
         n = r.response.size
-        noise = np.fft.rfft(rng.normal(0.0, 0.3, n))
-        noise[np.fft.rfftfreq(n, 1.0 / RATE) > 290.0] *= 0.02
-        added = np.fft.irfft(noise, n) + play * own[start : start + n]
-        records.append(replace(r, response=r.response + added))
+        steady = e.first_sample + e.transient_periods * PERIOD
+        velocity = r.response + play * own[start : start + n]
+        # From the first whole period on, every one is that one.
+        velocity[steady:] = np.resize(velocity[steady : steady + PERIOD], n - steady)
+        velocity[steady:] -= np.mean(velocity[steady : steady + PERIOD])
+        place = np.floor(np.cumsum(velocity) / RATE / step) * step
+        told = np.gradient(place) * RATE
+        records.append(replace(r, response=told, position=place))
     frf = estimate_periodic(tuple(records), PATH, "torque_mode")
     found = distortion(tuple(records), PATH, "torque_mode", frf)
     assert found.play is play
