@@ -7,13 +7,20 @@ the measured lines, and on the model only between and above them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from backend.analysis.arrays import ComplexArray, FloatArray
 from backend.analysis.loop_goals import Goals, LoadClass, Mark, Worst, goals_for, worst_of
-from backend.analysis.loop_search import INTEGRAL_RATIO, Found, LoopSearch
+from backend.analysis.loop_search import (
+    BEGUN,
+    INTEGRAL_RATIO,
+    TRIED_AT_LAST,
+    Found,
+    LoopSearch,
+)
 from backend.analysis.loop_structure import (
     TURN,
     DriveLoops,
@@ -72,21 +79,39 @@ def design(
     when nothing meets any goal.
     """
     search = LoopSearch(plant, inertia_kgm2, loops, notch_response)
+    goals = {mark: goals_for(load, mark).with_reserve() for mark in MARKS}
+    best = {mark: search.best(goals[mark], slots) for mark in MARKS}
+    firsts = [max(found, key=_merit) for found in best.values() if found]
     rows: list[Candidate] = []
     stricter: Found | None = None
     for mark in MARKS:
-        goals = goals_for(load, mark).with_reserve()
-        best = search.best(goals, slots)
-        winner = max(best, key=lambda found: found.merit, default=None)
-        if stricter is not None and winner is not None:
+        if not best[mark]:
+            continue
+        winner = _winner(search, best[mark], firsts, goals[mark])
+        if stricter is not None:
             # What keeps stricter goals keeps these with at least as much gain.
-            winner = search.better(winner, stricter.shape, goals)
-            best = best if winner in best else [*best, winner]
+            winner = search.better(winner, stricter.shape, goals[mark])
         stricter = winner
-        for found in best:
-            marks: tuple[Mark, ...] = (mark,) if found is winner else ()
-            rows.append(_candidate(search, found, marks))
+        rows += [_candidate(search, found, ()) for found in best[mark] if found is not winner]
+        rows.append(_candidate(search, winner, (mark,)))
     return _table(rows)
+
+
+def _winner(
+    search: LoopSearch, found: Sequence[Found], others: Sequence[Found], goals: Goals
+) -> Found:
+    """The best that leads from these, and from what is best for other goals."""
+    first = max(found, key=_merit)
+    bar = replace(first, merit=BEGUN * first.merit)
+    shapes = [s for s in dict.fromkeys(other.shape for other in others) if s != first.shape]
+    begun = [first, *(search.better(bar, shape, goals) for shape in shapes)]
+    return max(
+        (search.shaken(each, goals, TRIED_AT_LAST) for each in begun if each is not bar), key=_merit
+    )
+
+
+def _merit(found: Found) -> float:
+    return found.merit
 
 
 def _candidate(search: LoopSearch, found: Found, marks: tuple[Mark, ...]) -> Candidate:

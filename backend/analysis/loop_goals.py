@@ -107,8 +107,15 @@ def sensitivity_peak(loops: ComplexArray) -> float:
 
 def stable(loops: ComplexArray) -> BoolArray:
     """Nyquist per row: followed down from the top, 1 + L must not have wound round the origin."""
-    turn = np.unwrap(np.angle(1.0 + loops)[:, ::-1], axis=1)
-    end = np.degrees(turn[:, -1])
+    real, imag = 1.0 + loops.real, loops.imag
+    # Followed upwards it turns by whole turns where it passes left of the origin.
+    above = imag >= 0.0
+    row, line = np.nonzero(above[:, 1:] != above[:, :-1])
+    side = real[row, line] * imag[row, line + 1] - imag[row, line] * real[row, line + 1]
+    falls = above[row, line]
+    passed = np.where(falls, side > 0.0, side < 0.0)
+    turns = np.bincount(row, passed * np.where(falls, 1.0, -1.0), len(loops))
+    end = np.degrees(np.arctan2(imag[:, 0], real[:, 0])) - 360.0 * turns
     return np.asarray((end > -270.0) & (end < 90.0))
 
 

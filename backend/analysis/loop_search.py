@@ -1,9 +1,11 @@
 """Which notches and filters let the gain of a speed loop go highest.
 
 Greedy in the number of notches: the best of a family of shapes is added, then all are moved
-together (a pattern search, Hooke & Jeeves 1961) as long as the design gets better. A shape is
-judged by the highest gain that keeps the goals for everything that the axis may be, so most
-shapes are refused by a single look at the sensitivity.
+together (a pattern search, Hooke & Jeeves 1961, and random steps, Rechenberg 1973) as long as the
+design gets better. A further notch need not be worth anything where it is begun: the notches before
+it were shaped for a loop without it, and whether some seed was worth a per cent decided by noise
+between one notch and two. A shape is judged by the highest gain that keeps the goals for everything
+that the axis may be, so most shapes are refused by a single look at the sensitivity.
 """
 
 from __future__ import annotations
@@ -37,17 +39,27 @@ _RESOLUTION = 0.01
 _COARSE = 1.4
 #: Widths as multiples of the centre and depths in dB that are tried at every place.
 _WIDTHS = (0.25, 0.5, 0.9, 1.5, 2.2)
-_DEPTHS = (-6.0, -10.0, -16.0, -24.0)
+_DEPTHS = (-2.0, -6.0, -10.0, -16.0, -24.0)
 #: Places as multiples of a resonance: a wide notch above it takes the gain down from the
 #: resonance on, where the motor turns alone, and costs less phase below than one upon it.
 _PLACES = (0.8, 1.0, 1.25, 1.6)
 #: Steps of the pattern search: share of centre, share of width, dB; halved so many times.
 _STEP = (0.12, 0.4, 5.0)
 _HALVINGS, _SWEEPS = 4, 4
+#: A seed may be worth this share of what it is added to.
+BEGUN = 0.9
+#: Random steps of all notches: how many for each number of them and for the winner, spread as
+#: above, at once in so many coordinates, wider after one that is better and narrower after others.
+_TRIED, TRIED_AT_LAST = 60, 400
+_SPREAD, _AT_ONCE, _WIDER, _NARROWER, _FINEST = (0.12, 0.4, 3.0), 0.5, 1.5, 0.93, 0.05
 _DEEPEST_DB, _WIDEST, _NARROWEST = -40.0, 4.0, 0.08
 #: No notch is begun below this, and none ends this far above the highest line.
 _LOWEST_PLACE_HZ = 15.0
 _FARTHEST = 2.5
+#: A look at every so manyth line refuses most shapes.
+_SOME = 4
+#: Where the gain below a bandwidth is looked at, as logarithms of shares of it.
+_DECADE = np.linspace(-np.log(10.0), 0.0, 24)
 
 
 @dataclass(frozen=True)
@@ -89,11 +101,14 @@ class LoopSearch:
     loops: DriveLoops
     notch_response: NotchResponse
     _made: dict[Notch, ComplexArray | None] = field(default_factory=dict)
+    _levels: dict[Notch, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.frequency_hz: FloatArray = self.plant.frequency_hz
         self._s = 1j * TURN * self.frequency_hz
+        self._log_f = np.log(self.frequency_hz)
         self._shifts = self.plant.shifted()
+        self._some = np.ascontiguousarray(self._shifts[:, ::_SOME])
         self.filters = (self.loops.filters, *self.loops.choices)
         self._fixed = [self.loops.with_filters(f).response(self.frequency_hz) for f in self.filters]
         self._highest = (
@@ -131,6 +146,11 @@ class LoopSearch:
         return worst_of(self.loops_at(fixed, bandwidth_hz))
 
     def _keeps(self, fixed: ComplexArray, bandwidth_hz: float, goals: Goals) -> bool:
+        # What some of the lines refuse need not be looked at on all of them.
+        corner = TURN * bandwidth_hz / INTEGRAL_RATIO
+        pi = TURN * bandwidth_hz * self.inertia_kgm2 * (1.0 + corner / self._s[::_SOME])
+        if sensitivity_peak(self._some * (fixed[::_SOME] * pi)) > goals.ms:
+            return False
         loops = self.loops_at(fixed, bandwidth_hz)
         return sensitivity_peak(loops) <= goals.ms and worst_of(loops).meets(goals)
 
@@ -163,14 +183,39 @@ class LoopSearch:
         best = self._wider(Found(Shape(), 0.0, 0.0), goals)
         kept = [best] if best.bandwidth_hz else []
         for count in range(1, slots + 1):
-            found = best
+            found = begun = replace(best, merit=BEGUN * best.merit)
             for shape in self._seeds(best.shape, count):
                 found = self.better(found, shape, goals)
-            if found is best:
+            if found is begun:
                 break
-            best = self._refined(found, goals)
+            found = self.shaken(self._refined(found, goals), goals, _TRIED)
+            if found.merit <= best.merit:
+                break
+            best = found
             kept.append(best)
         return kept
+
+    def shaken(self, found: Found, goals: Goals, tries: int) -> Found:
+        """The best of so many random steps, the same ones each time.
+
+        What limits the gain is the worst of many loops, so where no single coordinate makes it
+        better two of them may.
+        """
+        random, spread = np.random.default_rng(1), 1.0
+        at = np.array([_coordinates(notch) for notch in found.shape.notches])
+        low = np.array([np.log(_LOWEST_PLACE_HZ), np.log(_NARROWEST), _DEEPEST_DB])
+        high = np.array([np.log(_FARTHEST * self.plant.measured_hz), np.log(_WIDEST), -1.0])
+        for _ in range(tries if at.size else 0):
+            chosen = random.random(at.shape) < max(_AT_ONCE, 1.0 / len(at))
+            moved = at + spread * np.array(_SPREAD) * random.normal(size=at.shape) * chosen
+            moved = np.clip(moved, low, high)
+            shape = replace(found.shape, notches=tuple(_of(*each) for each in moved))
+            tried = self.better(found, shape, goals)
+            if tried is not found:
+                found, at, spread = tried, moved, min(_WIDER * spread, 1.0)
+            else:
+                spread = _NARROWER * spread if spread > _FINEST else 1.0
+        return found
 
     def better(self, incumbent: Found, shape: Shape, goals: Goals) -> Found:
         """The shape with its highest gain where that is worth more, else the incumbent."""
@@ -183,15 +228,16 @@ class LoopSearch:
 
     def _left(self, shape: Shape, bandwidth_hz: float) -> float:
         """What notches leave of the gain in the decade below a bandwidth; 0: not possible."""
-        total = 1.0
-        grid = np.geomspace(0.1 * bandwidth_hz, bandwidth_hz, 24)
+        total = 0.0
+        grid = np.log(bandwidth_hz) + _DECADE
         for notch in shape.notches:
             made = self._notch(notch)
             if made is None:
                 return 0.0
-            level = np.interp(grid, self.frequency_hz, np.log(np.maximum(np.abs(made), 1e-6)))
-            total *= float(np.exp(np.mean(level)))
-        return total
+            if notch not in self._levels:
+                self._levels[notch] = np.log(np.maximum(np.abs(made), 1e-6))
+            total += float(np.mean(np.interp(grid, self._log_f, self._levels[notch])))
+        return float(np.exp(total))
 
     def _wider(self, found: Found, goals: Goals) -> Found:
         for choice in range(len(self.filters)):
@@ -235,6 +281,15 @@ class LoopSearch:
                 if found is before:
                     break
         return found
+
+
+def _coordinates(notch: Notch) -> tuple[float, float, float]:
+    """Logarithms of centre and of width as a share of it, and depth."""
+    return np.log(notch.center_hz), np.log(notch.width_hz / notch.center_hz), notch.depth_db
+
+
+def _of(centre: float, ratio: float, depth_db: float) -> Notch:
+    return Notch(float(np.exp(centre)), float(np.exp(centre + ratio)), float(depth_db))
 
 
 def _moved(notch: Notch, scale: float) -> Iterator[Notch]:

@@ -242,8 +242,12 @@ def _interpolated(points: tuple[tuple[int, float], ...], level: float) -> float:
 def _nearest_level(
     points: tuple[tuple[int, float], ...], wanted: float, allowed: IntegerRange
 ) -> int:
-    levels = range(allowed.low, allowed.high + 1)
-    return min(levels, key=lambda level: abs(_interpolated(points, level) - wanted))
+    if not points:
+        raise ValueError("the levels have not been measured on this drive yet")
+    ordered = sorted(points)
+    levels = np.arange(allowed.low, allowed.high + 1)
+    known = np.interp(levels, [p[0] for p in ordered], [p[1] for p in ordered])
+    return int(levels[np.argmin(np.abs(known - wanted))])
 
 
 def fit_notch(frequency_hz: FloatArray, ratio: ComplexArray) -> Notch:
