@@ -13,8 +13,8 @@ describe('what the server says of a job', () => {
   })
   it('is told part by part, and what is a name stays', () => {
     expect(said(zh, 'Frequency response: Spindle')).toBe('频率响应：Spindle')
-    expect(said(zh, '2 of 6: inertia and friction: evaluating')).toBe(
-      '第 2 步（共 6 步）：惯量与摩擦：正在计算',
+    expect(said(zh, '2 of 6: inertia and friction: going back and evaluating')).toBe(
+      '第 2 步（共 6 步）：惯量与摩擦：正在返回并计算',
     )
   })
   it('is told sentence by sentence, as a verdict or a refused tuning has several', () => {

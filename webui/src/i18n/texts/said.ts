@@ -53,7 +53,6 @@ export const saidTexts = {
   'said.searching': ['searching home', '正在寻找零点'],
   'said.end': ['looking for an end at limited torque', '以限定转矩寻找行程端点'],
   'said.first': ['a first short move', '首次短距离移动'],
-  'said.evaluating': ['evaluating', '正在计算'],
   'said.goingBack': ['going back and evaluating', '正在返回并计算'],
   'said.pull': ['looking for a load that pulls the axis', '检查是否有重力负载'],
   'said.feel': ['feeling the axis with a small torque', '以小转矩试探轴'],
