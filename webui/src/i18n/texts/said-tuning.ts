@@ -326,6 +326,32 @@ export const saidOfTuning = {
   ],
   'said.tPromise': ['it did not keep the promise when it was verified', '验证时未达到预期'],
   'said.tTime': ['the time for one tuning was used up', '单次整定的时间已用完'],
+  'said.tLostAsIs': [
+    'what lost samples was not all measured again, as the time for one tuning was used up',
+    '丢失采样的部分未全部重新测量，因为单次整定的时间已用完',
+  ],
+  'said.tOneMove': [
+    'the load swings, and the axis was not moved a second time, gently, as the time for one tuning was used up',
+    '负载有摆动，但轴未再次平缓移动，因为单次整定的时间已用完',
+  ],
+  'said.tNoNotchTime': [
+    'what they do was not measured, as the time for one tuning was used up',
+    '未测量其作用，因为单次整定的时间已用完',
+  ],
+  'said.tNoNotchTry': [
+    'tune again, where it was lost samples that took it with a better link',
+    '请重新整定；若原因是丢失采样，请先改善链路',
+  ],
+  'said.tFewerValues': [
+    "what the drive's notches do was measured with fewer of their values, as the time for one tuning was used up",
+    '驱动器陷波器的作用仅用较少的数值测量，因为单次整定的时间已用完',
+  ],
+  'said.tNextTime': ['the next tuning measures it again', '下次整定将重新测量'],
+  'said.tLink': ['look at the link quality', '请检查链路质量'],
+  'said.tNotchAgain': [
+    'there was no time to try its notches again where samples were lost',
+    '丢失采样后已没有时间再次尝试其陷波器',
+  ],
   'said.tNone': ['no candidate kept its promise when it was verified', '验证时没有方案达到预期'],
   'said.tNoneTry': [
     'all parameters are as before; look for play and loose parts, measure again, or choose gains by hand',
