@@ -90,7 +90,6 @@ class Recorder:
         self.problem = ""
         self.reason = ""
         self.began = time.time()
-        self.triggered: float | None = None
         self._bench = bench
         self._ended = ended
         self._make_writer = make_writer
@@ -283,7 +282,6 @@ class Recorder:
 
     def _begin(self, why: str) -> None:
         self.phase = "recording"
-        self.triggered = time.time()
         self.event(why, f"recording {why}")
         writer = self._writer
         while self._held and writer is not None:

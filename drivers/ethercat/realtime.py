@@ -20,7 +20,6 @@ class RealTime:
     """What was granted; ``notes`` say in words what was not, and how to get it."""
 
     fifo_priority: int
-    memory_locked: bool
     notes: tuple[str, ...]
 
 
@@ -31,7 +30,7 @@ def claim(*, wanted: bool = True) -> RealTime:
     Note that a SCHED_FIFO thread may never spin: the kernel throttles it for 50 ms a second.
     """
     if not wanted:
-        return RealTime(0, memory_locked=False, notes=("real-time scheduling was not asked for",))
+        return RealTime(0, notes=("real-time scheduling was not asked for",))
     notes = []
     libc = ctypes.CDLL(None, use_errno=True)
     scheduling.fine_timers()
@@ -42,8 +41,7 @@ def claim(*, wanted: bool = True) -> RealTime:
             "the system grants no real-time scheduling (SCHED_FIFO), so single cycles may be some"
             " milliseconds late on a busy computer; CAP_SYS_NICE or an rtprio limit grants it"
         )
-    locked = libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0
-    if not locked:
+    if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
         notes.append(
             "the system does not let this process lock its memory; CAP_IPC_LOCK or a larger"
             " memlock limit does"
@@ -52,7 +50,7 @@ def claim(*, wanted: bool = True) -> RealTime:
     scheduling.spare_collector()
     gc.disable()
     sys.setswitchinterval(1e-4)
-    return RealTime(priority, locked, tuple(notes))
+    return RealTime(priority, tuple(notes))
 
 
 def die_with_parent() -> None:

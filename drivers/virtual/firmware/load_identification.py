@@ -64,7 +64,8 @@ class LoadIdentification:
         self._timer: Timer | None = None
         self._samples: list[Sample] = []
         self._before: tuple[float, float] | None = None
-        self._online = core.schedule.after(_SAMPLE_S, self._watch) if keys.online else None
+        if keys.online:
+            core.schedule.after(_SAMPLE_S, self._watch)
         self._show_revolutions()
 
     @property

@@ -83,7 +83,6 @@ class TerminalTable:
     masks_outputs: bool = True
     keep_key: str | None = None
     """What its outputs do when process data end: a set bit switches the output off."""
-    index_bit: int | None = None
     probe_bits: tuple[int, int] | None = None
 
     def use_of(self, terminal: Input, od: ObjectDictionary) -> InputUse | None:
@@ -161,7 +160,6 @@ M6L = TerminalTable(
     bus_outputs_need_function=True,
     bus_outputs_need_cycles=True,
     keep_key="2014:1C",
-    index_bit=25,
     probe_bits=(26, 27),
 )
 
