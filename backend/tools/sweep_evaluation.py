@@ -15,9 +15,9 @@ from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
 from backend.analysis.identify import Identification, identify_with_path
 from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
 from backend.analysis.mechanical_model import MechanicalModel
-from backend.analysis.mode_doubt import ModeDoubt
 from backend.analysis.reported import charged, commanded, current_doubt, mean_cycles
 from backend.analysis.resonance import Resonance
+from backend.analysis.resonance_table import resonance_table
 from backend.analysis.sampling import MODEL_SHARE, STEP_LEAD_S, Hold, SignalPath, sampled_command
 from backend.axis import Envelope
 from backend.tools import excite
@@ -34,15 +34,8 @@ _COMMANDED = (
     "the drive reports the torque that it commands: what its current loop takes is not known, and "
     "is charged to the band"
 )
-#: Weak modes below this are artefacts of friction more often than mechanics.
-_LOWEST_MODE_HZ = 15.0
-_WEAK_DB, _LEAST_DB, _LEAST_SHARE = 3.0, 1.0, 0.2
-#: A mode whose part in the response is not known to this (logarithm, one deviation) may be none.
-_UNSURE = 1.0 / 3.0
 #: A speed loop's gain and the mechanics are found in turn, so often at most.
 _ROUNDS = 3
-#: Deviations to either side that hold 95 of 100 cases.
-_CI95 = 1.96
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,59 +272,6 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
     if not facts.torque_known:
         words.append("the drive does not tell its rated torque: magnitudes are per rated torque")
     return tuple(words)
-
-
-def resonance_table(
-    model: MechanicalModel, lines_hz: FloatArray, highest_hz: float,
-    doubts: tuple[ModeDoubt, ...] = (),
-) -> tuple[Resonance, ...]:  # fmt: skip
-    """Resonances and antiresonances that the lines show, ascending; heights are local, in dB.
-
-    A mode that hardly rises, or that no line shows because it is narrower than what lies between
-    two of them, explains noise; so does one whose own part may as well be nothing, by ``doubts``
-    (one for each mode, or none).
-    """
-    rows: list[Resonance] = []
-    for number, mode in enumerate(model.modes):
-        known = doubts[number] if doubts else None
-        height = model.height_db(mode)
-        low = mode.frequency_hz < _LOWEST_MODE_HZ
-        nearest_hz = float(np.min(np.abs(lines_hz - mode.frequency_hz)))
-        half_width_hz = mode.damping * mode.frequency_hz
-        seen = model.prominence(mode) / np.hypot(1.0, nearest_hz / half_width_hz)
-        shown = height > _WEAK_DB if low else seen > _LEAST_SHARE
-        inside = lines_hz[0] < mode.frequency_hz <= highest_hz
-        sure = known is None or known.residue < _UNSURE
-        if shown and sure and inside and mode.damping < 1.0:
-            rows.append(
-                Resonance(
-                    "resonance", mode.frequency_hz, mode.damping, height,
-                    _around(mode.frequency_hz, known.frequency if known else None),
-                    known.damping_interval(mode.damping, _CI95) if known else None,
-                )
-            )  # fmt: skip
-    kept = [row.frequency_hz for row in rows]
-    for frequency, damping in model.antiresonances():
-        # An antiresonance belongs to the next mode above it, which may lie beyond the band.
-        above = min((m.frequency_hz for m in model.modes if m.frequency_hz > frequency), default=0)
-        paired = above in kept or above > highest_hz
-        paired = paired or (not above and frequency > 0.25 * highest_hz)
-        if not paired or not lines_hz[0] < frequency <= highest_hz:
-            continue
-        around = np.array([frequency * 0.5, frequency, frequency * 2.0])
-        db = 20 * np.log10(np.abs(model.response(around)))
-        depth = float(db[1] - (db[0] + db[2]) / 2)
-        if depth < -_LEAST_DB:
-            rows.append(Resonance("antiresonance", frequency, damping, depth))
-    return tuple(sorted(rows, key=lambda row: row.frequency_hz))
-
-
-def _around(value: float, deviation: float | None) -> tuple[float, float] | None:
-    """The 95 % interval of a value whose logarithm has this deviation."""
-    if deviation is None:
-        return None
-    factor = float(np.exp(_CI95 * min(deviation, 5.0)))
-    return value / factor, value * factor
 
 
 def _injection_margins(found: Identification) -> dict[str, float | bool | None]:

@@ -14,9 +14,10 @@ from backend.analysis.line_spectra import Record, collect
 from backend.analysis.mechanical_model import MechanicalModel, Mode
 from backend.analysis.mode_doubt import ModeDoubt, mode_doubts
 from backend.analysis.resonance import Resonance
+from backend.analysis.resonance_table import resonance_table
 from backend.analysis.sampled_model import LoopModel, seen_response
 from backend.analysis.sampling import SignalPath
-from backend.tools.sweep_evaluation import SweepSettings, evaluate, resonance_table
+from backend.tools.sweep_evaluation import SweepSettings, evaluate
 
 DRIVE = Drive(
     rated_nm=RATED_NM, limit_nm=3 * RATED_NM, current_hz=1000.0, counts_per_rev=2**20,
