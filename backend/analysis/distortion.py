@@ -32,6 +32,8 @@ from backend.analysis.sampling import SignalPath, delay_response, reported_respo
 _REACH, _FEWEST = 6, 12
 #: What a bin that is left out may hold of what an excited one does: rounding, and nothing else.
 _SILENT = 1e-3
+#: Steps of an encoder that make more than this share of the motion on a line are coarse.
+_COARSE = 0.005
 #: Places of the axis that differ by less, relative to its way, are the same.
 _ROUNDING = 1e-9
 #: Play is looked for above this share of the sample rate: below, friction rules.
@@ -89,8 +91,7 @@ def distortion(
         np.interp(f, frf.frequency_hz, np.log(np.abs(frf.response)))
         + 1j * np.interp(f, frf.frequency_hz, np.unwrap(np.angle(frf.response)))
     )
-    # Behind a coarse encoder the reported speed is noisier by far than the way of a cycle.
-    placed = all(record.position is not None for record in records)
+    placed = _coarse(records, f)
     late = delay_response(f, path.response_delay_s) if placed else reported_response(f, path)
     lag_s = speed_lag_s(records, path)
     rest, before, noise, lines, falls = [], [], [], [], []
@@ -137,10 +138,27 @@ def distortion(
     )  # fmt: skip
 
 
+def _coarse(records: tuple[Record, ...], f: FloatArray) -> bool:
+    """Whether an encoder's steps show beside the motion.
+
+    The reported speed is noisier then by far than the way of a cycle.
+    """
+    if any(record.position is None for record in records):
+        return False
+    shares = []
+    for record in records:
+        good, _ = good_periods(record)
+        e = record.excitation
+        if good:
+            moved = velocity_from_position(record, e, good, e.sample_rate_hz).mean(axis=0)
+            shares.append(np.sqrt(np.median(_steps(record, f))) / np.median(np.abs(moved)))
+    return bool(shares) and float(np.mean(shares)) > _COARSE
+
+
 def _motion(
     record: Record, e: Excitation, good: list[int], path: SignalPath, placed: bool
 ) -> ComplexArray:
-    """Spectra [periods, lines] of the velocity, by the position where there is one."""
+    """Spectra [periods, lines] of the velocity, as reported or by the position."""
     if placed:
         return velocity_from_position(record, e, good, path.sample_rate_hz)
     return period_spectra(record.response, e, good)

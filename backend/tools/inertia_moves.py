@@ -16,7 +16,7 @@ from backend.tools.axis_facts import AxisFacts
 from backend.tools.go_back import go_back
 from backend.tools.inertia_evaluation import InertiaSettings
 from backend.tools.interrupted import Interrupted
-from backend.tools.probe import RoughFit, require_right_sign, rough_fit
+from backend.tools.probe import RoughFit, require_right_sign, rough_fit, smoothed
 from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play, quiet
 from backend.tools.soft_loop import SoftLoop, soft_loop_of
 from backend.tools.temporary import stopping_hard
@@ -147,14 +147,15 @@ async def first_look(
             )  # fmt: skip
         speed = 2.0 * speed
     require_right_sign(axis.drive.name, recording)
-    fit = rough_fit(
-        recording.torque_nm, recording.velocity_rad_s, recording.sample_rate_hz, recording.valid
+    valid = recording.valid
+    wanted, velocity, torque = (
+        smoothed(signal, valid, rate)
+        for signal in (whole * _TURN / 60.0, recording.velocity_rad_s, recording.torque_nm)
     )
+    fit = rough_fit(torque, velocity, rate, valid)
     floor = 0.5 * (facts.motor_inertia_kgm2 or 1e-7)
     rough = RoughFit(max(fit.inertia_kgm2, floor), max(fit.coulomb_nm, 0.0), fit.gravity_nm)
-    loop = soft_loop_of(
-        whole * _TURN / 60.0, recording.velocity_rad_s, recording.torque_nm, recording.valid, rate
-    )
+    loop = soft_loop_of(wanted, velocity, torque, valid, rate)
     return FirstLook(rough, moved / (float(np.sum(np.abs(speed))) / rate / 60.0), loop)
 
 

@@ -39,6 +39,8 @@ _RESTLESS_RPM = 3.0
 _FALLING_RPM = 30.0
 #: Share of the energy moved to and fro that noise alone does not make.
 _GAINED = 0.1
+#: A motion of some tenths of a second, a mean over so many seconds of which hides nothing.
+_SMOOTHED_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -177,6 +179,19 @@ class RoughFit:
     inertia_kgm2: float
     coulomb_nm: float
     gravity_nm: float
+
+
+def smoothed(
+    signal: npt.NDArray[np.float64], valid: npt.NDArray[np.bool_], rate: float
+) -> npt.NDArray[np.float64]:
+    """Mean [n] over 20 ms around each sample, of those that arrived.
+
+    Signals that are smoothed alike still fit each other; the steps of a coarse encoder, which are
+    no acceleration, mostly go.
+    """
+    window = np.ones(2 * round(0.5 * _SMOOTHED_S * rate) + 1)
+    taken = np.convolve(np.where(valid, signal, 0.0), window, "same")
+    return np.asarray(taken / np.maximum(np.convolve(valid.astype(np.float64), window, "same"), 1))
 
 
 def rough_fit(

@@ -182,6 +182,19 @@ async def test_inertia_of_ds_c_despite_its_coarse_encoder(ds_c: CanBench) -> Non
     assert outcome.result.coulomb_nm.value == pytest.approx(0.03, rel=0.1)
 
 
+async def test_inertia_of_a_load_that_the_loop_was_never_tuned_for() -> None:
+    """60 times the motor, on a loop that swings at 2.3 Hz: the first moves are weak enough."""
+    from backend.tools.inertia import InertiaSettings
+
+    heavy = mechanics((3e-3, 300.0, 0.05), viscous=1e-3, coulomb=0.06)
+    async with can_bench(incremental(heavy), pace=20.0) as bench:
+        async with profile_speed.prepared(bench.axis, bench.session, WIDE, True):
+            settings = InertiaSettings(WIDE, rated_torque_nm=1.27)
+            outcome = await inertia(bench.axis, bench.session, settings, silent())
+    assert outcome.result.inertia_kgm2.value == pytest.approx(3.05e-3, rel=0.02)
+    assert outcome.result.coulomb_nm.value == pytest.approx(0.06, rel=0.1)
+
+
 async def test_any_drive_with_cyclic_modes_is_measured_over_sync() -> None:
     """CST over SYNC at 1 kHz: 0.3 dB and 2° to 250 Hz, and what went out comes back in the rows."""
     async with can_bench(ONE_RESONANCE, drive="generic402", pace=20.0) as bench:
