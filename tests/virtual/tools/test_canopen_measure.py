@@ -187,10 +187,12 @@ async def test_inertia_of_a_load_that_the_loop_was_never_tuned_for() -> None:
     from backend.tools.inertia import InertiaSettings
 
     heavy = mechanics((3e-3, 300.0, 0.05), viscous=1e-3, coulomb=0.06)
-    async with can_bench(incremental(heavy), pace=20.0) as bench:
-        async with profile_speed.prepared(bench.axis, bench.session, WIDE, True):
-            settings = InertiaSettings(WIDE, rated_torque_nm=1.27)
-            outcome = await inertia(bench.axis, bench.session, settings, silent())
+    async with (
+        can_bench(incremental(heavy), pace=20.0) as bench,
+        profile_speed.prepared(bench.axis, bench.session, WIDE, True),
+    ):
+        settings = InertiaSettings(WIDE, rated_torque_nm=1.27)
+        outcome = await inertia(bench.axis, bench.session, settings, silent())
     assert outcome.result.inertia_kgm2.value == pytest.approx(3.05e-3, rel=0.02)
     assert outcome.result.coulomb_nm.value == pytest.approx(0.06, rel=0.1)
 
