@@ -54,6 +54,9 @@ def chirp(
 
     The correction that brings the axis back to rest is spread over the whole signal, where it
     stays far below the measured band.
+
+    Raises:
+        ValueError: the frequencies or the length make no signal at this rate.
     """
     n = round(duration_s * sample_rate_hz)
     ramp = min(round(ramp_s * sample_rate_hz), n // 4)

@@ -91,7 +91,11 @@ class BaseMotion:
 
 
 def crest_factor(signal: FloatArray) -> float:
-    """Peak over RMS of a signal without its mean."""
+    """Peak over RMS of a signal without its mean.
+
+    Raises:
+        ValueError: the signal is constant.
+    """
     centred = signal - np.mean(signal)
     rms = float(np.sqrt(np.mean(centred**2)))
     if rms == 0.0:
@@ -112,6 +116,9 @@ def choose_lines(
 
     ``odd_only`` takes odd bins alone: even-order distortion then falls on the empty even bins
     and odd-order distortion on the odd bins that were left out.
+
+    Raises:
+        ValueError: no bin lies between the two frequencies.
     """
     first = max(1, int(np.ceil(f_min_hz / resolution_hz - 1e-9)))
     last = int(np.floor(f_max_hz / resolution_hz + 1e-9))
@@ -156,6 +163,10 @@ def multisine(
     ``invert`` turns the exciting part's sign and leaves the base motion: the friction that the
     base motion causes then cancels between such a pair. ``ramp_samples`` defaults to half a
     period.
+
+    Raises:
+        ValueError: a line that cannot be played, too few periods, or amplitudes that do not fit the
+            lines.
     """
     lines = np.asarray(lines, dtype=np.int64)
     if lines.size == 0 or lines[0] < 1 or 2 * lines[-1] >= period_samples:
@@ -190,6 +201,9 @@ def repeated(
     """Any period, played again and again; ``lines`` are its bins that are evaluated.
 
     Base motion, ramps and ``invert`` as for :func:`multisine`.
+
+    Raises:
+        ValueError: the base motion lies on an evaluated line.
     """
     n = period.size
     if invert:

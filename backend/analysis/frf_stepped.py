@@ -18,7 +18,11 @@ from backend.analysis.sampling import SignalPath
 
 
 def estimate_stepped(record: Record, path: SignalPath, quantity: Quantity) -> Frf:
-    """One complex amplitude per tone of a stepped sine; the halves of a tone give the spread."""
+    """One complex amplitude per tone of a stepped sine; the halves of a tone give the spread.
+
+    Raises:
+        ValueError: the excitation has no tones.
+    """
     e = record.excitation
     f = np.array([segment.frequency_hz for segment in e.segments])
     if f.size == 0:

@@ -56,6 +56,9 @@ def design_moves(
     The acceleration uses 70 % of the torque left after friction; every second repetition runs at
     half speed and 60 % of the acceleration, so that viscous and Coulomb friction can be told
     apart. ``smoothing_s`` bounds the jerk.
+
+    Raises:
+        ValueError: the torque limit does not exceed the friction.
     """
     torque = 0.7 * (limits.torque_nm - friction_nm)
     if torque <= 0:

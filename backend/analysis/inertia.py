@@ -142,6 +142,9 @@ def estimate_inertia(
     off by half a step, about ω_speed·T/2 of the acceleration torque. ``position_rad`` [n] is the
     motor's; without it the speed is summed up. Samples at the torque limit,
     in gaps (``valid`` False) and within the filter's reach of either are left out.
+
+    Raises:
+        ValueError: the arrays differ in length, or are shorter than the filter.
     """
     n = torque_nm.size
     if velocity_rad_s.size != n:

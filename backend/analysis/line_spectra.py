@@ -175,6 +175,9 @@ def velocity_from_position(
 
     What is transformed is how far the axis went from one sample to the next: the mean velocity
     between them, exactly. A position that ends elsewhere than it began would leak onto every line.
+
+    Raises:
+        ValueError: the recording has no position.
     """
     if record.position is None:
         raise ValueError("the recording has no position")
@@ -229,7 +232,11 @@ def collect(
 
 
 def own_torque(record: Record, path: SignalPath) -> FloatArray:
-    """The sampled torque without what the injection contributes to it: the loop's own part."""
+    """The sampled torque without what the injection contributes to it: the loop's own part.
+
+    Raises:
+        ValueError: the recording has no reported torque.
+    """
     if record.torque is None:
         raise ValueError("torque_injection needs the reported torque")
     return record.torque - sampled_command(record.excitation.samples, path)
@@ -370,6 +377,9 @@ def mean_spectra(
     """Lines in Hz, and cross spectra with the injection of itself, the torque and the velocity.
 
     Sums over the records' means; torque as reported, nothing taken from it.
+
+    Raises:
+        ValueError: every period has a gap.
     """
     parts = []
     for record in records:

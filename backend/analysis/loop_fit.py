@@ -17,6 +17,9 @@ def fit_loop(
 
     ``own_torque`` and ``velocity`` are cross spectra with the injection. Only lines well below
     half the sample rate are used, since both are sampled signals.
+
+    Raises:
+        ValueError: fewer than 6 lines lie below 0.15 of the sample rate.
     """
     use = frequency_hz <= 0.6 * DIRECT_SHARE * path.sample_rate_hz
     if np.count_nonzero(use) < 6:

@@ -16,7 +16,11 @@ _PRBS_TAPS: dict[int, tuple[int, ...]] = {
 
 
 def prbs_period(order: int, samples_per_bit: int = 1, realisation: int = 0) -> FloatArray:
-    """One period of a maximum-length binary sequence without its mean, peak 1."""
+    """One period of a maximum-length binary sequence without its mean, peak 1.
+
+    Raises:
+        ValueError: the order is outside 7 to 15.
+    """
     if order not in _PRBS_TAPS:
         raise ValueError(f"PRBS order {order} is outside 7 to 15")
     length = 2**order - 1
@@ -50,6 +54,9 @@ def prbs(
 
     ``realisation`` picks the starting state, that is a cyclic shift. Lines are the bins between
     ``f_min_hz`` and ``f_max_hz`` (default 0.4 of the bit rate, where the power is half).
+
+    Raises:
+        ValueError: the order is outside 7 to 15, or no period is left after settling.
     """
     if periods <= transient_periods:
         raise ValueError(f"{periods} periods leave none after {transient_periods} of settling")

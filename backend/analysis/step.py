@@ -72,6 +72,9 @@ def step_metrics(
 
     ``initial`` defaults to the first sample, ``window`` (same unit as the signal) to 2 % of the
     step.
+
+    Raises:
+        ValueError: target and initial value are the same.
     """
     start = float(signal[0]) if initial is None else initial
     size = target - start

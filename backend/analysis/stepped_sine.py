@@ -25,6 +25,9 @@ def stepped_sine(
     Every frequency is moved slightly so that its cycles fill a whole number of samples:
     ``measure_cycles``, or more where these take less than ``measure_s``. ``segments`` say which
     samples to evaluate. ``amplitude`` weighs the tones; None is 1 for all.
+
+    Raises:
+        ValueError: no frequency, or one that cannot be played at this rate.
     """
     weights = np.ones(len(frequency_hz)) if amplitude is None else amplitude
     parts: list[FloatArray] = []
