@@ -28,7 +28,7 @@ def _said() -> set[str]:
     for file in (file for folder in SOURCES for file in (ROOT / folder).rglob("*.py")):
         for node in ast.walk(ast.parse(file.read_text())):
             if (words := _words(node)) is not None:
-                found |= {words, *words.split(": ")}
+                found |= {words, *words.split(": "), *re.split(": |; ", words)}
     return found
 
 
