@@ -213,6 +213,46 @@ def test_a_damaged_file_is_refused_in_words(laptop: Page, axis: str, station: St
     expect(page.get_by_text("the same result as when it was measured")).to_be_visible()
 
 
+def test_a_finger_that_scrolls_moves_no_marker(phone: Page, axis: str) -> None:
+    page = phone
+    show(page, axis, "Mechanics")
+    cursors = page.get_by_role("slider", name=re.compile("^Cursor"))
+    over = page.locator(".bode-part .u-over").first
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    assert box is not None
+    x, y = box["x"] + 0.1 * box["width"], box["y"] + box["height"] / 2
+    fingers = page.context.new_cdp_session(page)
+
+    def event(kind: str, *points: tuple[float, float]) -> None:
+        touched = [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(points)]
+        fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touched})
+
+    def places() -> list[str | None]:
+        return [each.get_attribute("aria-valuenow") for each in cursors.all()]
+
+    before = places()
+    event("touchStart", (x, y))
+    for way in range(0, 120, 10):
+        event("touchMove", (x, y - way))
+    event("touchEnd")
+    # Two fingers zoom the page.
+    event("touchStart", (x, y))
+    event("touchStart", (x, y), (x + 80, y))
+    event("touchMove", (x - 20, y), (x + 120, y))
+    event("touchEnd")
+    page.wait_for_timeout(1000)
+    assert places() == before
+
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    assert box is not None
+    x, y = box["x"] + 0.1 * box["width"], box["y"] + box["height"] / 2
+    event("touchStart", (x, y))
+    event("touchEnd")
+    expect(cursors.first).not_to_have_attribute("aria-valuenow", before[0] or "")
+
+
 def test_on_a_phone(phone: Page, axis: str) -> None:
     page = phone
     for name in ("tune", "response"):

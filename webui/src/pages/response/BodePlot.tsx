@@ -5,6 +5,7 @@ import type { PlotName } from '../../live/cursors'
 import { axisLook } from '../../plots/axis'
 import { sharedCursor } from '../../plots/shared-cursor'
 import { figure } from '../../widgets/format'
+import { dragMarkers } from './drag'
 import { type Curve, gridOf, hertz, logTicks, onGrid, type Part, partOf, rangeOf } from './bode'
 
 /** A vertical line over all parts that can be dragged. */
@@ -25,7 +26,6 @@ interface Frame {
 const HEIGHTS: Record<Part, number> = { magnitude: 260, phase: 180, coherence: 100 }
 /** Room that the number of a frequency takes. */
 const LABEL_PX = 54
-const GRAB_PX = 22
 /** uPlot.Scale.Distr, which as an ambient const enum cannot be imported. */
 const LOGARITHMIC = 3
 
@@ -129,7 +129,7 @@ function BodePart({
       element,
     )
     plotted.current = plot
-    const remove = listen(
+    const remove = dragMarkers(
       plot,
       () => now.current.markers,
       (id, frequency) => moved.current(id, frequency),
@@ -285,54 +285,4 @@ function drawMarkers(plot: uPlot, markers: Marker[], named: boolean): void {
     ctx.fillText(marker.label, x + 4, bbox.top + (14 + 16 * row) * devicePixelRatio)
   }
   ctx.restore()
-}
-
-/** Dragging takes the nearest marker; a press far from any brings the nearest cursor there. */
-function listen(
-  plot: uPlot,
-  markers: () => Marker[],
-  move: (id: string, frequency: number) => void,
-): () => void {
-  let dragged: string | null = null
-  const left = (event: PointerEvent) => event.clientX - plot.over.getBoundingClientRect().left
-  const at = (event: PointerEvent) => {
-    const x = Math.min(Math.max(left(event), 0), plot.over.clientWidth)
-    return plot.posToVal(x, 'x')
-  }
-  const down = (event: PointerEvent) => {
-    const x = left(event)
-    const near = markers()
-      .map((marker) => ({
-        id: marker.id,
-        away: Math.abs(plot.valToPos(marker.frequency, 'x') - x),
-      }))
-      .toSorted((a, b) => a.away - b.away)
-    // Where a cursor lies on a notch, the notch is what is meant.
-    const within = near.filter((each) => each.away <= GRAB_PX)
-    const grabbed =
-      within.find((each) => each.id.startsWith('notch')) ??
-      within[0] ??
-      near.find((each) => each.id.startsWith('cursor'))
-    if (!grabbed) return
-    dragged = grabbed.id
-    plot.over.setPointerCapture(event.pointerId)
-    if (grabbed.away > GRAB_PX) move(grabbed.id, at(event))
-  }
-  const drag = (event: PointerEvent) => {
-    if (dragged !== null) move(dragged, at(event))
-  }
-  const up = () => {
-    dragged = null
-  }
-  const { over } = plot
-  over.addEventListener('pointerdown', down)
-  over.addEventListener('pointermove', drag)
-  over.addEventListener('pointerup', up)
-  over.addEventListener('pointercancel', up)
-  return () => {
-    over.removeEventListener('pointerdown', down)
-    over.removeEventListener('pointermove', drag)
-    over.removeEventListener('pointerup', up)
-    over.removeEventListener('pointercancel', up)
-  }
 }

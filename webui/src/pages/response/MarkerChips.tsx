@@ -8,7 +8,19 @@ const STEP = 1.01
 const FINE = 1.001
 const COARSE = 1.1
 
-/** A key's factor on a frequency; null for keys that move nothing. */
+/** Where a key brings a frequency within a range; null for keys that move nothing. */
+export function moved(
+  key: string,
+  fine: boolean,
+  frequency: number,
+  [low, high]: [number, number],
+): number | null {
+  if (key === 'Home') return low
+  if (key === 'End') return high
+  const factor = factorOf(key, fine)
+  return factor === null ? null : Math.min(Math.max(frequency * factor, low), high)
+}
+
 function factorOf(key: string, fine: boolean): number | null {
   const step = fine ? FINE : STEP
   if (key === 'ArrowRight' || key === 'ArrowUp') return step
@@ -30,11 +42,10 @@ export function MarkerChips({
 }) {
   const t = useT()
   const press = (marker: Marker) => (event: KeyboardEvent) => {
-    const factor = factorOf(event.key, event.shiftKey)
-    if (factor === null) return
+    const to = moved(event.key, event.shiftKey, marker.frequency, range)
+    if (to === null) return
     event.preventDefault()
-    const inside = Math.min(Math.max(marker.frequency * factor, range[0]), range[1])
-    onMove(marker.id, inside)
+    onMove(marker.id, to)
   }
   return (
     <div className="markers" role="group" aria-label={t('marker.group')}>
