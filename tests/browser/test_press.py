@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, Route, expect
 
 from tests.browser.driving import Bench, open_axis
 from tests.browser.test_motion import PLUS
@@ -134,3 +134,53 @@ def test_a_press_that_begins_nothing_says_why(laptop: Page, bench: Bench) -> Non
     finally:
         bench.station.drives.command(do="heal", wire="mlink://virtual0")
     until(lambda: bench.state()["fresh"], what="the drive answers again")
+
+
+def test_the_keyboard_stays_where_it_was(laptop: Page, bench: Bench) -> None:
+    """After a dialogue, and after a button that its own request disabled."""
+    page = laptop
+    page.evaluate("location.hash = '#/connect'")
+    opens = page.get_by_role("button", name="Name and notes").first
+    opens.focus()
+    page.keyboard.press("Enter")
+    dialogue = page.get_by_role("dialog")
+    expect(dialogue.get_by_role("button", name="Close")).to_be_focused()
+    page.keyboard.press("Escape")
+    expect(dialogue).to_have_count(0)
+    expect(opens).to_be_focused()
+
+    again = page.get_by_role("button", name="Look again")
+    again.focus()
+    held: list[Route] = []
+
+    def hold(route: Route) -> None:
+        held.append(route)
+
+    page.route(re.compile("/interfaces$"), hold)
+    page.keyboard.press("Enter")
+    expect(again).to_be_disabled()
+    while not held:
+        page.wait_for_timeout(20)
+    held[0].continue_()
+    expect(again).to_be_enabled()
+    expect(again).to_be_focused()
+    # Let go on purpose, it stays where it is.
+    page.mouse.click(2, 790)
+    page.evaluate("document.body.append(document.createElement('i'))")
+    page.wait_for_timeout(100)
+    assert page.evaluate("document.activeElement === document.body")
+
+
+def test_a_key_that_is_held_presses_once(laptop: Page, bench: Bench) -> None:
+    page = laptop
+    open_axis(page, bench.drive, "motion")
+    button = page.get_by_role("button", name="Enable", exact=True)
+    expect(button).to_be_enabled()
+    button.focus()
+    page.evaluate(
+        "window.presses = 0; document.activeElement.addEventListener('click', () => presses++)"
+    )
+    for _ in range(5):
+        page.keyboard.down("Enter")
+    page.keyboard.up("Enter")
+    assert page.evaluate("window.presses") == 1

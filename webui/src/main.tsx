@@ -5,6 +5,7 @@ import { StrictMode } from 'react'
 import { createRoot } from 'react-dom/client'
 import { whenUnknown } from './api/client'
 import { App } from './app/App'
+import { keepFocus } from './app/focus'
 import { keepPresses } from './app/press'
 import { checkSession } from './app/session'
 import { listenForEscape } from './app/stop'
@@ -12,6 +13,7 @@ import * as live from './live/live'
 
 listenForEscape()
 keepPresses()
+keepFocus()
 whenUnknown(() => void checkSession())
 live.whenRefused(() => void checkSession())
 createRoot(document.getElementById('root') as HTMLElement).render(

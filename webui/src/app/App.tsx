@@ -1,5 +1,5 @@
 import { MantineProvider } from '@mantine/core'
-import { Component, type ReactNode, Suspense, useEffect } from 'react'
+import { Component, type ReactNode, Suspense, useEffect, useMemo } from 'react'
 import { useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useDrives, useLink } from '../live/store'
@@ -9,11 +9,13 @@ import { AXIS, BENCH, fetchAhead } from './pages'
 import { isAxisPage, useRoute } from './router'
 import { SessionGate } from './SessionGate'
 import { StopButton } from './StopButton'
-import { theme } from './theme'
+import { themeWith } from './theme'
 
 export function App() {
+  const t = useT()
+  const told = useMemo(() => themeWith(t('close')), [t])
   return (
-    <MantineProvider theme={theme} defaultColorScheme="auto">
+    <MantineProvider theme={told} defaultColorScheme="auto">
       <SessionGate>
         <Guard stop>
           <Frame>

@@ -31,6 +31,9 @@ export function meant<Thing>(
 const PRESSABLE =
   'button, a[href], label, summary, input, select, textarea, [role="button"], [role="option"]'
 
+/** What a browser presses anew with every repetition of a key that is held. */
+const ONCE = 'button, a[href], summary, [role="button"]'
+
 const pressable = (target: EventTarget | null) =>
   target instanceof Element ? target.closest<HTMLElement>(PRESSABLE) : null
 
@@ -60,6 +63,13 @@ export function keepPresses(): void {
     event.stopImmediatePropagation()
     if (act === 'what was pressed' && begun?.on?.isConnected) begun.on.click()
   }
+  // A key that stays down repeats: what lies on a keyboard would start an axis again and again.
+  const key = (event: KeyboardEvent) => {
+    if (event.repeat && event.key === 'Enter' && pressable(event.target)?.matches(ONCE)) {
+      event.preventDefault()
+    }
+  }
+  window.addEventListener('keydown', key, { capture: true })
   window.addEventListener('pointerdown', down, { capture: true })
   window.addEventListener('pointerup', up, { capture: true })
   window.addEventListener('pointercancel', () => (press = null), { capture: true })

@@ -38,8 +38,10 @@ const dark: MantineColorsTuple = [
   '#0d1216',
 ]
 
-/** Dense and calm; targets of 44 px, system fonts only. */
-export const theme = createTheme({
+/** Dense and calm; targets of 44 px, system fonts only. `close`: what closing a dialogue is called. */
+export const themeWith = (close: string) => ({ ...theme, components: components(close) })
+
+const theme = createTheme({
   colors: { steel, dark },
   primaryColor: 'steel',
   primaryShade: { light: 7, dark: 6 },
@@ -48,14 +50,21 @@ export const theme = createTheme({
     'system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "Liberation Sans", "Noto Sans SC", "PingFang SC", "Microsoft YaHei", sans-serif',
   fontFamilyMonospace: 'ui-monospace, "Cascadia Mono", Consolas, "DejaVu Sans Mono", monospace',
   fontSizes: { xs: '12px', sm: '14px', md: '15px', lg: '17px', xl: '20px' },
-  components: {
-    Button: Button.extend({ defaultProps: { size: 'sm', variant: 'default', px: 12 } }),
-    ActionIcon: ActionIcon.extend({ defaultProps: { size: 44, variant: 'subtle' } }),
-    TextInput: TextInput.extend({ defaultProps: { size: 'sm' } }),
-    Textarea: Textarea.extend({ defaultProps: { size: 'sm' } }),
-    NativeSelect: NativeSelect.extend({ defaultProps: { size: 'sm' } }),
-    SegmentedControl: SegmentedControl.extend({ defaultProps: { size: 'sm' } }),
-    Checkbox: Checkbox.extend({ defaultProps: { size: 'sm' } }),
-    Modal: Modal.extend({ defaultProps: { zIndex: 300, centered: true } }),
-  },
+})
+
+const components = (close: string) => ({
+  Button: Button.extend({ defaultProps: { size: 'sm', variant: 'default', px: 12 } }),
+  ActionIcon: ActionIcon.extend({ defaultProps: { size: 44, variant: 'subtle' } }),
+  TextInput: TextInput.extend({ defaultProps: { size: 'sm' } }),
+  Textarea: Textarea.extend({ defaultProps: { size: 'sm' } }),
+  NativeSelect: NativeSelect.extend({ defaultProps: { size: 'sm' } }),
+  SegmentedControl: SegmentedControl.extend({ defaultProps: { size: 'sm' } }),
+  Checkbox: Checkbox.extend({ defaultProps: { size: 'sm' } }),
+  Modal: Modal.extend({
+    defaultProps: {
+      zIndex: 300,
+      centered: true,
+      closeButtonProps: { size: 44, 'aria-label': close },
+    },
+  }),
 })
