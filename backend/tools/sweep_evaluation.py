@@ -34,6 +34,10 @@ _COMMANDED = (
     "the drive reports the torque that it commands: what its current loop takes is not known, and "
     "is charged to the band"
 )
+#: What is charged to all lines where a speed loop's reference was the excitation, one deviation:
+#: a set-point that is held until it is sampled tells next to nothing of current loop and delay,
+#: which the loop's own torque has to, and that is small on heavy axes.
+_BY_REFERENCE_S = 15e-6
 #: A speed loop's gain and the mechanics are found in turn, so often at most.
 _ROUNDS = 3
 
@@ -150,6 +154,11 @@ def evaluate(
         direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
         found = replace(found, direct=direct, corrected=corrected)
         warnings += (_COMMANDED,)
+    if by_speed:
+        lines = found.direct.frequency_hz
+        late = 2j * np.pi * lines * _BY_REFERENCE_S
+        direct, corrected = (charged(x, lines, late) for x in (found.direct, found.corrected))
+        found = replace(found, direct=direct, corrected=corrected)
     return SweepResult(
         kind="mechanics",
         loop=loop,
