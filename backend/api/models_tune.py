@@ -181,9 +181,14 @@ class GainInfo(Message):
 
 
 class Undo(Message):
-    """Raw values that were there before; writing them back undoes the change."""
+    """Raw values that were there before; writing them back undoes the change.
+
+    ``after`` is what the change left: where it is given and something else is there now, nothing
+    is undone, as somebody has changed it since.
+    """
 
     before: dict[str, int]
+    after: dict[str, int] | None = None
 
 
 class MeasurementInfo(Message):

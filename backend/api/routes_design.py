@@ -34,6 +34,7 @@ from backend.api.models_tune import (
 )
 from backend.api.routes_measurements import change_log, measurement_head
 from backend.bench import Bench
+from backend.drive import Drive
 from backend.measurements import BadMeasurement, unpack
 from backend.member import Member
 from backend.report.changes import Change
@@ -68,10 +69,11 @@ def _notches(wanted: Sequence[NotchShape | None]) -> list[Notch | None]:
     return [None if w is None else Notch(w.center_hz, w.width_hz, w.depth_db) for w in wanted]
 
 
-async def _note(bench: Bench, member: Member, what: str, before: Mapping[str, int]) -> None:
-    """Keep a change for the report, with what the drive says now."""
+async def _note(bench: Bench, member: Member, what: str, before: dict[str, int]) -> Undo:
+    """Keep a change for the report, with what the drive says now; returns the way back."""
     after = {key: await member.drive.raw(key) for key in before}
     change_log(bench).add(member.drive.id, Change(datetime.now(UTC), what, before, after))
+    return Undo(before=before, after=after)
 
 
 @router.get("/drives/{drive_id}/notches")
@@ -114,9 +116,9 @@ async def write_notches(bench: TheBench, member: Controlled, request: NotchWrite
         before = await notch.write_notches(
             member.axis, _notches(request.notches), meaning_of(member.drive)
         )
-    await _note(bench, member, "notches", before)
+    undo = await _note(bench, member, "notches", before)
     bench.journal.add(f"{member.drive.name}: notches written", drive=member.drive.id)
-    return Undo(before=before)
+    return undo
 
 
 @router.get("/drives/{drive_id}/gains")
@@ -154,9 +156,9 @@ async def write_gains(bench: TheBench, member: Controlled, request: GainWrite) -
         raw = gains.plan_level(member.drive, request.level or 0)
     with bench.motion.keeping_still(member):
         before = await write_settings(member.axis, raw)
-    await _note(bench, member, "gains", before)
+    undo = await _note(bench, member, "gains", before)
     bench.journal.add(f"{member.drive.name}: gains written", drive=member.drive.id)
-    return Undo(before=before)
+    return undo
 
 
 def _gains(speed_hz: float, integral_hz: float, position_1_s: float, inertia_kgm2: float) -> Gains:
@@ -165,13 +167,31 @@ def _gains(speed_hz: float, integral_hz: float, position_1_s: float, inertia_kgm
 
 @router.post("/drives/{drive_id}/tune/undo")
 async def undo_tuning(bench: TheBench, member: Controlled, request: Undo) -> Undo:
-    """Put back what a change returned as `before`; returns what was there until now."""
+    """Put back what a change returned as `before`; returns what was there until now.
+
+    With the change's `after` nothing is put back over what somebody else has written since.
+    """
     with bench.motion.keeping_still(member):
         now = {key: await member.drive.raw(key) for key in request.before}
+        _require_untouched(member.drive, request, now)
         await put_back(member.axis, request.before)
-    await _note(bench, member, "undo", now)
+    undo = await _note(bench, member, "undo", now)
     bench.journal.add(f"{member.drive.name}: tuning taken back", drive=member.drive.id)
-    return Undo(before=now)
+    return undo
+
+
+def _require_untouched(drive: Drive, undo: Undo, now: Mapping[str, int]) -> None:
+    """Raises NotAllowed where a value is neither what the change wrote nor what was there."""
+    for key, left in (undo.after or {}).items():
+        raw = now.get(key)
+        if raw is not None and raw not in (left, undo.before[key]):
+            raise NotAllowed(
+                f"{drive.name}: {key} is {raw} now, where this change had left {left}: it was "
+                "changed again since, so nothing was taken back",
+                drive=drive.name, parameter=key, value=raw, limit=str(left),
+                remedy="look at the list of changes; take it back all the same, or write the "
+                "value that you want",
+            )  # fmt: skip
 
 
 @lru_cache(maxsize=4)

@@ -97,6 +97,30 @@ def test_changes_stand_in_the_report(station: Station, drive: str) -> None:
     assert "Tuning changed no setting." in station.http.get(f"/reports/{made['file']}").text
 
 
+def test_nothing_is_taken_back_over_what_somebody_wrote_since(
+    station: Station, drive: str
+) -> None:
+    gains = station.ok(station.http.get(f"/drives/{drive}/gains"))
+    level = next(each for each in gains["levels"] if each != gains["level"])
+    undo = station.ok(station.http.put(f"/drives/{drive}/gains", json={"level": level}))
+    key = next(k for k in undo["before"] if undo["before"][k] != undo["after"][k])
+    hers = undo["after"][key] + 1
+    path = f"/drives/{drive}/parameters/{key}"
+    station.ok(station.http.put(path, json={"raw": hers}))
+    refused = station.http.post(f"/drives/{drive}/tune/undo", json=undo)
+    assert refused.status_code == 409
+    problem = refused.json()
+    assert problem["parameter"] == key
+    assert f"is {hers} now" in problem["detail"]
+    assert problem["remedy"]
+    for each, raw in undo["after"].items():
+        now = station.ok(station.http.get(f"/drives/{drive}/parameters/{each}"))["raw"]
+        assert now == (hers if each == key else raw)
+    # Whoever has seen it may take it back all the same.
+    station.ok(station.http.post(f"/drives/{drive}/tune/undo", json={"before": undo["before"]}))
+    assert station.ok(station.http.get(path))["raw"] == undo["before"][key]
+
+
 def test_a_report_as_pdf_in_chinese(station: Station, drive: str) -> None:
     station.ok(_upload(station, drive, "loop", known.speed_loop(), 1))
     body = {"format": "pdf", "language": "zh", "measurements": ["loop.sdmeas"]}

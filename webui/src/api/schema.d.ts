@@ -1382,6 +1382,8 @@ export interface paths {
         /**
          * Undo Tuning
          * @description Put back what a change returned as `before`; returns what was there until now.
+         *
+         *     With the change's `after` nothing is put back over what somebody else has written since.
          */
         post: operations["undo_tuning"];
         delete?: never;
@@ -7598,8 +7600,15 @@ export interface components {
         /**
          * Undo
          * @description Raw values that were there before; writing them back undoes the change.
+         *
+         *     ``after`` is what the change left: where it is given and something else is there now, nothing
+         *     is undone, as somebody has changed it since.
          */
         Undo: {
+            /** After */
+            after?: {
+                [key: string]: number;
+            } | null;
             /** Before */
             before: {
                 [key: string]: number;

@@ -14,6 +14,18 @@ export const saidOfTuning = {
     'no mechanical model explains the recording: only the part of the plot below a tenth of the sample rate is shown, and nothing is designed from it',
     '没有机械模型能解释该记录：仅显示采样率十分之一以下的部分，且不据此进行设计',
   ],
+  'said.wUnknownAbove': [
+    'above {hz} Hz the response is not known well enough: what is folded back there hides it. Nothing is concluded from what lies above; a shorter cycle shows it',
+    '{hz} Hz 以上的响应不够确知：被折叠回来的成分将其掩盖。不据以上部分下结论；缩短周期可使其显现',
+  ],
+  'said.undoStale': [
+    '{name}: {key} is {raw} now, where this change had left {left}: it was changed again since, so nothing was taken back',
+    '{name}：{key} 现为 {raw}，而此更改写入的是 {left}：之后又被修改过，因此未撤销',
+  ],
+  'said.rUndoStale': [
+    'look at the list of changes; take it back all the same, or write the value that you want',
+    '请查看更改列表；仍然撤销，或写入所需的值',
+  ],
   'said.wSaturated': [
     'the torque was at its limit, or not what was commanded, for {share} of the time: lower the excitation or raise the limit',
     '转矩在 {share} 的时间内达到限值，或与指令不符：请减小激励或提高限值',

@@ -293,6 +293,7 @@ export const tuning = {
   'undo.candidate': ['A set of gains and notches was written.', '已写入一组增益和陷波。'],
   'undo.undo': ['A change was taken back.', '已撤销更改。'],
   'undo.button': ['Take it back', '撤销'],
+  'undo.all': ['Take it back all the same', '仍然撤销'],
   'undo.what': ['Values from before ({count})', '之前的值（{count}）'],
   'gain.speed': ['Speed loop', '速度环'],
   'gain.integral': ['Integral corner', '积分转折频率'],

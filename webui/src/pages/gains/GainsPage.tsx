@@ -66,7 +66,7 @@ export function GainsPage({ drive }: { drive: string }) {
                   <ParameterFields
                     drive={drive}
                     keys={part.keys}
-                    onWritten={(before) => remember(drive, 'gains', before)}
+                    onWritten={(before) => remember(drive, 'gains', { before })}
                   />
                 </div>
               ))}

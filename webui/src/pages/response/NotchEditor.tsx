@@ -42,7 +42,7 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
           body: { notches: wanted },
         }),
       )
-      remember(drive, 'notches', done.before)
+      remember(drive, 'notches', done)
       await notches.read()
     })
   return (

@@ -4,7 +4,7 @@ import { useT } from '../../i18n'
 import { dateTime } from '../../widgets/format'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
-import { forget, useChanges } from './undo'
+import { changedSince, forget, useChanges } from './undo'
 
 /** The newest change to an axis, with the way back. */
 export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => void }) {
@@ -12,12 +12,14 @@ export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => v
   const last = useChanges(drive).at(-1)
   const act = useAction()
   if (!last) return <ProblemNote problem={act.problem} onClose={act.clear} />
+  const since = changedSince(act.problem, last.before)
   const undo = () =>
     act.run(async () => {
       await ask(
         api.POST('/api/v1/drives/{drive_id}/tune/undo', {
           params: { path: { drive_id: drive } },
-          body: { before: last.before },
+          // Over what somebody wrote since only where that is wanted.
+          body: { before: last.before, after: since ? null : (last.after ?? null) },
         }),
       )
       forget(drive)
@@ -30,7 +32,7 @@ export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => v
           {t(`undo.${last.what}`)} <span className="num dim">{dateTime(last.time)}</span>
         </span>
         <Button loading={act.busy} onClick={() => void undo()}>
-          {t('undo.button')}
+          {t(since ? 'undo.all' : 'undo.button')}
         </Button>
       </div>
       <details>

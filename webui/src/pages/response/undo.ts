@@ -1,10 +1,16 @@
 import { useSyncExternalStore } from 'react'
+import type { Problem } from '../../api/schema'
 
-/** A change that was written, and the raw values that take it back. */
-export interface Change {
+/** What a write answers: raw values that take it back, and those that it left. */
+export interface Written {
+  before: Record<string, number>
+  after?: Record<string, number> | null
+}
+
+/** A change that was written. */
+export interface Change extends Written {
   what: 'notches' | 'gains' | 'candidate' | 'undo'
   time: string
-  before: Record<string, number>
 }
 
 const KEPT = 8
@@ -38,15 +44,19 @@ function store(drive: string, list: Change[]): void {
 }
 
 /** Keep what a write returned; nothing is kept of a write that changed nothing. */
-export function remember(
-  drive: string,
-  what: Change['what'],
-  before: Record<string, number>,
-): void {
-  if (Object.keys(before).length === 0) return
-  const change = { what, time: new Date().toISOString(), before }
+export function remember(drive: string, what: Change['what'], done: Written): void {
+  if (Object.keys(done.before).length === 0) return
+  const { before, after = null } = done
+  const change = { what, time: new Date().toISOString(), before, after }
   store(drive, [...read(drive), change].slice(-KEPT))
 }
+
+/** Whether a change was not taken back because a value of it was changed again since. */
+export const changedSince = (problem: Problem | null, before: Record<string, number>): boolean =>
+  problem?.type === 'urn:servodeck:not-allowed' &&
+  problem.parameter != null &&
+  problem.parameter in before &&
+  problem.limit != null
 
 /** Take the newest change off the list, once it has been undone. */
 export const forget = (drive: string) => store(drive, read(drive).slice(0, -1))

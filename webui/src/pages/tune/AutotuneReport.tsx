@@ -5,6 +5,7 @@ import { known, useT } from '../../i18n'
 import { said } from '../../i18n/said'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { changedSince } from '../response/undo'
 import { hertz, measuredCurve, wrapWhole } from '../response/bode'
 import { BodePlot } from '../response/BodePlot'
 import { Legend } from '../response/Legend'
@@ -38,12 +39,13 @@ export function AutotuneReport({
   const [pressed, setPressed] = useState(undone.has(job))
   const undo = useAction()
   const applied = result.applied
+  const since = changedSince(undo.problem, result.before)
   const go = () =>
     undo.run(async () => {
       await ask(
         api.POST('/api/v1/drives/{drive_id}/tune/undo', {
           params: { path: { drive_id: drive } },
-          body: { before: result.before },
+          body: { before: result.before, after: since ? null : (result.after ?? null) },
         }),
       )
       undone.add(job)
@@ -64,7 +66,7 @@ export function AutotuneReport({
             </span>
             {(force === 'acts' || force === 'changed') && (
               <Button loading={undo.busy} onClick={() => void go()}>
-                {t('undo.button')}
+                {t(since ? 'undo.all' : 'undo.button')}
               </Button>
             )}
           </div>

@@ -70,14 +70,14 @@ export function CandidatesPanel({
       const hasNotches = await documentsNotches(drive)
       const path = { params: { path: { drive_id: drive } } }
       const { speed_bandwidth_hz, integral_hz, position_1_s } = candidate.gains
-      const before = await ask(
+      const gains = await ask(
         api.PUT('/api/v1/drives/{drive_id}/gains', {
           ...path,
           body: { gains: { speed_bandwidth_hz, integral_hz, position_1_s, inertia_kgm2: total } },
         }),
       )
       // Kept at once: the way back must be there even when the notches are refused.
-      remember(drive, 'gains', before.before)
+      remember(drive, 'gains', gains)
       if (hasNotches) {
         const notches = await ask(
           api.PUT('/api/v1/drives/{drive_id}/notches', {
@@ -85,7 +85,7 @@ export function CandidatesPanel({
             body: { notches: candidate.notches },
           }),
         )
-        remember(drive, 'notches', notches.before)
+        remember(drive, 'notches', notches)
       }
       setWritten(true)
       await onApplied()

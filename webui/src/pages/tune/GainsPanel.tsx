@@ -64,7 +64,7 @@ export function GainsPanel({
           body,
         }),
       )
-      remember(drive, 'gains', done.before)
+      remember(drive, 'gains', done)
       await of.read()
     })
   const values = typed ? whole(typed) : null
