@@ -97,9 +97,7 @@ def test_changes_stand_in_the_report(station: Station, drive: str) -> None:
     assert "Tuning changed no setting." in station.http.get(f"/reports/{made['file']}").text
 
 
-def test_nothing_is_taken_back_over_what_somebody_wrote_since(
-    station: Station, drive: str
-) -> None:
+def test_nothing_is_taken_back_over_what_somebody_wrote_since(station: Station, drive: str) -> None:
     gains = station.ok(station.http.get(f"/drives/{drive}/gains"))
     level = next(each for each in gains["levels"] if each != gains["level"])
     undo = station.ok(station.http.put(f"/drives/{drive}/gains", json={"level": level}))
