@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.tools.axis_facts import AxisFacts
+from backend.tools.interrupted import too_strong
 from backend.tools.recording import Play, bus_limits, cycle_s, enabled, play, quiet
 from drivers.cia402 import Mode
+from drivers.errors import NotAllowed
 
 _TURN = 2 * np.pi
 #: Nearer than the larger of these (turns, share of the travel) is near enough.
@@ -18,6 +22,9 @@ _ATTEMPTS = 3
 _MISSED_REV, _MISSED = 0.3, 0.2
 #: What share of a way a loop goes, and moves that are different enough to tell.
 _SHARES, _TOLD_APART_REV = (0.4, 1.5), 0.02
+#: So many times slower a move becomes at most that takes too much torque: a sixteenth of it goes
+#: into acceleration then.
+_SLOWEST = 4.0
 
 
 async def go_back(
@@ -26,7 +33,8 @@ async def go_back(
     """Move to ``goal_raw`` in CSV with a raised-cosine profile; repeats where the loop is soft.
 
     A load that pulls takes the same way of each move, until the loop's integral holds it, and a
-    loop without an integral goes a share of what is asked: the next move is asked for more.
+    loop without an integral goes a share of what is asked: the next move is asked for more. A
+    heavy load that takes more torque than is permitted is moved slower.
 
     Raises:
         NotAllowed: the motion was ended by the envelope or a fault.
@@ -35,30 +43,52 @@ async def go_back(
     rest = units.position(goal_raw - await axis.position_raw())
     most = min(_MISSED_REV, _MISSED * envelope.travel_rev)
     moves: list[tuple[float, float]] = []
-    for _ in range(_ATTEMPTS):
+    slower = 1.0
+    while len(moves) < _ATTEMPTS:
         if abs(rest) < max(_NEAR_REV, _NEAR * envelope.travel_rev):
             return
         distance = float(np.clip(_to_ask(rest, moves), rest - most, rest + most))
-        rate = 1.0 / cycle_s(session)
-        # Peak speed of a raised cosine is twice its mean.
-        highest_rps = 0.25 * envelope.speed_rpm / 60.0
-        duration_s = max(2.0 * abs(distance) / highest_rps, 0.4)
-        n = round(duration_s * rate)
-        turn = (np.arange(n) + 0.5) / n
-        speed_rpm = distance / duration_s * 60.0 * (1.0 - np.cos(_TURN * turn))
-        values = np.array([units.velocity_raw(v) for v in speed_rpm], dtype=np.int64)
-        values = np.concatenate([values, np.zeros(round(0.1 * rate), dtype=np.int64)])
         around = abs(rest) + envelope.travel_rev
-        wide = Envelope(around, envelope.speed_rpm, envelope.torque_percent, duration_s + 1.0)
-        async with enabled(axis, session, Mode.CSV):
-            await quiet(axis)
-            await play(
-                axis, session, Play(Mode.CSV, values), await bus_limits(axis, wide, goal_raw),
-                facts.rated_torque_nm, lambda _fraction: None,
+        try:
+            await _move(
+                axis, session, goal_raw, distance, slower, replace(envelope, travel_rev=around),
+                facts,
             )  # fmt: skip
+        except NotAllowed as error:
+            if slower >= _SLOWEST or not too_strong(error):
+                raise
+            slower *= 2.0
             await quiet(axis)
+            # What it went of that move tells nothing of the next one.
+            moves.clear()
+            rest = units.position(goal_raw - await axis.position_raw())
+            continue
         before, rest = rest, units.position(goal_raw - await axis.position_raw())
         moves.append((distance, before - rest))
+
+
+async def _move(
+    axis: Axis, session: CyclicSession, goal_raw: int, distance: float, slower: float,
+    envelope: Envelope, facts: AxisFacts,
+) -> None:  # fmt: skip
+    """One move by ``distance`` turns that takes ``slower`` times as long as it has to."""
+    units, rate = await axis.units(), 1.0 / cycle_s(session)
+    # Peak speed of a raised cosine is twice its mean.
+    highest_rps = 0.25 * envelope.speed_rpm / 60.0
+    duration_s = slower * max(2.0 * abs(distance) / highest_rps, 0.4)
+    n = round(duration_s * rate)
+    turn = (np.arange(n) + 0.5) / n
+    speed_rpm = distance / duration_s * 60.0 * (1.0 - np.cos(_TURN * turn))
+    values = np.array([units.velocity_raw(v) for v in speed_rpm], dtype=np.int64)
+    values = np.concatenate([values, np.zeros(round(0.1 * rate), dtype=np.int64)])
+    limits = await bus_limits(axis, envelope, goal_raw)
+    async with enabled(axis, session, Mode.CSV):
+        await quiet(axis)
+        await play(
+            axis, session, Play(Mode.CSV, values), limits, facts.rated_torque_nm,
+            lambda _fraction: None,
+        )  # fmt: skip
+        await quiet(axis)
 
 
 def _to_ask(rest: float, moves: list[tuple[float, float]]) -> float:

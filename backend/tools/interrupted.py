@@ -40,6 +40,12 @@ def too_fast(error: NotAllowed) -> bool:
     return ended and "speed" in error.message and _OF_THE_MOTION[0] in error.message
 
 
+def too_strong(error: NotAllowed) -> bool:
+    """Whether the loop ended a motion for its torque, so that a weaker one may be made."""
+    ended = not isinstance(error, Interrupted)
+    return ended and "torque" in error.message and _OF_THE_MOTION[0] in error.message
+
+
 def require_held(axis: Axis, session: CyclicSession) -> None:
     """Disabled by others after its last sample, it must not be enabled again to go home either."""
     power = session.power()

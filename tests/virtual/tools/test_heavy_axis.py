@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from backend.tools.axis_facts import read_facts
+from backend.tools.go_back import go_back
 from backend.tools.inertia import inertia
 from backend.tools.inertia_evaluation import InertiaSettings
 from backend.tools.soft_loop import SoftLoop, soft_loop_of
@@ -67,3 +70,26 @@ async def test_a_heavy_axis_needs_one_attempt() -> None:
     assert highest < 0.85 * WIDE.torque_percent
     assert found.result.inertia_kgm2.value == pytest.approx(3.05e-3, rel=0.02)
     assert found.result.coulomb_nm.value == pytest.approx(0.06, rel=0.1)
+
+
+async def test_a_heavy_axis_goes_home_slower_where_its_torque_is_limited() -> None:
+    async with direct(HEAVY, drive="r6l") as b:
+        facts = await read_facts(b.axis, None)
+        units = await b.axis.units()
+        home = await b.axis.position_raw()
+        away = home + units.position_raw(0.3)
+        await go_back(b.axis, b.session, away, WIDE, facts)
+        taken = units.torque(b.link.highest["torque"])
+        lengths: list[int] = []
+        play = b.link.play
+
+        async def played(trajectories: Sequence[Trajectory]) -> int:
+            lengths.append(len(trajectories[0].values))
+            return await play(trajectories)
+
+        b.link.play = played  # type: ignore[method-assign]
+        narrow = replace(WIDE, torque_percent=0.6 * taken)
+        await go_back(b.axis, b.session, home, narrow, facts)
+        left = abs(units.position(await b.axis.position_raw() - home))
+    assert lengths[1] > 1.5 * lengths[0]
+    assert left < 0.05
