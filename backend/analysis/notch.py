@@ -245,7 +245,9 @@ def _nearest_level(
     if not points:
         raise ValueError("the levels have not been measured on this drive yet")
     ordered = sorted(points)
-    levels = np.arange(allowed.low, allowed.high + 1)
+    # What levels beyond those that were measured do is not known.
+    low, high = max(allowed.low, ordered[0][0]), min(allowed.high, ordered[-1][0])
+    levels = np.arange(low, high + 1)
     known = np.interp(levels, [p[0] for p in ordered], [p[1] for p in ordered])
     return int(levels[np.argmin(np.abs(known - wanted))])
 

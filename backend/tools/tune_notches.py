@@ -63,17 +63,19 @@ async def learn_notches(
         return ""
     found = outcome.result
     clock = time_left or TimeLeft()
+    # Where friction rules, a torque that is off by little makes a speed that is off by much.
+    ruled = how.scheme == "free" and mechanics.loop != "none"
+    beside = _held(how, facts, outcome) or ruled
+    takes_s = notch_trials.least_s(axis.drive) * (1.0 if beside else _FREE)
     repeats = clock.learning()
-    if not repeats.allow((1.0 + clock.lossy) * notch_trials.least_s(axis.drive)):
+    if not repeats.allow((1.0 + clock.lossy) * takes_s):
         if meaning_of(axis.drive) is None:
             return _NO_TIME
         clock.give_up(_PARTLY)
         return ""
     home = await axis.position_raw()
-    # Where friction rules, a torque that is off by little makes a speed that is off by much.
-    ruled = how.scheme == "free" and mechanics.loop != "none"
     try:
-        if _held(how, facts, outcome) or ruled:
+        if beside:
             meaning = await measure_meaning_in_loop(
                 axis, session, how.envelope, facts, mechanics, found.inertia_kgm2.value,
                 progress, repeats,

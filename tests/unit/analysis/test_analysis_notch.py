@@ -112,6 +112,16 @@ def test_levels_need_a_measured_calibration():
     assert decode_hz_levels(*raw, known).width_hz == pytest.approx(250.0)
 
 
+def test_no_level_is_taken_whose_effect_was_not_measured():
+    """What is asked beyond the measured levels gets the last of them, not one that may do more."""
+    hz, level, depth = IntegerRange(50, 4000), IntegerRange(0, 20), IntegerRange(0, 99)
+    known = LevelCalibration(((10, 0.51), (16, 0.8)), ((8, -22.0), (70, -3.0)))
+    narrow, wide = (Notch(500.0, width, -40.0) for width in (100.0, 900.0))
+    assert encode_hz_levels(narrow, hz, level, depth, known) == (500, 10, 8)
+    assert encode_hz_levels(wide, hz, level, depth, known) == (500, 16, 8)
+    assert encode_hz_levels(Notch(500.0, 300.0, -1.0), hz, level, depth, known)[2] == 70
+
+
 def test_a_notch_is_found_again_in_a_ratio_of_responses():
     truth = Notch(433.0, 120.0, -18.0)
     f = np.geomspace(20.0, 1500.0, 150)
