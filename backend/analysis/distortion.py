@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray, IntArray, neighbour_mean
+from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray, IntArray, neighbour_mean
 from backend.analysis.excitation import Excitation
 from backend.analysis.frf import Frf
 from backend.analysis.line_spectra import (
@@ -32,8 +32,9 @@ from backend.analysis.sampling import SignalPath, delay_response, reported_respo
 _REACH, _FEWEST = 6, 12
 #: What a bin that is left out may hold of what an excited one does: rounding, and nothing else.
 _SILENT = 1e-3
-#: Steps of an encoder that make more than this share of the motion on a line are coarse.
-_COARSE = 0.005
+#: What the position shows less than this share of is noise of the reported speed. (What moves
+#: above half the sample rate is folded into both, into the position less.)
+_CONTRADICTED = 0.5
 #: Places of the axis that differ by less, relative to its way, are the same.
 _ROUNDING = 1e-9
 #: Play is looked for above this share of the sample rate: below, friction rules.
@@ -46,6 +47,9 @@ _SLOW, _ABOUT_S = 0.1, 0.002
 _AT_REVERSALS, _LEAST_TIME = 1.4, 0.01
 #: Power on the empty bins over that of the noise in it, from which on it tells of play.
 _ABOVE_NOISE = 4.0
+#: Where noise rules below, play may show above this share of the sample rate, where it moves the
+#: motor alone; so much above the noise there.
+_HIGHEST, _FAR_ABOVE_NOISE = 0.3, 5.0
 
 
 @dataclass(frozen=True)
@@ -91,30 +95,28 @@ def distortion(
         np.interp(f, frf.frequency_hz, np.log(np.abs(frf.response)))
         + 1j * np.interp(f, frf.frequency_hz, np.unwrap(np.angle(frf.response)))
     )
-    placed = _coarse(records, f)
-    late = delay_response(f, path.response_delay_s) if placed else reported_response(f, path)
     lag_s = speed_lag_s(records, path)
+    ways = [_Way(reported_response(f, path), False)]
+    if all(record.position is not None for record in records):
+        ways.append(_Way(delay_response(f, path.response_delay_s), True))
     rest, before, noise, lines, falls = [], [], [], [], []
     for record in records:
         good, _ = good_periods(record)
         if len(good) < 2:
             continue
         between = replace(record.excitation, lines=empty)
-        moved = _motion(record, between, good, path, placed)
+        own = 0.0
         if quantity == "torque_injection":
-            own = period_spectra(own_torque(record, path), between, good)
-            moved = moved - plant * late * own
-        mean = moved.mean(axis=0)
-        direction = friction_direction(record, between, good, path, lag_s)
-        by_friction = frf.coulomb_nm * plant * late * direction
-        scatter = np.sum(np.abs(moved - mean) ** 2, axis=0) / (len(good) * (len(good) - 1))
-        # A motion that repeats itself repeats the steps of its encoder: that is no scatter.
-        noise.append(np.maximum(scatter, _steps(record, f) if placed else 0.0))
-        before.append(np.abs(mean) ** 2)
-        left = mean + by_friction.mean(axis=0)
-        rest.append(np.abs(left) ** 2)
-        falls.append(_at_reversals(record, good, empty, left / plant))
-        lines.append(np.abs(_motion(record, record.excitation, good, path, placed).mean(axis=0)))
+            own = plant * period_spectra(own_torque(record, path), between, good)
+        friction = frf.coulomb_nm * plant * friction_direction(record, between, good, path, lag_s)
+        seen = [way.seen(record, between, good, path, own, friction) for way in ways]
+        sizes = [float(np.median(np.abs(one.left))) for one in seen]
+        least = seen[-1] if sizes[-1] < _CONTRADICTED * sizes[0] else seen[0]
+        noise.append(least.noise)
+        before.append(np.abs(least.plain) ** 2)
+        rest.append(np.abs(least.left) ** 2)
+        falls.append(_at_reversals(record, good, empty, least.left / plant))
+        lines.append(np.abs(period_spectra(record.response, record.excitation, good).mean(axis=0)))
     if not rest:
         return none
     around = np.interp(f, frf.frequency_hz, neighbour_mean(np.mean(lines, axis=0), _REACH))
@@ -128,9 +130,11 @@ def distortion(
     if np.count_nonzero(upper) < _FEWEST:
         return none
     # Where noise rules, what is left after it is taken out is noise.
-    power, of_noise = (float(np.median(np.mean(p, axis=0)[upper])) for p in (rest, noise))
-    if power < _ABOVE_NOISE * of_noise:
-        return none
+    highest = f >= _HIGHEST * path.sample_rate_hz
+    if not _stands_out(rest, noise, upper, _ABOVE_NOISE):
+        if not _stands_out(rest, noise, highest, _FAR_ABOVE_NOISE):
+            return Distortion(np.asarray(np.interp(frf.frequency_hz, f, share)))
+        upper = highest
     return Distortion(
         # What lies below the first empty bins is told by all of them, not by one beside a valley.
         np.asarray(np.interp(frf.frequency_hz, f, share, left=float(np.median(share)))),
@@ -138,30 +142,54 @@ def distortion(
     )  # fmt: skip
 
 
-def _coarse(records: tuple[Record, ...], f: FloatArray) -> bool:
-    """Whether an encoder's steps show beside the motion.
-
-    The reported speed is noisier then by far than the way of a cycle.
-    """
-    if any(record.position is None for record in records):
+def _stands_out(
+    rest: list[FloatArray], noise: list[FloatArray], use: BoolArray, factor: float
+) -> bool:
+    """Whether what is left on these bins is more than noise."""
+    if np.count_nonzero(use) < _FEWEST:
         return False
-    shares = []
-    for record in records:
-        good, _ = good_periods(record)
-        e = record.excitation
-        if good:
-            moved = velocity_from_position(record, e, good, e.sample_rate_hz).mean(axis=0)
-            shares.append(np.sqrt(np.median(_steps(record, f))) / np.median(np.abs(moved)))
-    return bool(shares) and float(np.mean(shares)) > _COARSE
+    power, of_noise = (float(np.median(np.mean(p, axis=0)[use])) for p in (rest, noise))
+    return power >= factor * of_noise
 
 
-def _motion(
-    record: Record, e: Excitation, good: list[int], path: SignalPath, placed: bool
-) -> ComplexArray:
-    """Spectra [periods, lines] of the velocity, as reported or by the position."""
-    if placed:
-        return velocity_from_position(record, e, good, path.sample_rate_hz)
-    return period_spectra(record.response, e, good)
+@dataclass(frozen=True)
+class _Seen:
+    """Of one record on the empty bins: without the loop's torque, and without friction as well."""
+
+    plain: ComplexArray
+    left: ComplexArray
+    noise: FloatArray
+
+
+@dataclass(frozen=True)
+class _Way:
+    """To see the motion: by the reported speed, or by the position.
+
+    A motion shows in both; what only one of them shows is the noise that it has. Behind a coarse
+    encoder the reported speed is noisier by far than the way of a cycle, and a position that is
+    told in coarse units noisier than the speed.
+    """
+
+    late: ComplexArray
+    placed: bool
+
+    def seen(
+        self, record: Record, between: Excitation, good: list[int], path: SignalPath,
+        own: ComplexArray | float, friction: ComplexArray,
+    ) -> _Seen:  # fmt: skip
+        """``own`` [periods, bins] is the motion by the loop's own torque, ``friction`` by that."""
+        if self.placed:
+            moved = velocity_from_position(record, between, good, path.sample_rate_hz)
+        else:
+            moved = period_spectra(record.response, between, good)
+        moved = moved - self.late * own
+        mean = moved.mean(axis=0)
+        scatter = np.sum(np.abs(moved - mean) ** 2, axis=0) / (len(good) * (len(good) - 1))
+        if self.placed:
+            # A motion that repeats itself repeats the steps of its encoder: that is no scatter.
+            scatter = np.maximum(scatter, _steps(record, between.line_hz))
+        left = mean + self.late * friction.mean(axis=0)
+        return _Seen(np.asarray(mean), np.asarray(left), np.asarray(scatter))
 
 
 def _steps(record: Record, f: FloatArray) -> FloatArray:

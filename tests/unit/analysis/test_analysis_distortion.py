@@ -96,8 +96,10 @@ def test_play_is_told_from_the_steps_of_a_coarse_encoder(play):
         # From the first whole period on, every one is that one.
         velocity[steady:] = np.resize(velocity[steady : steady + PERIOD], n - steady)
         velocity[steady:] -= np.mean(velocity[steady : steady + PERIOD])
-        place = np.floor(np.cumsum(velocity) / RATE / step) * step
-        told = np.gradient(place) * RATE
+        exact = np.cumsum(velocity) / RATE
+        place = np.floor(exact / step) * step
+        # A drive's speed shows four times as much of the steps, as it looks within the cycle.
+        told = velocity + 4.0 * np.gradient(place - exact) * RATE
         records.append(replace(r, response=told, position=place))
     frf = estimate_periodic(tuple(records), PATH, "torque_mode")
     found = distortion(tuple(records), PATH, "torque_mode", frf)

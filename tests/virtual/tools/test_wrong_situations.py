@@ -8,7 +8,6 @@ torque filter as it comes, so that measurements have something to put back.
 from __future__ import annotations
 
 import asyncio
-import math
 import re
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
@@ -56,10 +55,7 @@ class Family:
     rotor_kgm2: float | None = None
 
     def autotune(self, envelope: Envelope = WIDE, *, apply: bool = True) -> AutotuneSettings:
-        # Every step is to be met with, however long a busy computer computes.
-        return AutotuneSettings(
-            envelope, apply=apply, motor_inertia_kgm2=self.rotor_kgm2, budget_s=math.inf
-        )
+        return AutotuneSettings(envelope, apply=apply, motor_inertia_kgm2=self.rotor_kgm2)
 
 
 #: A notch at 900 Hz, as the coefficients of MMS7 (-6 dB, 150 Hz wide) and in M6-L's Hz. Ten times
