@@ -22,9 +22,4 @@ def x(station: Station) -> Iterator[str]:
     """The drive at station 1 of the serial wire."""
     drive = station.add(1, name="X")
     yield drive
-    station.http.post("/stop", json={})
-    jobs = station.ok(station.http.get("/jobs"))
-    for job in jobs:
-        if job["state"] == "running":
-            station.http.delete(f"/jobs/{job['id']}")
-    station.ok(station.http.delete(f"/drives/{drive}"))
+    station.remove(drive)

@@ -59,8 +59,7 @@ def axes(station: Station) -> Iterator[tuple[str, str]]:
     yield names
     station.http.post("/stop", json={})
     station.http.delete("/buses/cyclic", params={"url": URL})
-    for name in names:
-        station.ok(station.http.delete(f"/drives/{name}"))
+    station.remove(*names)
 
 
 @pytest.fixture

@@ -120,8 +120,7 @@ class Segment:
     def stop(self) -> None:
         self.station.http.post("/stop", json={})
         self.end_cyclic()
-        for name in (self.a, self.b):
-            self.station.ok(self.station.http.delete(f"/drives/{name}"))
+        self.station.remove(self.a, self.b)
 
     def parameter(self, drive: str) -> Any:
         """One parameter, asked of the drive now."""

@@ -170,10 +170,7 @@ def day(station: Station, request: pytest.FixtureRequest) -> Iterator[Day]:
     station.http.post("/stop", json={})
     if maker.slave is not None:
         station.http.delete("/buses/cyclic", params={"url": maker.url})
-    for job in station.ok(station.http.get("/jobs")):
-        if job["state"] == "running":
-            station.http.delete(f"/jobs/{job['id']}")
-    station.ok(station.http.delete(f"/drives/{drive}"))
+    station.remove(drive)
 
 
 def test_a_working_day(day: Day) -> None:

@@ -86,8 +86,7 @@ def test_from_the_makers_file_to_a_moving_axis(station: Station) -> None:
         assert station.ok(written)["raw"] == 500_000
         _jog(station, drive)
     finally:
-        station.http.post("/stop", json={})
-        station.ok(station.http.delete(f"/drives/{drive}"))
+        station.remove(drive)
 
 
 def _jog(station: Station, drive: str) -> None:

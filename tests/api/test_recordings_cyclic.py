@@ -40,8 +40,7 @@ def cyclic(station: Station) -> Iterator[tuple[str, str]]:
     assert bus["cyclic"]["running"]
     yield names
     station.http.delete("/buses/cyclic", params={"url": URL})
-    for name in names:
-        station.ok(station.http.delete(f"/drives/{name}"))
+    station.remove(*names)
 
 
 def table(text: str) -> tuple[list[str], np.ndarray]:

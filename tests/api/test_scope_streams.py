@@ -52,14 +52,14 @@ def axis(station: Station) -> Iterator[str]:
     name = station.add(1, URL, name="A")
     yield name
     station.http.delete("/buses/cyclic", params={"url": URL})
-    station.ok(station.http.delete(f"/drives/{name}"))
+    station.remove(name)
 
 
 @pytest.fixture
 def serial(station: Station) -> Iterator[str]:
     name = station.add(1, name="S")
     yield name
-    station.ok(station.http.delete(f"/drives/{name}"))
+    station.remove(name)
 
 
 def exchange(station: Station, *, run: bool) -> None:

@@ -30,8 +30,7 @@ KEYS = ("PA_38", "6083:00")
 def z(station: Station) -> Iterator[str]:
     drive = station.add(3, CAN, "ds_c", "Z")
     yield drive
-    station.http.post("/stop", json={})
-    station.ok(station.http.delete(f"/drives/{drive}"))
+    station.remove(drive)
 
 
 def test_scan_finds_it_on_the_can_bus(station: Station) -> None:

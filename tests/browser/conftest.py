@@ -80,11 +80,7 @@ def x(station: Station) -> Iterator[str]:
     """The drive at station 1, on the bench."""
     drive = station.add(1, name="X")
     yield drive
-    station.http.post("/stop", json={})
-    for job in station.ok(station.http.get("/jobs")):
-        if job["state"] == "running":
-            station.http.delete(f"/jobs/{job['id']}")
-    station.ok(station.http.delete(f"/drives/{drive}"))
+    station.remove(drive)
 
 
 def _open(browser: Browser, url: str, **screen: object) -> Iterator[Page]:

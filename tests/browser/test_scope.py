@@ -194,7 +194,7 @@ def test_a_sine_has_its_frequency_and_amplitude(page: Page, station: Station, cy
     page.locator(".maths-row").get_by_label("Unit").fill("rpm")
     page.get_by_text("Measurements", exact=True).click()
     generate(station, cyclic, mode="CSP", shape="sine", amplitude=amplitude, frequency_hz=hertz,
-             duration_s=8)  # fmt: skip
+             duration_s=60)  # fmt: skip
 
     speed = 2 * math.pi * hertz * amplitude * 60
 

@@ -131,6 +131,25 @@ class Station:
         drive = self.ok(self.http.post("/drives", json=body))
         return str(drive["id"])
 
+    def remove(self, *drives: str) -> None:
+        """Whatever a test left them doing: stopped, awaited, and taken out.
+
+        An axis whose cable was pulled is put back in order once it answers again. That job is not
+        stopped by anybody, and the drive stays until it has ended.
+        """
+        self.http.post("/stop", json={})
+        for job in self.ok(self.http.get("/jobs")):
+            if job["state"] == "running":
+                self.http.delete(f"/jobs/{job['id']}")
+        for drive in drives:
+
+            def gone(drive: str = drive) -> bool:
+                answer = self.http.delete(f"/drives/{drive}")
+                assert answer.is_success or answer.status_code == 409, answer.text
+                return answer.is_success
+
+            until(gone, what=f"{drive} is taken out")
+
     def job(self, answer: httpx.Response, timeout_s: float = HANG_S) -> Any:
         """Wait for a job's end; returns the job."""
         job = self.ok(answer)
