@@ -161,6 +161,8 @@ class ScopeBlock:
     valid: npt.NDArray[np.bool_] | None = None
     times_s: npt.NDArray[np.float64] | None = None
     """True sampling times [n] of a polled block; None where the spacing is exact."""
+    cycle: int | None = None
+    """Number of the first sample's cycle, as `Cyclic.play` counts them; None where polled."""
 
 
 @dataclass(frozen=True, slots=True)

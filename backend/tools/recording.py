@@ -11,7 +11,7 @@ import asyncio
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,8 @@ _RENEW_S = 0.03
 _STATE_TIMEOUT_S = 5.0
 #: Samples arrive in bunches; this long after the last set-point all of them have come.
 _TAIL_S = 1.0
+#: Cycles that are kept from before the motion: its first set-point goes out in the next one.
+_RUN_IN = 8
 _ROLES = ("position_actual", "velocity_actual", "torque_actual", "status_word")
 _TARGET_OF = {
     Mode.CSP: "position_target", Mode.CSV: "velocity_target", Mode.CST: "torque_target",
@@ -73,18 +75,49 @@ class Play:
 
 @dataclass
 class _Catch:
-    """Blocks as they come."""
+    """Blocks as they come, of a motion that begins with cycle ``first``.
+
+    A server that stood still finds in one go what the bus did meanwhile, and most of that belongs
+    to what was before the motion.
+    """
 
     names: tuple[str, ...]
     blocks: list[bus.ScopeBlock] = field(default_factory=list)
+    first: int | None = None
 
     def take(self, block: bus.ScopeBlock) -> None:
-        self.blocks.append(block)
+        self.blocks += self._of_motion(block)
+
+    def begin(self, first: int) -> None:
+        """The bus has told the number; what came meanwhile is looked through."""
+        self.first = first
+        self.blocks = [part for block in self.blocks for part in self._of_motion(block)]
+
+    def _of_motion(self, block: bus.ScopeBlock) -> list[bus.ScopeBlock]:
+        """What may belong to it; everything as long as the number is not known."""
+        if self.first is None or block.cycle is None:
+            return [block]
+        early = self.first - _RUN_IN - block.cycle
+        if early <= 0:
+            return [block]
+        if early >= len(block.samples):
+            return []
+        valid = None if block.valid is None else block.valid[early:]
+        return [
+            replace(
+                block, samples=block.samples[early:], valid=valid, dropped=0,
+                cycle=block.cycle + early,
+            )
+        ]  # fmt: skip
 
     @property
-    def rows(self) -> int:
-        """Samples so far, those that were lost included."""
-        return sum(len(block.samples) + block.dropped for block in self.blocks)
+    def arrived(self) -> int:
+        """Samples of the motion so far, those that were lost included."""
+        if self.first is None or not self.blocks:
+            return 0
+        newest = self.blocks[-1]
+        assert newest.cycle is not None, "what a cyclic exchange delivers is numbered"
+        return newest.cycle + len(newest.samples) - self.first
 
     def since(self, number: int) -> FloatArray:
         """Rows of position, velocity and torque of the blocks from this number on."""
@@ -261,13 +294,12 @@ async def _drive_through(
     count = len(trajectory.values)
     station = trajectory.station
     try:
-        await session.cyclic.play([trajectory])
+        catch.begin(await session.cyclic.play([trajectory]))
     except NotAllowed as error:
         raise interrupted(error) from error
-    begun = catch.rows
-    heard, deadline, judged = 0, time.monotonic() + _TAIL_S, len(catch.blocks)
+    heard, deadline, judged = 0, time.monotonic() + _TAIL_S, 0
     while True:
-        arrived = catch.rows - begun
+        arrived = catch.arrived
         if arrived > heard:
             # A bus may be slow where a busy computer simulates it; one that is silent is gone.
             heard, deadline = arrived, time.monotonic() + _TAIL_S

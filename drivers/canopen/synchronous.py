@@ -94,6 +94,7 @@ class SyncLoop:
         self._stopping = False
         self._cycle = 0
         self._sent_cycle = -1
+        self._block_cycle = 0
         self._arrived: dict[int, bytes] = {}
         self._silent_s = dict.fromkeys(images.stations, 0.0)
         self._sampled_s: float | None = None
@@ -296,6 +297,8 @@ class SyncLoop:
         complete = self._complete = self.images.take(arrived)
         valid = len(arrived) == len(self.images.lengths)
         self._statistics.incomplete += not valid
+        if not self._rows:
+            self._block_cycle = self._sent_cycle
         # Beside what SYNC called for stands what went out in the same cycle, for the next SYNC.
         self._rows.append([*self.images.values, *self._sent])
         self._row_valid.append(valid)
@@ -333,6 +336,7 @@ class SyncLoop:
             samples=samples.reshape(len(self._rows), len(self.images.channels)),
             dropped=self._dropped,
             valid=np.array(self._row_valid, dtype=np.bool_),
+            cycle=self._block_cycle,
         )
         self._sequence += 1
         self._dropped = 0

@@ -417,6 +417,7 @@ class EthercatCyclic:
                     samples=samples,
                     dropped=dropped,
                     valid=valid,
+                    cycle=int(part["cycle"][0]),
                 )
             )
             consumer.sequence += 1

@@ -111,6 +111,8 @@ class DirectLink:
         """Asked at each cycle: whether its answer does not come; the drive has heard it."""
         self._loop: AxisLoop | None = None
         self._pump: asyncio.Task[None] | None = None
+        self._count = 0
+        """Of cycles whose samples were delivered."""
         self._ordinary_time = time.monotonic
         self._consumers: list[Callable[[ScopeBlock], None]] = []
         self._channels: tuple[str, ...] = ()
@@ -270,8 +272,11 @@ class DirectLink:
             return
         samples = np.array(rows, np.float64)
         valid = ~np.isnan(samples).any(axis=1)
-        block = ScopeBlock(0, self.now_ns / 1e9, self.cycle_ns / 1e9, self._channels, samples,
-                           missed, valid)  # fmt: skip
+        block = ScopeBlock(
+            0, self.now_ns / 1e9, self.cycle_ns / 1e9, self._channels, samples, missed, valid,
+            cycle=self._count + missed,
+        )  # fmt: skip
+        self._count += missed + len(rows)
         for consumer in tuple(self._consumers):
             consumer(block)
 
@@ -310,7 +315,7 @@ class DirectLink:
                     None if offset is None else array.array("q", offset.tolist()),
                 )
             )  # fmt: skip
-        return 0
+        return self._count
 
     async def renew(self, station: int) -> None:
         del station

@@ -21,9 +21,9 @@ from backend.tools.probe import probe_axis
 from backend.tools.recording import bridged
 from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import Loop, SweepSettings
-from drivers.link import Trajectory
+from drivers.link import ScopeBlock, Trajectory
 from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import WIDE, mechanics, silent
+from tests.virtual.tools.rig import WIDE, errors, mechanics, silent
 
 ONE = mechanics((1e-4, 60.0, 0.006))
 
@@ -145,3 +145,21 @@ async def test_what_is_played_again_is_shared_where_a_period_is_whole_already(
         await sweep(b.axis, b.session, SweepSettings(WIDE, realisations=1), progress)
     assert len(late.long) == 4
     assert "measuring, realisation 2 of 2: once more, since samples were lost" in steps
+
+
+async def test_what_was_before_a_motion_is_no_part_of_it_however_late_it_comes() -> None:
+    """A server that stood still finds the samples of before when the motion has begun."""
+    async with direct(ONE) as b:
+        play, old = b.link.play, 20_000
+
+        async def belated(trajectories: Sequence[Trajectory]) -> int:
+            first = await play(trajectories)
+            rest = np.random.default_rng(1).integers(-50, 50, (old, len(b.link._channels)))
+            samples = rest.astype(np.float64)
+            for consumer in tuple(b.link._consumers):
+                consumer(ScopeBlock(0, 0.0, 1e-3, b.link._channels, samples, cycle=first - old))
+            return first
+
+        b.link.play = belated  # type: ignore[method-assign]
+        found = await sweep(b.axis, b.session, SweepSettings(WIDE), silent())
+    assert errors(found.direct, ONE, 5, 250).magnitude_db < 0.3
