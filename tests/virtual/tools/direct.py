@@ -3,8 +3,9 @@
 For what needs many axes or many samples and nothing of the wire itself. While the exchange runs
 time passes as fast as the computer can, 20 ms at a go, and `time.monotonic` with it: who waits for
 30 ms or has 3 s, waits for 30 ms and has 3 s of the drive. While something is computed in a thread
-time keeps to its ordinary pace about. One cycle lies between a set-point and the sample that shows
-it, as with EtherCAT.
+time keeps to the pace of its processor time about, so that a busy computer, where the same takes
+longer, changes nothing. One cycle lies between a set-point and the sample that shows it, as with
+EtherCAT.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import array
 import asyncio
 import struct
+import threading
 import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
@@ -53,7 +55,7 @@ _MODE = 0x6060
 #: Simulated time for one access to the dictionary.
 _ACCESS_NS = 200_000
 _TURN_NS = 20_000_000
-#: What a turn lasts for those who compute meanwhile.
+#: What a turn lasts for those who compute meanwhile, in time of a processor.
 _REST_S = 0.01
 #: Set-points live this much longer than on a wire: simulated time outruns the tools' clock.
 _PATIENCE = 1000
@@ -71,22 +73,59 @@ class _Computing:
     """How many calls the worker threads of event loops have at hand."""
 
     count = 0
+    _lock = threading.Lock()
 
     @classmethod
     def watch(cls, loop: asyncio.AbstractEventLoop) -> None:
         ordinary = loop.run_in_executor
 
-        def counted(*call: Any) -> asyncio.Future[Any]:
-            cls.count += 1
-            future = ordinary(*call)
-            future.add_done_callback(cls._done)
-            return future
+        def counted(executor: Any, work: Callable[..., Any], *rest: Any) -> asyncio.Future[Any]:
+            def done() -> Any:
+                try:
+                    return work(*rest)
+                finally:
+                    cls._add(-1)
+
+            cls._add(1)
+            return ordinary(executor, done)
 
         loop.run_in_executor = counted  # type: ignore[method-assign, assignment]
 
     @classmethod
-    def _done(cls, _future: asyncio.Future[Any]) -> None:
-        cls.count -= 1
+    def _add(cls, calls: int) -> None:
+        with cls._lock:
+            cls.count += calls
+
+    @classmethod
+    def rest(cls) -> None:
+        """Let threads compute for `_REST_S` of processor time, or until they are through."""
+        begun = time.process_time()
+        while cls.count and time.process_time() - begun < _REST_S:
+            # Not asyncio's: that would be over in no time, as it is the drive's.
+            time.sleep(_REST_S / 5)
+
+
+class _Clock:
+    """`time.monotonic` of who waits for a drive whose time is ``drive_ns``.
+
+    To that comes the processor's time while the exchange ``runs``, and else the computer's.
+    """
+
+    def __init__(self, drive_ns: Callable[[], int], runs: Callable[[], bool]) -> None:
+        self._drive_ns, self._runs = drive_ns, runs
+        self._computers = time.monotonic
+        self._lock = threading.Lock()
+        self._passed = self._wall = self._computers()
+        self._processor = time.process_time()
+
+    def __call__(self) -> float:
+        with self._lock:
+            wall, processor = self._computers(), time.process_time()
+            # Threads may compute side by side.
+            computed = min(processor - self._processor, wall - self._wall)
+            self._passed += computed if self._runs() else wall - self._wall
+            self._wall, self._processor = wall, processor
+            return self._passed + self._drive_ns() / 1e9
 
 
 class DirectLink:
@@ -127,9 +166,7 @@ class DirectLink:
     async def open(self) -> None:
         self.device.advance(0)
         _Computing.watch(asyncio.get_running_loop())
-        ordinary = time.monotonic
-        time.monotonic = lambda: ordinary() + self.now_ns / 1e9
-        self._ordinary_time = ordinary
+        time.monotonic = _Clock(lambda: self.now_ns, lambda: self.running)
 
     async def close(self) -> None:
         await self.stop()
@@ -263,9 +300,7 @@ class DirectLink:
                 return
             self._deliver(rows, missed)
             await asyncio.sleep(0)
-            if _Computing.count:
-                # Not asyncio's: that would be over in no time, as it is the drive's.
-                time.sleep(_REST_S)  # noqa: ASYNC251
+            _Computing.rest()
 
     def _deliver(self, rows: list[list[float]], missed: int) -> None:
         if not rows:
