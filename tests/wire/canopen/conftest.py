@@ -8,12 +8,12 @@ from pathlib import Path
 
 import can
 import pytest
-from canopen_small_device import SmallDevice
 
 from drivers.canopen.link import CanopenLink
 from drivers.virtual.wires.can_wire import CanWire, PythonCanSide
 from drivers.virtual.wires.canopen import CanopenNode
 from drivers.virtual.wires.slcan import SlcanSide
+from tests.wire.canopen.small_device import SmallDevice
 
 _numbers = itertools.count()
 

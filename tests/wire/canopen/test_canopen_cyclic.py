@@ -7,8 +7,6 @@ import time
 
 import numpy as np
 import pytest
-from canopen_small_device import SmallDevice
-from conftest import Bench, until
 
 from drivers.canopen.busload import bus_load
 from drivers.canopen.cyclic import CanopenCyclic
@@ -25,6 +23,8 @@ from drivers.link import (
     Trajectory,
 )
 from drivers.virtual.wires.canopen import CanopenNode
+from tests.wire.canopen.conftest import Bench, until
+from tests.wire.canopen.small_device import SmallDevice
 
 CONTROL = CyclicSignal(5, Address(0x6040, 0, "UINT16"), "control")
 TARGET = CyclicSignal(5, Address(0x607A, 0, "INT32"), "target")

@@ -16,7 +16,6 @@ from typing import Any
 
 import can
 import pytest
-from conftest import until
 
 from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.link import CanopenLink
@@ -32,6 +31,7 @@ from drivers.virtual.wires.modbus import ModbusSlave, TableRegisters
 from drivers.virtual.wires.pty import PtyWire
 from profiles.loader import drive_names, load_profile
 from profiles.schema import Identity, LinkSpec, Parameter, Profile, Signal, UnitSpec, Watchdog
+from tests.wire.canopen.conftest import until
 
 #: Key, type, access, register, manual line (003).
 _ROWS: list[tuple[str, str, str, int, int]] = [

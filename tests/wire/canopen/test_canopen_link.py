@@ -6,13 +6,13 @@ import asyncio
 import time
 
 import pytest
-from canopen_small_device import SmallDevice
-from conftest import Bench, until
 
 from drivers.canopen.link import CanopenLink
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed, NotAsked, Rejected
 from drivers.link import Address, LinkEvent
 from drivers.virtual.wires.canopen import CanopenNode
+from tests.wire.canopen.conftest import Bench, until
+from tests.wire.canopen.small_device import SmallDevice
 
 SMALL = Address(0x2000, 0, "UINT8")
 LIMITED = Address(0x2001, 0, "INT16")

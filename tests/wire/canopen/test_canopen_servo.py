@@ -11,7 +11,6 @@ from collections.abc import AsyncIterator
 import can
 import numpy as np
 import pytest
-from conftest import until
 
 from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.link import CanopenLink
@@ -21,6 +20,7 @@ from drivers.virtual.device import Device
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.wires.can_wire import CanWire, PythonCanSide
 from drivers.virtual.wires.canopen import CanopenNode
+from tests.wire.canopen.conftest import until
 
 CONTROL = Address(0x6040, 0, "UINT16")
 STATUS = Address(0x6041, 0, "UINT16")

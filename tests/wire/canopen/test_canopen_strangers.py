@@ -5,10 +5,10 @@ from __future__ import annotations
 import struct
 
 import pytest
-from canopen_small_device import SmallDevice
 
 from drivers.canopen.frames import Frame
 from drivers.virtual.wires.canopen import CanopenNode
+from tests.wire.canopen.small_device import SmallDevice
 
 
 class RawMaster:

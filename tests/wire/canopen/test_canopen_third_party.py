@@ -17,8 +17,6 @@ from pathlib import Path
 import can
 import canopen
 import pytest
-from canopen_small_device import SmallDevice
-from conftest import Bench, until
 
 from drivers.canopen.frames import Frame, exact_bits, worst_case_bits
 from drivers.canopen.link import CanopenLink
@@ -27,6 +25,8 @@ from drivers.link import Address
 from drivers.virtual.wires.can_wire import CanWire
 from drivers.virtual.wires.canopen import CanopenNode
 from drivers.virtual.wires.slcan import SlcanSide
+from tests.wire.canopen.conftest import Bench, until
+from tests.wire.canopen.small_device import SmallDevice
 
 ROOT = Path(__file__).parents[3]
 
@@ -239,7 +239,7 @@ NAMESPACE_TEST = """
     import asyncio, sys, time
     sys.path[:0] = [{root!r}, {here!r}]
     import can
-    from canopen_small_device import SmallDevice
+    from small_device import SmallDevice
     from drivers.canopen.link import CanopenLink
     from drivers.link import Address
     from drivers.virtual.wires.can_wire import CanWire, PythonCanSide
