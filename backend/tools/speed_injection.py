@@ -26,8 +26,9 @@ _TURN = 2 * np.pi
 #: Peak of the first trial in rad/s: even a high gain makes little torque of it.
 FIRST_RAD_S = 0.3
 #: Shares of the permitted speed: for what the axis makes of the excitation, and for the highest
-#: set-point, which is what an unwatched drive goes on with when the computer falls silent.
-_SPEED_SHARE, _REFERENCE_SHARE = 0.15, 0.5
+#: set-point. A drive that nothing watches goes on with that when the computer falls silent.
+_SPEED_SHARE, _REFERENCE_SHARE = 0.3, 0.9
+_UNWATCHED_SPEED_SHARE, _UNWATCHED_REFERENCE_SHARE = 0.15, 0.5
 #: Share of the permitted torque for excitation and base motion together, and what is left of the
 #: base motion at least.
 _TORQUE_SHARE, _LEAST_BASE = 0.7, 0.4
@@ -69,22 +70,26 @@ class Size:
 
 
 def fitting_size(
-    sequence: excite.Sequence, recording: Recording, room: excite.Room, torque_nm: float
-) -> Size:
+    sequence: excite.Sequence, recording: Recording, room: excite.Room, torque_nm: float, *,
+    watched: bool,
+) -> Size:  # fmt: skip
     """What makes a torque that peaks at ``torque_nm``, as far as the trial tells.
 
     A soft loop makes little speed of its reference, so that the axis' own speed counts; the
     set-points stay within a share, too. Such a loop may answer the base motion with much torque,
-    as that lies near its resonance: the base motion gets what the excitation leaves.
+    as that lies near its resonance: the base motion gets what the excitation leaves. ``watched``:
+    the drive ends a motion whose set-points stop coming.
     """
+    speed_share = _SPEED_SHARE if watched else _UNWATCHED_SPEED_SHARE
+    reference_share = _REFERENCE_SHARE if watched else _UNWATCHED_REFERENCE_SHARE
     record = _record(sequence, recording)
     gain = _rough_gain(record)
     by_torque = torque_nm / gain
     base = 0.0 if sequence.base is None else float(np.max(np.abs(sequence.base)))
-    least = _SPEED_SHARE * room.speed_rad_s
+    least = speed_share * room.speed_rad_s
     moves = _speed_over_peak(record, gain) if base else 1.0
     by_speed = least / (_PEAK_OVER_RMS * moves)
-    most = min(by_speed, _REFERENCE_SHARE * room.speed_rad_s - base)
+    most = min(by_speed, reference_share * room.speed_rad_s - base)
     peak = min(by_torque, max(most, least))
     left_nm = _TORQUE_SHARE * room.torque_nm - torque_nm * peak / by_torque
     taken_nm = float(np.max(np.abs(recording.torque_nm)))

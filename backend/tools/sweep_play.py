@@ -47,7 +47,9 @@ async def scaled_by_speed(
         axis, session, settings, setup, sequences[:1], home, trial
     )
     share_nm = settings.share * setup.room.torque_nm
-    size = speed_injection.fitting_size(sent, recording, setup.room, share_nm)
+    size = speed_injection.fitting_size(
+        sent, recording, setup.room, share_nm, watched=not session.unwatched(axis.drive)
+    )
     return sized(sequences, size.peak_rad_s / speed_injection.FIRST_RAD_S, size.base_rad_s)
 
 

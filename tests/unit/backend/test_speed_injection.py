@@ -60,11 +60,12 @@ def played(
 
 
 def sized(
-    inertia: float, gain: float = GAIN, corner_hz: float = 0.0, noise_rad_s: float = 0.0
-) -> speed_injection.Size:
+    inertia: float, gain: float = GAIN, corner_hz: float = 0.0, noise_rad_s: float = 0.0, *,
+    watched: bool = False,
+) -> speed_injection.Size:  # fmt: skip
     trial = sequences(speed_injection.FIRST_RAD_S)[0]
     recording = played(trial, inertia, gain, corner_hz, noise_rad_s)
-    return speed_injection.fitting_size(trial, recording, ROOM, WANTED_NM)
+    return speed_injection.fitting_size(trial, recording, ROOM, WANTED_NM, watched=watched)
 
 
 def test_steps_of_the_encoder_are_not_taken_for_torque_of_the_reference() -> None:
@@ -79,6 +80,13 @@ def test_a_soft_loop_gets_more_reference_than_the_axis_may_turn() -> None:
     soft = sized(1.5e-3, 0.5 * GAIN)
     assert soft.peak_rad_s > 2 * 0.15 * ROOM.speed_rad_s
     assert soft.peak_rad_s + soft.base_rad_s <= 0.5 * ROOM.speed_rad_s + 1e-9
+
+
+def test_a_drive_that_ends_a_motion_without_computer_gets_more() -> None:
+    soft = sized(1.5e-3, 0.2 * GAIN, watched=True)
+    assert soft.peak_rad_s + soft.base_rad_s == pytest.approx(0.9 * ROOM.speed_rad_s)
+    follows = sized(2e-5, watched=True).peak_rad_s
+    assert 0.15 * ROOM.speed_rad_s < follows <= 0.3 * ROOM.speed_rad_s
 
 
 def test_an_axis_that_follows_gets_its_share_of_the_speed() -> None:
