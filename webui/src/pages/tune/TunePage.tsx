@@ -17,7 +17,7 @@ import { AutotunePanel } from './AutotunePanel'
 import { CandidatesPanel } from './CandidatesPanel'
 import { GainsPanel } from './GainsPanel'
 import { InertiaPanel } from './InertiaPanel'
-import type { Known } from './path'
+import { type Known, later, tunedAt } from './path'
 import { PathNav } from './PathNav'
 import { PreChecks } from './PreChecks'
 import { ReportPanel, useReports } from './ReportPanel'
@@ -76,7 +76,7 @@ export function TunePage({ drive }: { drive: string }) {
   const path: Known = {
     ready: able,
     inertia: si !== null,
-    changed: later(changes.at(-1)?.time ?? null, tuned?.applied ? (tuneJob?.ended ?? null) : null),
+    changed: later(changes.at(-1)?.time ?? null, tuned && tuneJob ? tunedAt(tuned, tuneJob) : null),
     measured: ours,
     reported: reports.list[0]?.made ?? null,
   }
@@ -163,10 +163,4 @@ export function TunePage({ drive }: { drive: string }) {
       )}
     </div>
   )
-}
-
-/** The later of two times; null is before all. */
-function later(a: string | null, b: string | null): string | null {
-  if (a === null || b === null) return a ?? b
-  return Date.parse(a) > Date.parse(b) ? a : b
 }

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest'
-import { type Known, nextStep, stepsDone } from './path'
+import { type Known, later, nextStep, stepsDone, tunedAt } from './path'
 
 const at = (minute: number) => new Date(Date.UTC(2026, 2, 1, 12, minute)).toISOString()
 const start: Known = { ready: false, inertia: false, changed: null, measured: [], reported: null }
@@ -25,6 +25,23 @@ describe('the guided path', () => {
     const known = { ...start, changed: at(4), measured }
     expect(stepsDone({ ...known, reported: at(3) }).report).toBe(false)
     expect(stepsDone({ ...known, reported: at(6) }).report).toBe(true)
+  })
+  it('takes a tuning that verified what it wrote as verified, until something else changes', () => {
+    const job = { started: at(1), ended: at(6) }
+    const measured = [
+      { kind: 'sweep-speed_loop', saved: at(5) },
+      { kind: 'sweep-mechanics', saved: at(3) },
+    ]
+    const done = (verified: boolean, changed: string | null) =>
+      stepsDone({
+        ...start,
+        measured,
+        changed: later(changed, tunedAt({ applied: true, verified }, job)),
+      }).verify
+    expect(done(true, null)).toBe(true)
+    expect(done(true, at(7))).toBe(false)
+    expect(done(false, null)).toBe(false)
+    expect(tunedAt({ applied: null, verified: null }, job)).toBeNull()
   })
   it('ends', () => {
     const all = stepsDone({

@@ -46,3 +46,18 @@ export function stepsDone(known: Known): Record<StepName, boolean> {
 /** The first step that is not done; null at the end of the path. */
 export const nextStep = (done: Record<StepName, boolean>): StepName | null =>
   STEPS.find((each) => !done[each]) ?? null
+
+/**
+ * When a tuning wrote its design; null where it did not. One that was verified measured after that,
+ * so that its verification is of it.
+ */
+export const tunedAt = (
+  tuned: { applied: unknown; verified: unknown },
+  job: { started: string; ended: string | null },
+): string | null => (!tuned.applied ? null : tuned.verified ? job.started : job.ended)
+
+/** The later of two times; null is before all. */
+export function later(a: string | null, b: string | null): string | null {
+  if (a === null || b === null) return a ?? b
+  return Date.parse(a) > Date.parse(b) ? a : b
+}
