@@ -22,7 +22,11 @@ COEFFICIENT_OFFSET = 32_768
 
 @dataclass(frozen=True)
 class Notch:
-    """Centre (Hz), -3 dB bandwidth (Hz) and depth (dB, negative: gain at the centre)."""
+    """Centre (Hz), -3 dB bandwidth (Hz) and depth (dB, negative: gain at the centre).
+
+    A notch of less than 10 dB is -3 dB over less than that: the bandwidth then lies where the power
+    is half-way between the centre's and what is passed.
+    """
 
     center_hz: float
     width_hz: float
@@ -139,14 +143,14 @@ def decode_coefficients(raw: NotchCoefficients, sample_time_s: float) -> Notch:
 
 
 def realised(raw: NotchCoefficients, sample_time_s: float) -> RealisedNotch:
-    """Read the rounded filter's response as one would on a plot."""
+    """Read the rounded filter's response as one would on a plot; the width as `Notch` means it."""
     a1, a2, b1, b2 = coefficient_values(raw)
     stable = is_stable(raw)
     f = np.geomspace(1.0, 0.499 / sample_time_s, 20_000)
     db = 20 * np.log10(np.maximum(np.abs(coefficients_response(raw, f, sample_time_s)), 1e-12))
     lowest = int(np.argmin(db))
     dc = 20 * np.log10(abs(1 + a1 + a2) / abs(1 + b1 + b2)) if stable and 1 + a1 + a2 else -np.inf
-    level = dc - 3.0103
+    level = 10 * np.log10((10 ** (dc / 10) + 10 ** (db[lowest] / 10)) / 2)
     width = float("nan")
     left = np.flatnonzero(db[:lowest] > level)
     right = np.flatnonzero(db[lowest:] > level)

@@ -83,6 +83,18 @@ def test_realised_response_against_control_library():
     assert r.dc_gain_db == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("depth_db", [-2.0, -3.5, -8.0, -30.0])
+def test_what_the_drive_does_is_as_wide_as_what_was_asked_however_shallow(depth_db):
+    """|H|² of the continuous notch is (1 + d²)/2 on both edges of its bandwidth."""
+    n = Notch(800.0, 200.0, depth_db)
+    low = -100 + np.sqrt(100**2 + 800**2)
+    power = np.abs(n.response(np.array([low, low + 200.0]))) ** 2
+    assert power == pytest.approx((1 + 10 ** (depth_db / 10)) / 2)
+    made = realised(encode_coefficients(n, TS), TS)
+    # The backward difference moves both edges; a step of b2 is 0.3 Hz.
+    assert made.width_hz == pytest.approx(200.0, rel=0.08)
+
+
 def test_continuous_notch_has_its_depth_and_minus_3_db_width():
     n = Notch(300.0, 60.0, -60.0)
     low = -30 + np.sqrt(30**2 + 300**2)
