@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import shutil
 import threading
@@ -139,18 +140,23 @@ class RecordingWriter:
     # --- the thread -------------------------------------------------------------------
 
     def _create(self, head: bytes) -> BinaryIO:
+        """With its head or not at all: a server may be killed at any moment."""
+        part = self.path.with_name(f".{self.path.name}.part")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._check_space()
-            file = self.path.open("xb", buffering=0)
+            if self.path.exists():
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+            file = part.open("wb", buffering=0)
         except OSError as error:
             raise self._storage(error) from error
         try:
             _write(file, head)
             os.fsync(file.fileno())
+            part.replace(self.path)
         except OSError as error:
             file.close()
-            self.path.unlink(missing_ok=True)
+            part.unlink(missing_ok=True)
             raise self._storage(error) from error
         self._good = len(head)
         self._written = Written(bytes=self._good)

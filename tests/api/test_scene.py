@@ -17,6 +17,7 @@ from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 from websockets.typing import Subprotocol
 
+from tests.support.jogging import jogged
 from tests.support.machine import within
 from tests.support.station import HANG_S, Station, until
 
@@ -65,17 +66,19 @@ def messages(data: bytes) -> list[dict[str, Any]]:
     return [message for message in found["messages"] if isinstance(message, dict)]
 
 
+def a_good_way_off(now: Any, _start: float) -> bool:
+    return float(now["position"]) > 1.3
+
+
 def test_parts_follow_the_motor(station: Station, x: str) -> None:
     screw = {"mechanics": {"kind": "screw", "lead_mm": 10, "motor_turns": 2}}
     station.ok(station.http.put(f"/drives/{x}/mechanics", json=screw))
     with open_scene(station) as socket, station.live() as page:
         seen = Seen(socket)
         seen.watch(1)
-        page.send(type="jog_start", drive=x, direction=1, speed=300, acceleration=3000,
-                  travel_limit=50, torque_limit=100)  # fmt: skip
-        with page.holding(x):
-            until(lambda: float(station.state(x)["position"]) > 1.3, HANG_S, "the axis moves")
-        page.send(type="jog_stop", drive=x)
+        limits = {"speed": 300, "acceleration": 3000, "travel_limit": 50, "torque_limit": 100}
+        with jogged(station.http, page, x, a_good_way_off, **limits):
+            page.send(type="jog_stop", drive=x)
         assert page.wait("jog_ended", drive=x)["problem"] is None
         seen.watch(1)
         turns = float(station.state(x)["position"])

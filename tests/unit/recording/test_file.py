@@ -13,12 +13,14 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import pytest
 
 from backend.files import StorageFailed
 from backend.recording import chunks
+from backend.recording import writer as recording_writer
 from backend.recording.reader import BadRecording, RecordingReader
 from backend.recording.writer import RecordingWriter
 from drivers.errors import NotAllowed
@@ -264,6 +266,23 @@ def test_slow_disk_fails_it_rather_than_dropping(
     with RecordingReader(tmp_path / "a.sdrec") as reader:
         assert [s.sequence for s in reader.blocks()] == list(range(1, 11)), "no gap before the end"
         assert reader.summary().state == "failed"
+
+
+def test_a_file_has_its_head_from_its_first_moment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A server that is killed while it begins a recording leaves none that nobody can read."""
+    there: list[list[Path]] = []
+
+    def looking(file: BinaryIO, data: bytes) -> None:
+        there.append(list(tmp_path.glob("*.sdrec")))
+        ordinary(file, data)
+
+    ordinary = recording_writer._write
+    monkeypatch.setattr(recording_writer, "_write", looking)
+    written(tmp_path / "a.sdrec", 1)
+    assert there[0] == []
+    assert [path.name for path in tmp_path.iterdir()] == ["a.sdrec"]
 
 
 def test_an_existing_file_is_never_overwritten(tmp_path: Path) -> None:
