@@ -15,7 +15,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import IO, NamedTuple
@@ -47,8 +46,6 @@ PATIENT = [
 AT_IDLE = ["chrt", "--idle", "0"]
 
 
-#: A repeat may show another test of the same file that the machine had no time for.
-MOST_REPEATS = 2
 TWO = ["-n", "2", "--dist", "loadfile"]
 
 
@@ -68,17 +65,6 @@ def pytest(name: str, *arguments: str) -> Check:
 def ignoring(paths: Sequence[str]) -> list[str]:
     """Arguments that leave these out."""
     return [f"--ignore={path}" for path in paths]
-
-
-class Suspect(NamedTuple):
-    """A suite, and those of its tests that failed once."""
-
-    suite: str
-    tests: frozenset[str]
-
-    def check(self) -> Check:
-        """Their files, whole."""
-        return pytest(self.suite, *sorted({test.partition("::")[0] for test in self.tests}))
 
 
 QUICK = [
@@ -109,17 +95,17 @@ class Runner:
 
     def __init__(self, out: IO[str], before: Sequence[str] = ()) -> None:
         self.failed: list[str] = []
-        self.again: list[Suspect] = []
+        self.again: list[Check] = []
         """What failed in suites, to be run once more when nothing else runs."""
         self._out = out
         self._before = before
         self._environment = os.environ | {"PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
 
-    def run(self, checks: Sequence[Check], failed_before: AbstractSet[str] = frozenset()) -> None:
+    def run(self, checks: Sequence[Check], *, last: bool = False) -> None:
         """Run them in turn; what they print goes where this prints.
 
-        Files with failed tests go to `again`, whole, as the tests of some follow one another. A
-        busy machine is no defect, and a defect stays one: what ``failed_before``, too, has failed.
+        Files with failed tests go to `again`, whole, as the tests of some follow one another; not
+        at the ``last`` time. A busy machine is no defect, and a defect stays one.
         """
         for check in checks:
             self._say(f"== {check.name}")
@@ -127,9 +113,9 @@ class Runner:
             code = self._once(check.command, check.folder)
             self._say(f"== {check.name}: {time.monotonic() - began:.0f} s, exit {code}")
             suite = list(check.command[: len(PYTEST)]) == PYTEST
-            tests = last_failed(check.name) if code == 1 and suite else frozenset()
-            if tests and not tests & failed_before:
-                self.again.append(Suspect(check.name, tests))
+            files = last_failed(check.name) if code == 1 and suite and not last else []
+            if files:
+                self.again.append(pytest(check.name, *files))
             elif code != 0:
                 self.failed.append(check.name)
 
@@ -144,17 +130,17 @@ class Runner:
         ).returncode  # fmt: skip
 
 
-def last_failed(name: str) -> frozenset[str]:
-    """Tests that failed in the last run of a suite; forgotten with this answer.
+def last_failed(name: str) -> list[str]:
+    """Files with tests that failed in the last run of a suite; forgotten with this answer.
 
     None where the suite came to no end.
     """
     note = ROOT / ".pytest_cache" / name / "v" / "cache" / "lastfailed"
     if not note.exists():
-        return frozenset()
+        return []
     failed = json.loads(note.read_text("utf-8"))
     note.unlink()
-    return frozenset(failed)
+    return sorted({test.partition("::")[0] for test in failed})
 
 
 def main() -> int:
@@ -171,7 +157,7 @@ def main() -> int:
 
 
 def run_suites(runner: Runner) -> list[str]:
-    """Run the suites in three lanes; returns the names of those with a test that failed twice."""
+    """Run the suites in three lanes; returns the names of those that failed twice."""
     with (
         tempfile.TemporaryFile("w+", encoding="utf-8") as idle,
         tempfile.TemporaryFile("w+", encoding="utf-8") as seen,
@@ -188,16 +174,11 @@ def run_suites(runner: Runner) -> list[str]:
             printed.seek(0)
             shutil.copyfileobj(printed, sys.stdout)
     again = [*runner.again, *pages.again, *beside.again]
-    for _ in range(MOST_REPEATS):
-        if not again:
-            break
+    if again:
         alone = Runner(sys.stdout)
         print("== once more, alone", flush=True)
-        for suspect in again:
-            alone.run([suspect.check()], suspect.tests)
+        alone.run(again, last=True)
         runner.failed += alone.failed
-        again = alone.again
-    runner.failed += [suspect.suite for suspect in again]
     return runner.failed + pages.failed + beside.failed
 
 

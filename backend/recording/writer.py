@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import secrets
 import shutil
 import threading
 import time
@@ -141,19 +142,17 @@ class RecordingWriter:
 
     def _create(self, head: bytes) -> BinaryIO:
         """With its head or not at all: a server may be killed at any moment."""
-        part = self.path.with_name(f".{self.path.name}.part")
+        part = self.path.with_name(f".{self.path.name}.{secrets.token_hex(4)}.part")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._check_space()
-            if self.path.exists():
-                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
-            file = part.open("wb", buffering=0)
+            file = part.open("xb", buffering=0)
         except OSError as error:
             raise self._storage(error) from error
         try:
             _write(file, head)
             os.fsync(file.fileno())
-            part.replace(self.path)
+            _name_once(part, self.path)
         except OSError as error:
             file.close()
             part.unlink(missing_ok=True)
@@ -283,6 +282,20 @@ def end_summary(written: Written) -> dict[str, object]:
         "first_s": written.first_s,
         "last_s": written.last_s,
     }
+
+
+def _name_once(part: Path, path: Path) -> None:
+    """Give a file its name, which no other may have. FAT has no second names."""
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        raise
+    except OSError:
+        if path.exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from None
+        part.replace(path)
+    else:
+        part.unlink()
 
 
 def _write(file: BinaryIO, data: bytes) -> None:

@@ -155,11 +155,13 @@ def test_jog_plays_one_position_per_cycle(station: Station, cyclic: tuple[str, s
             return page.wait("jog_ended", drive=a, timeout_s=60)
 
         for _ in range(5):
+            watch = Stopwatch()
             ended = undisturbed(jog)
             assert ended["problem"] is None, ended
             if at_speed(page.binary) > 300:
                 break
             # This computer kept the button's thread from its work, and the axis was braked.
+            assert watch.busy(), ended
             assert "200 ms" in ended["reason"], ended
         page.send(type="scope_stop", subscription=1)
     steps = steps_of(page.binary)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import threading
 import time
 from collections.abc import Callable
@@ -57,8 +56,7 @@ class OwnTime:
     what this process started too, such as the virtual drives and the browser: of each the thread
     that waited longest, as one does its part after the other. A server that waits for a wire or for
     a time-out, or works for long without letting others in, shows all the same; and so does
-    everything on a machine that has time for us. Time in which a virtual machine's host gave its
-    processors to others counts as waiting too.
+    everything on a machine that has time for us.
     """
 
     def __init__(self, *, with_children: bool = False) -> None:
@@ -66,11 +64,9 @@ class OwnTime:
         self._with_children = with_children
         self._began_s = 0.0
         self._before_ns: dict[str, dict[str, int]] = {}
-        self._stolen_s = 0.0
 
     def __enter__(self) -> OwnTime:
-        self._before_ns, self._stolen_s = self._waited_ns(), _stolen_s()
-        self._began_s = time.monotonic()
+        self._before_ns, self._began_s = self._waited_ns(), time.monotonic()
         return self
 
     def __exit__(self, *_exc: object) -> None:
@@ -80,8 +76,7 @@ class OwnTime:
             before_ns = self._before_ns.get(process, {})
             each_ns = [ns - before_ns.get(thread, 0) for thread, ns in threads.items()]
             waited_ns += sum(each_ns) if process == "self" else max(each_ns, default=0)
-        stolen_s = _stolen_s() - self._stolen_s
-        self.s = max(took_s - waited_ns / 1e9 - stolen_s, 0.0)
+        self.s = max(took_s - waited_ns / 1e9, 0.0)
 
     def _waited_ns(self) -> dict[str, dict[str, int]]:
         """For how long the threads have waited, by process."""
@@ -141,15 +136,6 @@ def _runnable_ns(process: str) -> dict[str, int]:
         with contextlib.suppress(OSError):
             told[str(thread)] = int(thread.read_text().split()[1])
     return told
-
-
-def _stolen_s() -> float:
-    """Of all processors since the machine began, by its host; 0 where the kernel does not tell."""
-    try:
-        line = Path("/proc/stat").read_text().splitlines()[0].split()
-        return int(line[8]) / os.sysconf("SC_CLK_TCK")
-    except (OSError, IndexError):
-        return 0.0
 
 
 def _children(process: str) -> list[str]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import math
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
@@ -106,9 +105,7 @@ async def bench(drive: str, spec: MechanicsSpec) -> AsyncIterator[DirectBench]:
 async def measured(drive: str, spec: MechanicsSpec, *, tune: bool = False) -> Known:
     async with bench(drive, spec) as b:
         if tune:
-            settings = AutotuneSettings(
-                WIDE, apply=False, motor_inertia_kgm2=ROTOR[drive], budget_s=math.inf
-            )
+            settings = AutotuneSettings(WIDE, apply=False, motor_inertia_kgm2=ROTOR[drive])
             found = await autotune(b.axis, b.session, settings, silent())
             return Known(found.inertia, found.mechanics, found, meaning_of(b.axis.drive))
         outcome = await inertia(b.axis, b.session, InertiaSettings(WIDE), silent())
@@ -120,7 +117,7 @@ async def work(
 ) -> object:
     """One part of a tuning as the whole does it."""
     axis, session, name = b.axis, b.session, b.axis.drive.profile.drive
-    settings = AutotuneSettings(WIDE, motor_inertia_kgm2=ROTOR[name], budget_s=math.inf)
+    settings = AutotuneSettings(WIDE, motor_inertia_kgm2=ROTOR[name])
     if part in ("inertia", "sweep"):
         return await autotune(axis, session, settings, progress)
     assert known is not None

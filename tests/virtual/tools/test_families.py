@@ -6,8 +6,6 @@ time for; limits are those of `tuning.md`, truth is the analytic response of the
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
 from backend.commands.measure import _told
@@ -85,9 +83,7 @@ async def test_inertia_between_ends_that_are_found() -> None:
 @pytest.mark.parametrize("drive", ["mms7", "m6l", "r6l"])
 async def test_autotune_of_a_family_and_back(drive: str) -> None:
     # M6-L does not tell its motor's inertia, which its load ratio counts in.
-    rotor_kgm2 = None if drive == "mms7" else 5e-5
-    # What a busy computer takes to compute must not take notches out.
-    settings = AutotuneSettings(WIDE, motor_inertia_kgm2=rotor_kgm2, budget_s=math.inf)
+    settings = AutotuneSettings(WIDE, motor_inertia_kgm2=None if drive == "mms7" else 5e-5)
     async with direct(ONE, 5e-4, drive=drive) as b:
         result = await autotune(b.axis, b.session, settings, silent())
         assert result.applied is not None

@@ -7,7 +7,6 @@ loop drives it: what is predicted then is wrong by as much as play makes it.
 from __future__ import annotations
 
 import asyncio
-import math
 from typing import Any
 
 import numpy as np
@@ -34,7 +33,7 @@ async def found_tight() -> AutotuneResult:
     """The table of candidates of the tight axis, measured once."""
     if not _FOUND:
         async with direct(TIGHT, _CYCLE_S) as b:
-            settings = AutotuneSettings(WIDE, apply=False, budget_s=math.inf)
+            settings = AutotuneSettings(WIDE, apply=False)
             _FOUND.append(await autotune(b.axis, b.session, settings, silent()))
     return _FOUND[0]
 
@@ -42,7 +41,7 @@ async def found_tight() -> AutotuneResult:
 async def applied_loose(b: DirectBench, progress: Progress, keep: Any = None) -> AutotuneResult:
     found = await found_tight()
     facts = completed(await read_facts(b.axis), found.mechanics)
-    settings = AutotuneSettings(WIDE, budget_s=math.inf)
+    settings = AutotuneSettings(WIDE)
     return await apply_and_verify(b.axis, b.session, settings, facts, found, progress, keep)
 
 
