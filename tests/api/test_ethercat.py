@@ -148,20 +148,19 @@ def test_jog_plays_one_position_per_cycle(station: Station, cyclic: tuple[str, s
             page.send(type="jog_start", drive=a, direction=1, **JOG)
             with page.holding(a):
                 # Held by the axis' time, which passes slowly on a busy computer.
-                while at_speed(page.binary) <= 300:
+                # Looked at now and then: this process is the server's too, and must let it answer.
+                while len(page.binary) % 10 or at_speed(page.binary) <= 300:
                     if (message := page.receive())["type"] == "jog_ended":
                         return message
             page.send(type="jog_stop", drive=a)
             return page.wait("jog_ended", drive=a, timeout_s=60)
 
         for _ in range(5):
-            watch = Stopwatch()
             ended = undisturbed(jog)
             assert ended["problem"] is None, ended
             if at_speed(page.binary) > 300:
                 break
-            # This computer kept the button's thread from its work, and the axis was braked.
-            assert watch.busy(), ended
+            # As in `tests.support.jogging`: a stall of 200 ms ends a jog, rightly.
             assert "200 ms" in ended["reason"], ended
         page.send(type="scope_stop", subscription=1)
     steps = steps_of(page.binary)

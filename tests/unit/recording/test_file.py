@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import resource
 import signal
@@ -285,12 +286,21 @@ def test_a_file_has_its_head_from_its_first_moment(
     assert [path.name for path in tmp_path.iterdir()] == ["a.sdrec"]
 
 
-def test_an_existing_file_is_never_overwritten(tmp_path: Path) -> None:
+@pytest.mark.parametrize("disk", ["ext4", "fat"])
+def test_an_existing_file_is_never_overwritten(
+    tmp_path: Path, disk: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_paths: Path) -> None:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    if disk == "fat":  # which gives no file a second name
+        monkeypatch.setattr(os, "link", refused)
     path = written(tmp_path / "a.sdrec", 1)
     before = path.read_bytes()
     with pytest.raises(StorageFailed, match="exists"):
         RecordingWriter(path, header(), unexpected)
     assert path.read_bytes() == before
+    assert [each.name for each in tmp_path.iterdir()] == ["a.sdrec"]
 
 
 def test_sixteen_channels_at_4_khz_lose_nothing(tmp_path: Path) -> None:
