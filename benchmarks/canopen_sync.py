@@ -17,17 +17,13 @@ from pathlib import Path
 
 import can
 
-sys.path[:0] = [
-    str(Path(__file__).parents[1]),
-    str(Path(__file__).parents[1] / "tests" / "wire" / "canopen"),
-]
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from canopen_small_device import SmallDevice  # noqa: E402
-
-from drivers.canopen.link import CanopenLink  # noqa: E402
-from drivers.link import Address, CyclicSignal, ScopeBlock  # noqa: E402
-from drivers.virtual.wires.can_wire import CanWire, PythonCanSide  # noqa: E402
-from drivers.virtual.wires.canopen import CanopenNode  # noqa: E402
+from drivers.canopen.link import CanopenLink
+from drivers.link import Address, CyclicSignal, ScopeBlock
+from drivers.virtual.wires.can_wire import CanWire, PythonCanSide
+from drivers.virtual.wires.canopen import CanopenNode
+from tests.wire.canopen.small_device import SmallDevice
 
 INPUTS = [
     CyclicSignal(5, Address(0x6041, 0, "UINT16"), "status"),

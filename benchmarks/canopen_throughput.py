@@ -21,18 +21,14 @@ from pathlib import Path
 import can
 import canopen
 
-sys.path[:0] = [
-    str(Path(__file__).parents[1]),
-    str(Path(__file__).parents[1] / "tests" / "wire" / "canopen"),
-]
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from canopen_small_device import SmallDevice  # noqa: E402
-
-from drivers.canopen.link import CanopenLink  # noqa: E402
-from drivers.link import Address  # noqa: E402
-from drivers.virtual.wires.can_wire import CanWire, ClientSide, PythonCanSide  # noqa: E402
-from drivers.virtual.wires.canopen import CanopenNode  # noqa: E402
-from drivers.virtual.wires.slcan import SlcanSide  # noqa: E402
+from drivers.canopen.link import CanopenLink
+from drivers.link import Address
+from drivers.virtual.wires.can_wire import CanWire, ClientSide, PythonCanSide
+from drivers.virtual.wires.canopen import CanopenNode
+from drivers.virtual.wires.slcan import SlcanSide
+from tests.wire.canopen.small_device import SmallDevice
 
 STATUS = Address(0x6041, 0, "UINT16")
 READS = 1000
