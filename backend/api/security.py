@@ -173,7 +173,7 @@ class Gate:
         brought = credentials(scope)
         identity = self._people.identify(brought.cookie, brought.bearer)
         if identity is None and not self._strangers.take():
-            raise TooOften("too many requests of nobody in particular", 1.0)
+            raise TooOften("too many requests without login", 1.0)
         needs = self._policy.needs(method, path)
         if not needs:
             raise self._undeclared(method, path, identity)
@@ -280,7 +280,7 @@ class Gate:
             brought = credentials(scope)
             identity = self._people.identify(brought.cookie, brought.bearer)
             if identity is None and not self._strangers.take():
-                raise TooOften("too many requests of nobody in particular", 1.0)
+                raise TooOften("too many requests without login", 1.0)
             needs = self._policy.needs("WS", scope["path"])
             if not needs:
                 raise NotFound(f"there is nothing at {scope['path']}")

@@ -30,8 +30,8 @@ def test_scan_and_connect(laptop: Page, station: Station) -> None:
     (drive,) = station.ok(station.http.get("/drives"))
     assert drive["name"] == "Gantry"
     # The bench is as it was for the other tests.
-    page.get_by_role("button", name="Take off the bench").click()
-    page.get_by_role("dialog").get_by_role("button", name="Take off the bench").click()
+    page.get_by_role("button", name="Remove axis").click()
+    page.get_by_role("dialog").get_by_role("button", name="Remove axis").click()
     until(lambda: station.ok(station.http.get("/drives")) == [], what="the drive is gone")
 
 

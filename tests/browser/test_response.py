@@ -200,13 +200,13 @@ def test_a_damaged_file_is_refused_in_words(laptop: Page, axis: str, station: St
     file = station.ok(station.http.get("/measurements"))[-1]["file"]
     whole = station.http.get(f"/measurements/{file}/file").content
     with page.expect_file_chooser() as chooser:
-        page.get_by_role("button", name="Take in").click()
+        page.get_by_role("button", name="Import").click()
     chooser.value.set_files(
         {"name": "cut.sdmeas", "mimeType": "application/octet-stream", "buffer": whole[:-900]}
     )
     expect(page.get_by_text("cut.sdmeas is damaged, or no measurement")).to_be_visible()
     with page.expect_file_chooser() as chooser:
-        page.get_by_role("button", name="Take in").click()
+        page.get_by_role("button", name="Import").click()
     chooser.value.set_files(
         {"name": "copy.sdmeas", "mimeType": "application/octet-stream", "buffer": whole}
     )

@@ -106,7 +106,7 @@ def test_place_write_and_take_back_a_notch(page: Page, axis: str, station: Stati
     expect(page.get_by_text("Notches were written.")).to_be_visible()
     assert notches_of(station, axis) == [pytest.approx(RESONANCE_HZ, rel=0.03)]
 
-    page.get_by_role("button", name="Take it back").click()
+    page.get_by_role("button", name="Undo").click()
     expect(page.get_by_text("Notches were written.")).to_have_count(0)
     assert notches_of(station, axis) == []
 
@@ -181,8 +181,8 @@ def test_report(page: Page, axis: str) -> None:
 def test_take_everything_back(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "tune")
     assert notches_of(station, axis) != []
-    expect(page.get_by_role("button", name="Take it back").first).to_be_visible()
-    back = page.get_by_role("button", name="Take it back")
+    expect(page.get_by_role("button", name="Undo").first).to_be_visible()
+    back = page.get_by_role("button", name="Undo")
     for left in (1, 0):
         back.first.click()
         expect(page.get_by_text(re.compile("were written"))).to_have_count(left)

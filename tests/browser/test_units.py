@@ -17,7 +17,7 @@ def test_a_screw_becomes_a_gear_and_is_taken_back(laptop: Page, bench: Bench) ->
     page.get_by_label("Lead").fill("10")
     page.get_by_role("button", name="Calculate").click()
     plan = page.locator("section.panel").filter(
-        has=page.get_by_role("heading", name="What follows")
+        has=page.get_by_role("heading", name="Result")
     )
     expect(plan).to_contain_text("10 mm")
     # Nothing is written yet.
@@ -126,7 +126,7 @@ def test_the_course_of_the_brake_is_drawn(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "setup")
     page.get_by_text("Brake", exact=True).click()
-    picture = page.get_by_role("img", name="Course of the brake")
+    picture = page.get_by_role("img", name="Brake timing")
     # 004:1793, figure 24.
     expect(picture).to_contain_text("50 ms")
 

@@ -52,7 +52,7 @@ describe('what the server says of a job', () => {
       said(zh, 'coherence is low: raise the excitation, or look for backlash and friction'),
     ).toBe('相干性偏低：请增大激励，或检查间隙和摩擦')
     expect(said(zh, 'torque 81 is beyond the limit of 80: the axis is braked and disabled')).toBe(
-      'torque 81 超出限值 80：轴已制动并断开使能',
+      'torque 81 超出限值 80：轴已制动并断使能',
     )
   })
   it('is told as it came in English, and where nobody translated it', () => {

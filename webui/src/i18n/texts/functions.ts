@@ -58,10 +58,7 @@ export const functions = {
   'io.writeAnyway': ['Write anyway', '仍然写入'],
   'io.noFunction': ['The manual names no parameter for the function.', '手册未给出功能参数。'],
   'io.objects': ['As the objects have it', '按对象显示'],
-  'io.stopFirst': [
-    'Functions are changed while the motor is not enabled.',
-    '请在电机未使能时更改功能。',
-  ],
+  'io.stopFirst': ['Disable the axis to change functions.', '请在电机未使能时更改功能。'],
   'io.force.begin': ['Begin', '开始'],
   'io.force.end': ['End and put back', '结束并恢复'],
   'io.force.agree': [
@@ -123,7 +120,7 @@ export const functions = {
     '一个数值，按表设定多个增益。',
   ],
   'blockHelp.inertia': [
-    'Load inertia. Gains in Hz are right only if this is.',
+    'Inertia as this drive defines it (see parameter). Gains in Hz are right only if this value is.',
     '负载惯量。只有惯量正确，以 Hz 表示的增益才正确。',
   ],
   'blockHelp.command_filter': [
@@ -132,7 +129,7 @@ export const functions = {
   ],
   'blockHelp.position': [
     'Higher follows tighter and settles sooner, until it overshoots. At most a third to a fifth of the speed loop.',
-    '越大跟随越紧、整定越快，直至超调。最多为速度环的三分之一到五分之一。',
+    '越大跟随越紧、调节越快，直至超调。最多为速度环的三分之一到五分之一。',
   ],
   'blockHelp.speed_ff': [
     'Tells the speed loop what the command wants before an error builds up.',
@@ -152,7 +149,7 @@ export const functions = {
   ],
   'blockHelp.notch': [
     'Take out narrow resonances. Place them on the Response page, from a measurement.',
-    '消除窄带共振。请在响应页面根据测量设置。',
+    '消除窄带谐振。请在响应页面根据测量设置。',
   ],
   'blockHelp.adaptive': [
     'Lets the drive place notches by itself while the axis moves.',
@@ -166,12 +163,12 @@ export const functions = {
     'Low-pass of the measured speed: less noise, less phase margin.',
     '实测速度的低通：噪声更小，相位裕度也更小。',
   ],
-  'blockHelp.switching': ['Which set of gains holds when.', '何时使用哪一组增益。'],
+  'blockHelp.switching': ['Selects the active gain set.', '何时使用哪一组增益。'],
   'blockHelp.compensation': [
     'Removes known forces: friction, gravity, disturbances.',
     '补偿已知的力：摩擦、重力、扰动。',
   ],
-  'blockHelp.limits': ['Ends of what the loops may ask for.', '各环输出的上限。'],
+  'blockHelp.limits': ['Loop output limits.', '各环输出的上限。'],
 
   'setup.tab.gear': ['Units', '单位'],
   'setup.tab.brake': ['Brake', '抱闸'],
@@ -203,7 +200,7 @@ export const functions = {
   'gear.write': ['Write the gear', '写入齿轮比'],
   'gear.keep': ['Only show travel', '仅用于显示行程'],
   'gear.forget': ['Forget the mechanics', '清除机械数据'],
-  'gear.result': ['What follows', '结果'],
+  'gear.result': ['Result', '结果'],
   'gear.perTurn': ['Travel per motor revolution', '电机每转行程'],
   'gear.increments': ['Increments per motor revolution', '电机每转增量数'],
   'gear.error': ['Rounding of every distance', '距离舍入误差'],
@@ -223,8 +220,8 @@ export const functions = {
   ],
   'gear.written': ['The gear is written.', '齿轮比已写入。'],
   'gear.waits': ['It waits for: {what}', '等待：{what}'],
-  'gear.applyNow': ['Write settings', '应用设置'],
-  'gear.undo': ['Take it back', '撤销'],
+  'gear.applyNow': ['Write settings', '写入设置'],
+  'gear.undo': ['Undo', '撤销'],
   'travel.position': ['Travel', '行程'],
   'travel.velocity': ['Travel speed', '行进速度'],
 
@@ -233,7 +230,7 @@ export const functions = {
     'The profile knows no brake settings of this drive.',
     '配置文件不含此驱动器的抱闸设置。',
   ],
-  'brake.picture': ['Course of the brake', '抱闸时序'],
+  'brake.picture': ['Brake timing', '抱闸时序'],
   'brake.servo': ['servo', '使能'],
   'brake.output': ['brake output', '抱闸输出'],
   'brake.power': ['motor power', '电机通电'],
@@ -313,7 +310,7 @@ export const functions = {
 
   'motion.tab.settings': ['Settings', '设置'],
   'group.stopping': ['Stopping', '停止方式'],
-  'group.modulo': ['Modulo and rotary axis', '模数与旋转轴'],
+  'group.modulo': ['Modulo and rotary axis', '循环（取模）旋转轴'],
   'group.impedance': ['Impedance control', '阻抗控制'],
   'group.inputs': ['Terminals', '端子'],
   'settings.none': ['The profile knows no such settings of this drive.', '配置文件不含此类设置。'],
@@ -323,7 +320,7 @@ export const functions = {
   'watch.find': ['Name, number or key', '名称、编号或键'],
   'watch.empty': [
     'Put parameters here to see their values live. The list is kept on this bench.',
-    '在此添加参数以实时查看数值。列表保存在此工作台。',
+    '在此添加参数以实时查看数值。列表保存在此调试台。',
   ],
   'watch.remove': ['Take {name} off the list', '从列表移除 {name}'],
   'watch.age': ['{time} ago', '{time}前'],

@@ -138,7 +138,7 @@ export const library = {
   'audit.action.taken back': ['taken back', '已恢复'],
   'audit.action.purged': ['deleted for good', '已永久删除'],
   'audit.action.connected': ['connected', '已连接'],
-  'audit.action.taken off the bench': ['taken off the bench', '已从工作台移除'],
+  'audit.action.taken off the bench': ['taken off the bench', '已从调试台移除'],
   'audit.action.made': ['made', '已创建'],
   'audit.action.changed': ['changed', '已更改'],
   'audit.action.logged in': ['in', '已登录'],

@@ -116,19 +116,19 @@ export const saidOfTuning = {
   ],
   'said.pStuckTry': [
     "look for a closed brake, a blocked axis or a torque limit; raise the envelope's torque only if the machine allows it",
-    '请检查制动器是否闭合、轴是否卡住或转矩限值；仅在机器允许时提高转矩限值',
+    '请检查抱闸是否闭合、轴是否卡住或转矩限值；仅在机器允许时提高转矩限值',
   ],
   // What ends a measurement.
   'said.eLeft': ['the drive left Operation enabled', '驱动器退出了“运行使能”'],
   'said.eLook': [
     "see the Alarms page; without an alarm look at the emergency stop, the drive's supply and whoever else may disable it, then measure again",
-    '请查看“报警”页面；若无报警，请检查急停、驱动器供电以及可能断开使能的其他人员，然后重新测量',
+    '请查看“报警”页面；若无报警，请检查急停、驱动器供电以及可能断使能的其他人员，然后重新测量',
   ],
   'said.eLimit': [
     '{name} {value} is beyond the limit of {limit}',
     '{name} {value} 超出限值 {limit}',
   ],
-  'said.eBraked': ['the axis is braked and disabled', '轴已制动并断开使能'],
+  'said.eBraked': ['the axis is braked and disabled', '轴已制动并断使能'],
   'said.eBrakedOnly': ['the axis is braked', '轴已制动'],
   'said.eRenewed': ['the setpoints were not renewed in time', '设定值未及时更新'],
   'said.eInvalid': [
@@ -270,7 +270,7 @@ export const saidOfTuning = {
   ],
   'said.tWasGain': [
     'gain margin of {have} dB where {want} dB was predicted',
-    '幅值裕度 {have} dB，预测为 {want} dB',
+    '增益裕度 {have} dB，预测为 {want} dB',
   ],
   'said.tAgainSame': [
     'the design keeps all goals for the axis as its loop shows it, too',
@@ -312,7 +312,7 @@ export const saidOfTuning = {
   'said.tPm': ['phase margin {pm}° instead of {promised}°', '相位裕度 {pm}°，应为 {promised}°'],
   'said.tGm': [
     'gain margin {gm} dB instead of {promised} dB',
-    '幅值裕度 {gm} dB，应为 {promised} dB',
+    '增益裕度 {gm} dB，应为 {promised} dB',
   ],
   'said.tFewLines': [
     'too few lines of the tuned loop could be measured, and its step overshoots',
@@ -444,7 +444,7 @@ export const saidOfTuning = {
   'said.nWithout': ['trying without a notch', '不带陷波器测试'],
   'said.nStiff': [
     'its speed loop is so stiff that a notch might make it swing while what it does is measured',
-    '其速度环刚度过高，测量陷波器作用时可能引起振荡',
+    '其速度环增益过高，测量陷波器作用时可能引起振荡',
   ],
   'said.nStiffTry': ['lower the speed gain, and tune again', '请降低速度增益后重新整定'],
   'said.nLevelsYet': [
@@ -473,7 +473,7 @@ export const saidOfTuning = {
     '请启用驱动器的行程限位，手放在急停上，并同意此次测量',
   ],
   'said.uEnabled': ['{axis} is enabled', '{axis} 处于使能状态'],
-  'said.uEnabledTry': ['disable it before the measurement', '测量前请断开使能'],
+  'said.uEnabledTry': ['disable it before the measurement', '测量前请断使能'],
   // Steps.
   'said.kBigTry': ['take a smaller step or a wider envelope', '请减小阶跃或放宽限值'],
 } as const satisfies Texts

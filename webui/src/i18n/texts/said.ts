@@ -50,7 +50,7 @@ export const saidTexts = {
   ],
   'said.onceMore': ['once more, since samples were lost', '因丢失采样，重新测量一次'],
   'said.preparing': ['preparing', '准备中'],
-  'said.searching': ['searching home', '正在寻找零点'],
+  'said.searching': ['searching home', '正在寻找原点'],
   'said.end': ['looking for an end at limited torque', '以限定转矩寻找行程端点'],
   'said.first': ['a first short move', '首次短距离移动'],
   'said.goingBack': ['going back and evaluating', '正在返回并计算'],

@@ -3,13 +3,13 @@ import type { Texts } from '../types'
 /** The bench in 3D. */
 export const scene = {
   'page.scene': ['3D', '三维'],
-  'scene.frame': ['The bench in 3D', '三维台架'],
+  'scene.frame': ['The bench in 3D', '三维调试台'],
   'scene.help': [
     'Parts move with the measured positions. Red posts are the software limits of the drive, the blue one is position zero. Drag to turn, wheel or two fingers to zoom. A track without limits grows as far as the axis was seen; its length has no scale.',
     '部件随实测位置运动。红柱为驱动器软件限位，蓝柱为零位。拖动可旋转，滚轮或双指可缩放。无限位的导轨按轴到达过的范围伸长，长度不按比例。',
   ],
   'scene.none': ['No axis is connected yet.', '尚未连接任何轴。'],
-  'scene.shaft': ['a bare shaft', '空轴'],
+  'scene.shaft': ['a bare shaft', '裸轴（无负载）'],
   'scene.screw': ['a screw', '丝杠'],
   'scene.belt': ['a belt', '同步带'],
   'scene.rack': ['a rack', '齿条'],
@@ -19,7 +19,7 @@ export const scene = {
   'scene.keep': ['Keep', '保存'],
   'scene.keepHelp': [
     'Kept with the bench and shown here; nothing is written to the drive.',
-    '随台架保存并在此显示；不写入驱动器。',
+    '随调试台保存并在此显示；不写入驱动器。',
   ],
   'scene.gear': ['Electronic gear of the drive', '驱动器的电子齿轮'],
   'scene.limits': ['Limits and home, in the drive', '驱动器中的限位与原点'],

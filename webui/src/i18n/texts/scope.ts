@@ -37,7 +37,7 @@ export const scope = {
   'trigger.low': ['From', '下限'],
   'trigger.high': ['To', '上限'],
   'trigger.bit': ['Bit', '位'],
-  'trigger.persistence': ['Keep in sight', '余辉'],
+  'trigger.persistence': ['Persistence', '余辉'],
   'trigger.none': ['the newest', '仅最新'],
   'trigger.sweeps': ['{count} earlier', '之前 {count} 次'],
   'trigger.arm': ['Arm', '启动触发'],

@@ -53,7 +53,7 @@ export const segment = {
   'segment.lostLinks': ['Link lost', '断开次数'],
   'segment.rxErrors': ['RX errors', '接收错误'],
   'segment.invalidFrames': ['Damaged frames', '损坏帧'],
-  'segment.forwarded': ['Damaged before', '上游损坏'],
+  'segment.forwarded': ['Forwarded RX errors', '上游损坏'],
   'segment.writeAlias': ['Write alias', '写入别名'],
   'segment.aliasWarning': [
     'Written to the drive’s EEPROM, valid after its supply was switched off and on. Machines whose controller addresses drives by alias must be told. Nothing may move on this bus meanwhile.',
@@ -83,11 +83,11 @@ export const segment = {
   'segment.command': ['In a terminal:', '在终端执行：'],
   'segment.commandsWhy': [
     'EtherCAT needs raw frames. Restart servodeck afterwards. The virtual bench needs none of this.',
-    'EtherCAT 需要原始帧权限。执行后请重启 servodeck。虚拟台架无需这些权限。',
+    'EtherCAT 需要原始帧权限。执行后请重启 servodeck。虚拟调试台无需这些权限。',
   ],
   'segment.recovering': [
     'The exchange broke off and is being set up again by itself; every axis stays disabled until you enable it. Reason:',
-    '周期通信中断，正在自动恢复；恢复后所有轴保持禁用，需手动使能。原因：',
+    '周期通信中断，正在自动恢复；恢复后所有轴保持断使能，需手动使能。原因：',
   ],
   'segment.endRecovery': ['Do not set it up again', '不再恢复'],
 } satisfies Texts

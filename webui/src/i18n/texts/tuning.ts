@@ -10,7 +10,7 @@ export const tuning = {
   ],
   'sweep.title': ['Measure', '测量'],
   'sweep.what': ['What to measure', '测量对象'],
-  'sweep.kind.mechanics': ['Mechanics', '机械'],
+  'sweep.kind.mechanics': ['Mechanics', '机械特性'],
   'sweep.kind.speed_loop': ['Speed loop', '速度环'],
   'sweep.kind.position_loop': ['Position loop', '位置环'],
   'sweep.help.mechanics': [
@@ -43,7 +43,7 @@ export const tuning = {
   ],
   'sweep.excitation.help.chirp': [
     'A tone that glides upwards: you hear where the machine resonates.',
-    '频率逐渐升高的单音：可以听出机器在何处共振。',
+    '频率逐渐升高的单音：可以听出机器在何处谐振。',
   ],
   'sweep.excitation.help.prbs': [
     'Full torque, switched to and fro at random: the most energy, but also the roughest for the mechanics.',
@@ -62,12 +62,12 @@ export const tuning = {
     '测量时缓慢往复运动，以克服静摩擦',
   ],
   'sweep.moves': [
-    'The axis is enabled and shaken with about {part} % of rated torque, at most {torque} %. It stays within ±{travel} rev of where it stands and below {speed} rpm, returns to its place, and is disabled. Nobody may be near it.',
-    '轴将使能并以约 {part}%（最大 {torque}%）额定转矩激振，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并去使能。请确保无人靠近。',
+    'The axis is enabled and shaken with about {part} % of rated torque, at most {torque} %. It stays within ±{travel} rev of where it stands and below {speed} rpm, returns to its place, and is disabled. Keep everyone clear of the machine.',
+    '轴将使能并以约 {part}%（最大 {torque}%）额定转矩激振，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并断使能。请确保无人靠近。',
   ],
   'sweep.movesLoop': [
-    'The axis is enabled and follows a small, fast changing command, with at most {torque} % of rated torque. It stays within ±{travel} rev of where it stands and below {speed} rpm, returns to its place, and is disabled. Nobody may be near it.',
-    '轴将使能并跟随快速变化的小幅指令，最大 {torque}% 额定转矩，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并去使能。请确保无人靠近。',
+    'The axis is enabled and follows a small, fast changing command, with at most {torque} % of rated torque. It stays within ±{travel} rev of where it stands and below {speed} rpm, returns to its place, and is disabled. Keep everyone clear of the machine.',
+    '轴将使能并跟随快速变化的小幅指令，最大 {torque}% 额定转矩，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并断使能。请确保无人靠近。',
   ],
   'excite.title': ['Preview of the excitation', '激励预览'],
   'excite.one': ['first realisation', '第一次激励'],
@@ -118,7 +118,7 @@ export const tuning = {
   'margin.crossover': ['Crossover', '穿越频率'],
   'margin.phase': ['Phase margin', '相位裕度'],
   'margin.gain': ['Gain margin', '增益裕度'],
-  'margin.ms': ['Greatest sensitivity Ms', '最大灵敏度 Ms'],
+  'margin.ms': ['Peak sensitivity Ms', '最大灵敏度 Ms'],
   'margin.at': ['at {frequency}', '于 {frequency}'],
   'margin.unstable': ['This loop is not stable.', '该环路不稳定。'],
   'margin.before': ['(before: {value})', '（之前：{value}）'],
@@ -230,12 +230,12 @@ export const tuning = {
   'measured.otherKind': ['Only responses of the same kind can be compared.', '只能对比同类响应。'],
   'measured.title': ['Stored responses', '已存储的响应'],
   'measured.none': ['None yet.', '尚无。'],
-  'measured.sweep-mechanics': ['Mechanics', '机械'],
+  'measured.sweep-mechanics': ['Mechanics', '机械特性'],
   'measured.sweep-speed_loop': ['Speed loop', '速度环'],
   'measured.sweep-position_loop': ['Position loop', '位置环'],
   'measured.show': ['Show', '显示'],
   'measured.compare': ['Compare', '对比'],
-  'measured.upload': ['Take in', '导入'],
+  'measured.upload': ['Import', '导入'],
   'measured.download': ['Download {file} with its raw signals', '下载 {file}（含原始信号）'],
   'measured.delete': ['Delete {file}', '删除 {file}'],
   'measured.deleteTitle': ['Delete this measurement?', '删除此测量？'],
@@ -268,7 +268,7 @@ export const tuning = {
   'notch.read': ['Read them again', '重新读取'],
   'notch.confirm': [
     'All notches of the drive are written and made to act. The axis must be disabled. They are lost at power-off until the parameters are saved in the drive.',
-    '将写入驱动器的全部陷波并使其生效。轴必须去使能。未保存到驱动器前，断电会丢失。',
+    '将写入驱动器的全部陷波并使其生效。轴必须断使能。未保存到驱动器前，断电会丢失。',
   ],
   'notch.writeNow': ['Write', '写入'],
   'owed.title': [
@@ -292,8 +292,8 @@ export const tuning = {
   'undo.gains': ['Gains were written.', '已写入增益。'],
   'undo.candidate': ['A set of gains and notches was written.', '已写入一组增益和陷波。'],
   'undo.undo': ['A change was taken back.', '已撤销更改。'],
-  'undo.button': ['Take it back', '撤销'],
-  'undo.all': ['Take it back all the same', '仍然撤销'],
+  'undo.button': ['Undo', '撤销'],
+  'undo.all': ['Undo all the same', '仍然撤销'],
   'undo.what': ['Values from before ({count})', '之前的值（{count}）'],
   'gain.speed': ['Speed loop', '速度环'],
   'gain.integral': ['Integral corner', '积分转折频率'],
@@ -323,7 +323,7 @@ export const tuning = {
   'tune.no.faults': ['Remove the cause and reset the fault:', '请排除原因并复位故障：'],
   'tune.ok.idle': ['Nothing else moves the axis.', '没有其他任务移动此轴。'],
   'tune.no.idle': ['Something moves the axis now.', '轴正被其他任务移动。'],
-  'tune.ok.pending': ['All written parameters act.', '所有已写参数均已生效。'],
+  'tune.ok.pending': ['No change is pending.', '所有已写参数均已生效。'],
   'tune.no.pending': [
     'Parameters wait to take effect; write the settings or restart the drive. Number:',
     '有参数等待生效；请写入设置或重启驱动器。数量：',
@@ -341,7 +341,7 @@ export const tuning = {
   'tune.limits': ['Limits of every movement', '所有运动的限制'],
   'tune.limitsHelp': [
     'Travel counts from where the axis stands. Whatever leaves the limits ends the measurement and disables the axis.',
-    '行程从当前位置计算。超出限制即结束测量并去使能。',
+    '行程从当前位置计算。超出限制即结束测量并断使能。',
   ],
   'tune.free': [
     'Look at the machine: can the axis travel this far in both directions, and is nobody within reach?',
@@ -405,7 +405,7 @@ export const tuning = {
   'inertia.quantity': ['Quantity', '量'],
   'inertia.value': ['Value (95 % confidence)', '值（95% 置信区间）'],
   'inertia.inertia': ['Inertia of motor and load', '电机与负载惯量'],
-  'inertia.ratio': ['Load ratio', '惯量比'],
+  'inertia.ratio': ['Inertia ratio', '惯量比'],
   'inertia.coulomb': ['Coulomb friction', '库仑摩擦'],
   'inertia.viscous': ['Viscous friction', '粘性摩擦'],
   'inertia.gravity': ['Gravity', '重力'],
@@ -461,7 +461,7 @@ export const tuning = {
   'candidate.marked': ['Show the marked designs only', '仅显示推荐方案'],
   'candidate.mark': ['Choice', '选择'],
   'candidate.apply': ['Apply', '应用'],
-  'candidate.settling': ['Settling', '调整时间'],
+  'candidate.settling': ['Settling', '调节时间'],
   'candidate.overshoot': ['Overshoot', '超调'],
   'candidate.cost': ['Phase lost to notches', '陷波相位损失'],
   'candidate.written': [
@@ -483,8 +483,8 @@ export const tuning = {
   ],
   'autotune.title': ['Tune automatically', '自动整定'],
   'autotune.help': [
-    'Measures inertia and response, computes notches and gains, writes them, and measures again. What does not keep its promise is taken back. Every step can be cancelled; the drive is then as before.',
-    '测量惯量和响应，计算陷波和增益，写入后再次测量。不符合承诺的会被撤销。每一步都可取消，取消后驱动器恢复原状。',
+    'Measures inertia and response, computes notches and gains, writes them, and measures again. Settings that miss the predicted margins are restored. Every step can be cancelled; the drive is then as before.',
+    '测量惯量和响应，计算陷波和增益，写入后再次测量。不符合预测指标的会被撤销。每一步都可取消，取消后驱动器恢复原状。',
   ],
   'autotune.motorHelp': [
     'needed where the drive counts its load in multiples of the motor and does not tell the motor: from the data sheet',
@@ -496,7 +496,7 @@ export const tuning = {
   ],
   'autotune.apply': ['Write and verify the result', '写入并验证结果'],
   'autotune.moves': [
-    'The axis is enabled and moves several times for about a minute: forth and back, shaken, and stepped, within ±{travel} rev, {speed} rpm and {torque} % of rated torque. Nobody may be near it.',
+    'The axis is enabled and moves several times for about a minute: forth and back, shaken, and stepped, within ±{travel} rev, {speed} rpm and {torque} % of rated torque. Keep everyone clear of the machine.',
     '轴将使能并运动多次，约一分钟：往复、激振和阶跃，限制在 ±{travel} 转、{speed} rpm、{torque}% 额定转矩内。请确保无人靠近。',
   ],
   'autotune.start': ['Start tuning', '开始整定'],
@@ -525,7 +525,7 @@ export const tuning = {
   ],
   'autotune.tried': [
     'Tried before, and taken back because the measurement did not keep the promise:',
-    '之前尝试过，但测量不符合承诺，已撤销：',
+    '之前尝试过，但测量不符合预测指标，已撤销：',
   ],
   'autotune.verification': ['Verification', '验证'],
   'autotune.predicted': ['predicted', '预测'],
