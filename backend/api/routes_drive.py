@@ -37,6 +37,7 @@ from backend.api.models_sets import LoadSetRequest
 from backend.bench import Bench
 from backend.jobs import JobResult, Progress
 from backend.member import Member
+from backend.motion.classes import held_still, motion_of
 from backend.readings import Reading
 from backend.tools import cyclic_motion, homing, move, parameters, procedures
 from drivers.cia402 import Mode, State
@@ -194,9 +195,11 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
     parameter = drive.parameter(key)
     old = drive.readings.get(parameter.key)
     value, raw = (request.value, False) if request.raw is None else (request.raw, True)
-    matters = drive.matters_to_motion(parameter.key)
-    with bench.motion.keeping_still(member) if matters else contextlib.nullcontext():
-        if drive.commands_motion(parameter.key):
+    matters = drive.matters_to_motion(parameter.key) or held_still(parameter)
+    # What energises is refused whatever moves; the rest waits until nothing does.
+    still = matters and motion_of(parameter) != "energises"
+    with bench.motion.keeping_still(member) if still else contextlib.nullcontext():
+        if still and drive.commands_motion(parameter.key):
             await _require_disabled(member, parameter.key)
         reading = await drive.write(key, 0 if value is None else value, raw=raw)
     bench.journal.add(
