@@ -524,6 +524,11 @@ class Profile(Frozen):
         """Parameters by key."""
         return {p.key: p for p in self.parameters}
 
+    @property
+    def from_description(self) -> bool:
+        """Made from a maker's file or a drive's own dictionary, not from a numbered manual."""
+        return not (self.manual.isdigit() or self.manual == "CiA")
+
     @cached_property
     def unit_keys(self) -> frozenset[str]:
         """Parameters that change what a position increment or another motion unit is."""
