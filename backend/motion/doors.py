@@ -8,14 +8,14 @@ from typing import Literal
 from backend.motion.grant import NotGranted
 from profiles.schema import Parameter, Profile
 
-Page = Literal["motion", "io", "parameters"]
+Page = Literal["", "motion", "io", "parameters"]
 
 _DRIVE = "/api/v1/drives/{drive_id}"
 
 
 @dataclass(frozen=True, slots=True)
 class Door:
-    """``page`` is the page's name, ``route`` the one for scripts, ``how`` what to do there."""
+    """``page`` is the page's name, empty where only a script can, ``route`` the one for scripts, ``how`` what to do there."""
 
     page: Page
     route: str
@@ -35,8 +35,13 @@ _MOVE = Door(
 _FORCE = Door("io", f"POST {_DRIVE}/io/forcing/{{name}}", "overrule terminals on the I/O page")
 _ASSIGN = Door(
     "io",
-    f"PUT {_DRIVE}/io/terminals/{{name}}",
+    f"PUT {_DRIVE}/motion-settings/{{key}}",
     "choose what a terminal does on the I/O page, with the axis disabled",
+)
+_SET = Door(
+    "",
+    f"PUT {_DRIVE}/motion-settings/{{key}}",
+    "somebody with the right to move sets it, with the axis disabled",
 )
 #: Roles that are the power state; every other role that energises is a set-point.
 _POWER_ROLES = frozenset({"control_word", "mode"})
@@ -48,7 +53,9 @@ def door_of(profile: Profile, parameter: Parameter) -> Door:
     for signal in profile.signals:
         if signal.key == key:
             return _POWER if signal.role in _POWER_ROLES else _MOVE
-    if any(key == terminal.function_key for terminal in profile.terminals):
+    if any(key in (each.function_key, each.polarity_key) for each in profile.terminals):
+        return _ASSIGN
+    if any(key == place.key for place in profile.functions.terminals.polarities):
         return _ASSIGN
     for forcing in profile.functions.terminals.forcing:
         if key in {place.key for place in (forcing.enable, forcing.value) if place is not None}:
@@ -60,7 +67,7 @@ def door_of(profile: Profile, parameter: Parameter) -> Door:
                 f"POST {_DRIVE}/procedures/{procedure.name}",
                 f"run the procedure “{procedure.title}”",
             )
-    return _MOVE
+    return _SET
 
 
 def refused(drive: str, profile: Profile, parameter: Parameter) -> NotGranted:
