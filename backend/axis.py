@@ -31,6 +31,8 @@ from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError
 from profiles.schema import Raw
 
+__all__ = ["Axis", "Envelope"]
+
 
 class Axis(PowerState):
     """Power state and motion permission of one drive."""
@@ -115,7 +117,7 @@ class Axis(PowerState):
             lasts_s = math.inf if self.enabled_by is not None else UNATTENDED_S
             drive = self.drive
             self._standing = drive.authority.standing(
-                drive.id, drive.name, "left enabled", lasts_s=lasts_s, ended=self.unattended
+                drive.id, "left enabled", lasts_s=lasts_s, ended=self.unattended
             )
         elif self._standing is not None:
             self.drive.authority.end(self._standing)

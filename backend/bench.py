@@ -151,7 +151,9 @@ class Bench:
             url, station, [m.drive.name for m in self.members.values()]
         )
         drive_id = new_id(name or f"{profile}-{station}", self.members)
-        drive = Drive(drive_id, name or drive_id, facts, [Port(link, station, spec)], self.authority)
+        drive = Drive(
+            drive_id, name or drive_id, facts, [Port(link, station, spec)], self.authority
+        )
         drive.found = found
         return self._add(drive)
 

@@ -36,7 +36,6 @@ from drivers.errors import (
 from drivers.link import Found, LinkQuality
 from profiles.schema import Parameter, Profile, Raw
 
-
 #: States in which the motor has power (CiA 402-2 table 28).
 _POWERED = frozenset({
     cia402.State.OPERATION_ENABLED, cia402.State.QUICK_STOP_ACTIVE, cia402.State.FAULT_REACTION,

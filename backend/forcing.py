@@ -193,7 +193,6 @@ class ForcingSession:
                 remedy="perhaps process data of the running exchange hold this object; end it",
             )
 
-
     async def _sent(self, key: str, raw: int) -> Reading:
         if self.grant is None:
             raise RuntimeError("terminals are overruled only in a session that runs")

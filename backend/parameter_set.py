@@ -26,7 +26,9 @@ VERSION = 1
 SUFFIX = ".sdset"
 MAX_BYTES = 4_000_000
 
-Status = Literal["differs", "same", "not_in_drive", "not_in_file", "invalid", "read_only", "energises"]
+Status = Literal[
+    "differs", "same", "not_in_drive", "not_in_file", "invalid", "read_only", "energises"
+]
 
 
 class BadSet(NotAllowed):
@@ -269,8 +271,8 @@ def _difference(
     if row.raw == now:
         return Difference(parameter, row.key, row.raw, now, "same")
     if motion_of(parameter) == "energises":
-        why = refused(drive.name, drive.profile, parameter)
-        problem = f"{why.message}; {why.remedy}"
+        no = refused(drive.name, drive.profile, parameter)
+        problem = f"{no.message}; {no.remedy}"
         return Difference(parameter, row.key, row.raw, now, "energises", problem)
     return Difference(
         parameter, row.key, row.raw, now, "differs", selected=not parameter.motor_individual

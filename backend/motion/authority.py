@@ -148,7 +148,7 @@ class MotionAuthority:
             _held.set(tuple(each for each in _held.get() if each is not grant))
             self.end(grant)
 
-    def standing(self, drive: str, name: str, purpose: str, *, lasts_s: float, ended: Ended) -> Grant:
+    def standing(self, drive: str, purpose: str, *, lasts_s: float, ended: Ended) -> Grant:
         """A grant for an axis that is left enabled, until `end`; it takes the place of an older."""
         for record in list(self._records.get(drive, ())):
             if record.grant.standing:

@@ -15,7 +15,8 @@ _DRIVE = "/api/v1/drives/{drive_id}"
 
 @dataclass(frozen=True, slots=True)
 class Door:
-    """``page`` is the page's name, empty where only a script can, ``route`` the one for scripts, ``how`` what to do there."""
+    """``page`` is the page's name, empty where only a script can do it with ``route``; ``how`` says
+    what to do there."""
 
     page: Page
     route: str

@@ -50,9 +50,7 @@ async def lower(session: CyclicSession, drive: Drive, goal: State) -> None:
     await _owner(session, drive).drive_to(session.station(drive), goal)
 
 
-async def play(
-    session: CyclicSession, drive: Drive, trajectory: Trajectory, grant: Grant
-) -> int:
+async def play(session: CyclicSession, drive: Drive, trajectory: Trajectory, grant: Grant) -> int:
     """Give the loop set-points to play; see `drivers.link.Cyclic.play`.
 
     Raises:
