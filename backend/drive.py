@@ -340,8 +340,9 @@ class Drive:
             Rejected: the drive refused.
             LinkTimeout: the outcome is unknown, and reading back failed as well.
         """
+        self._refuse_energising(key, value)
         parameter, value = self._to_be_written(key, value, raw=raw)
-        await self._require_harmless(parameter, value)
+        await self._require_harmless(parameter)
         return await self._written(parameter, value)
 
     async def energise(self, key: str, raw: Raw, grant: Grant) -> Reading:
@@ -387,17 +388,22 @@ class Drive:
                 ) from error
         return parameter, self.check(parameter, value)
 
-    async def _require_harmless(self, parameter: Parameter, value: Raw) -> None:
-        """Writing it moves nothing, now or with the power that the motor has.
+    def _refuse_energising(self, key: str, value: Raw) -> None:
+        """Raises NotGranted where this object can put energy into the motor, whatever the value."""
+        parameter = self.parameter(key)
+        if motion_of(parameter) != "energises":
+            return
+        self.port_for(parameter)
+        error = refused(self.name, self.profile, parameter)
+        self.listeners.refused(Refusal(self.id, self.name, parameter.key, value, error.message))
+        raise error
+
+    async def _require_harmless(self, parameter: Parameter) -> None:
+        """Writing it changes no motion that goes on, and nothing of an axis with power.
 
         Raises:
-            NotGranted: it can put energy into the motor.
             NotAllowed: the axis is enabled or moved, and a motion relies on it.
         """
-        if motion_of(parameter) == "energises":
-            error = refused(self.name, self.profile, parameter)
-            self.listeners.refused(Refusal(self.id, self.name, parameter.key, value, error.message))
-            raise error
         if not held_still(parameter):
             return
         if self.authority.held(self.id) is not None:
@@ -508,8 +514,9 @@ class Drive:
             NotGranted: it can put energy into the motor.
             DriveError: as `write`.
         """
+        self._refuse_energising(key, raw)
         parameter = self.parameter(key)
-        await self._require_harmless(parameter, raw)
+        await self._require_harmless(parameter)
         await self._sent(parameter, raw)
 
     async def _sent(self, parameter: Parameter, raw: int) -> None:
@@ -560,7 +567,13 @@ class Drive:
         status = self.key("status_word")
         if status is None:
             return
-        if self.decode_state(await self.raw(status)) in _POWERED:
+        try:
+            state = self.decode_state(await self.raw(status))
+        except DriveError as error:
+            # What was wanted is what the person knows of.
+            error.parameter = parameter.key
+            raise
+        if state in _POWERED:
             raise NotAllowed(
                 f"{self.name}: {parameter.key} {parameter.name} can be set only while the motor "
                 "is not enabled",

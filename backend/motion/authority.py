@@ -60,8 +60,11 @@ class MotionAuthority:
         return (whole or live)[-1] if live else None
 
     def mover_of(self, drive: str) -> Grant | None:
-        """The live grant of work that is going on; an axis that is only left enabled has none."""
-        live = [grant for grant in self._live(drive) if not grant.standing]
+        """The live grant of a motion that goes on.
+
+        An axis that is only left enabled has none, nor one of which terminals are overruled.
+        """
+        live = [g for g in self._live(drive) if not g.standing and g.keys is None]
         return live[-1] if live else None
 
     def held(self, drive: str, key: str | None = None) -> Grant | None:
