@@ -8,46 +8,30 @@ what it could not restore.
 from __future__ import annotations
 
 import asyncio
+import math
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
-from dataclasses import dataclass
 
 from backend import restoring
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
+from backend.motion.authority import UNATTENDED_S
+from backend.motion.envelope import Envelope
+from backend.motion.grant import Grant
 from backend.optional import existing, torque_limits
 from backend.people.identity import acting
 from backend.power import PowerState
 from backend.quick_stop import quick_stop_keys, raise_quick_stop
 from backend.readings import Reading
 from backend.restoring import CLEANUP_TIMEOUT_S, shielded
-from backend.travel_units import TravelUnit
 from backend.units import AxisUnits, read_units
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError
 from profiles.schema import Raw
 
-
-@dataclass(frozen=True, slots=True)
-class Envelope:
-    """Limits of one motion, in the axis' units: travel from the start point in rev, rpm, %, s.
-
-    ``travel_unit`` and ``travel_per_rev`` are the unit of who asked, for what is told to them.
-    """
-
-    travel_rev: float
-    speed_rpm: float
-    torque_percent: float
-    time_s: float
-    travel_unit: str = "rev"
-    travel_per_rev: float = 1.0
-
-    @property
-    def shown(self) -> TravelUnit:
-        """The unit for messages."""
-        return TravelUnit(self.travel_unit, self.travel_per_rev)
+__all__ = ["Axis", "Envelope"]
 
 
 class Axis(PowerState):
@@ -61,6 +45,9 @@ class Axis(PowerState):
         self._left_enabled = False
         #: The page by which that was done; None where it was no page.
         self.enabled_by: str | None = None
+        self._standing: Grant | None = None
+        #: Told why, when nobody may leave the axis enabled any longer; power is to be taken off.
+        self.unattended: Callable[[str], None] = lambda _why: None
         drive.listeners.add(self._units_may_have_changed)
 
     async def units(self) -> AxisUnits:
@@ -108,18 +95,33 @@ class Axis(PowerState):
         await self.require_stop_delivered()
         # In a running exchange the loop keeps the set-points where the axis stands.
         aims = self.cyclic_power() is None
-        if mode is not None:
-            if aims:
-                # An axis that is enabled already would follow a stale set-point of the new mode.
-                await self.aim_here(mode)
-            await self.set_mode(mode)
-        if goal is State.OPERATION_ENABLED and aims:
-            await self.aim_here()
-        # Noted before the word goes out: whatever happens on the way, it may be enabled then.
-        self._left_enabled = goal is State.OPERATION_ENABLED
+        with self.granted(f"to “{goal.value}”"):
+            if mode is not None:
+                if aims:
+                    # One that is enabled already would follow a stale set-point of the new mode.
+                    await self.aim_here(mode)
+                await self.set_mode(mode)
+            if goal is State.OPERATION_ENABLED and aims:
+                await self.aim_here()
+            # Noted before the word goes out: whatever happens on the way, it may be enabled then.
+            self._leave_enabled(goal is State.OPERATION_ENABLED)
+            await self.go_to(goal)
+
+    def _leave_enabled(self, enabled: bool) -> None:
+        """A person leaves the axis enabled from here on, or does so no longer."""
         actor = acting.get()
-        self.enabled_by = actor.connection if self._left_enabled and actor is not None else None
-        await self.go_to(goal)
+        self._left_enabled = enabled
+        self.enabled_by = actor.connection if enabled and actor is not None else None
+        if enabled:
+            # A page is watched, and its end takes the power off; a script has no sign of life.
+            lasts_s = math.inf if self.enabled_by is not None else UNATTENDED_S
+            drive = self.drive
+            self._standing = drive.authority.standing(
+                drive.id, "left enabled", lasts_s=lasts_s, ended=self.unattended
+            )
+        elif self._standing is not None:
+            self.drive.authority.end(self._standing)
+            self._standing = None
 
     async def let_go(self) -> None:
         """Take the power off an axis that a person enabled here and left enabled.
@@ -131,7 +133,7 @@ class Axis(PowerState):
         """
         if not self._left_enabled:
             return
-        self._left_enabled, self.enabled_by = False, None
+        self._leave_enabled(False)
         if await self.state() is State.OPERATION_ENABLED:
             await shielded(self._power_off, CLEANUP_TIMEOUT_S, self.drive.name)
 
@@ -206,6 +208,13 @@ class Axis(PowerState):
                 drive=drive.name,
                 remedy="end the cyclic exchange, or use CSP, CSV or CST",
             )
+        with self.granted(cia402.MODE_NAMES[mode], envelope):
+            async with self._enabled(mode, envelope):
+                yield
+
+    @asynccontextmanager
+    async def _enabled(self, mode: Mode, envelope: Envelope) -> AsyncIterator[None]:
+        drive = self.drive
         await self.require_stop_delivered()
         before = await self.state()
         if before is State.OPERATION_ENABLED and not await self.standstill(0.5):
@@ -252,15 +261,16 @@ class Axis(PowerState):
             NotAllowed: it cannot be enabled, the loop ended the motion, or the drive has a fault
                 at its end. Where the drive has a fault, the message names it.
         """
-        try:
-            await self.go_to_cyclic(session, State.OPERATION_ENABLED, mode, timeout_s)
-            yield
-        except NotAllowed as error:
-            await self._name_fault(error)
-            raise
-        finally:
-            await self.leave_cyclic(session, timeout_s)
-        await self._require_sound()
+        with self.granted(cia402.MODE_NAMES[mode]):
+            try:
+                await self.go_to_cyclic(session, State.OPERATION_ENABLED, mode, timeout_s)
+                yield
+            except NotAllowed as error:
+                await self._name_fault(error)
+                raise
+            finally:
+                await self.leave_cyclic(session, timeout_s)
+            await self._require_sound()
 
     async def _require_sound(self) -> None:
         """A fault after the last look at the motion must not pass for a motion that went well."""
@@ -351,7 +361,7 @@ class Axis(PowerState):
             Mode.CST: ("torque_target", 0),
         }.get(mode, ("", 0))
         if role and (key := drive.key(role)) is not None:
-            await drive.command(key, value)
+            await drive.command(key, value, self.grant(key))
 
     async def _leave(self, before: State, mode: Mode, previous: Mode) -> None:
         """To rest, and to the power state of before; after STOP, to Switch on disabled."""

@@ -7,6 +7,7 @@ import contextlib
 import logging
 from collections.abc import Awaitable, Callable, Collection, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from backend.access import Leases
@@ -26,7 +27,8 @@ from backend.matching import profile_for
 from backend.measurements import MeasurementStore
 from backend.member import Member
 from backend.monitor import Monitor, Snapshot
-from backend.motion import Motion
+from backend.motion.authority import MotionAuthority
+from backend.motion.axes import Motion
 from backend.naming import PlaceNames, new_id
 from backend.owed_store import OwedStore
 from backend.ports import Port
@@ -70,7 +72,9 @@ class Bench:
         self.on_job: list[Callable[[Job], None]] = []
         self.on_drives: list[Callable[[], None]] = []
         self.motion = Motion(self)
-        self.jobs = JobRunner(self._job_changed, self.motion.permit)
+        #: Who may move which axis now; every drive of the bench asks here.
+        self.authority = MotionAuthority()
+        self.jobs = JobRunner(self._job_changed, self.motion.permit, self.motion.granted)
         #: Bus and station of drives that left the bench and never took their stop.
         self._unstopped: set[tuple[str, int]] = set()
         self.exchanges = Exchanges(self)
@@ -147,7 +151,9 @@ class Bench:
             url, station, [m.drive.name for m in self.members.values()]
         )
         drive_id = new_id(name or f"{profile}-{station}", self.members)
-        drive = Drive(drive_id, name or drive_id, facts, [Port(link, station, spec)])
+        drive = Drive(
+            drive_id, name or drive_id, facts, [Port(link, station, spec)], self.authority
+        )
         drive.found = found
         return self._add(drive)
 
@@ -205,6 +211,7 @@ class Bench:
         axis = Axis(drive)
         places = {(self.buses.url_of(port), port.station) for port in drive.ports}
         axis.owes_stop = bool(places & self._unstopped)
+        axis.unattended = partial(self.motion.unattended, drive.id)
         self._unstopped -= places
         drive_id = drive.id
         monitor = Monitor(
@@ -218,6 +225,7 @@ class Bench:
         drive.listeners.add(lambda readings: self._readings(drive_id, readings))
         drive.listeners.add_writes(self.witness.wrote)
         drive.listeners.add_commands(self.witness.commanded)
+        drive.listeners.add_refusals(self.witness.refused)
         drive.owed.listen(self.drives_changed)
         self.returning.begin(axis)
         monitor.start()

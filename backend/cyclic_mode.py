@@ -15,6 +15,7 @@ from backend.axis import Axis
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.drive_identity import confirm_identity
+from backend.motion import loop
 from backend.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
@@ -40,7 +41,7 @@ async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None
         return
     (key,) = keys
     before = await drive.raw(key)
-    with drive.owed.lent({key: before}):
+    with axis.granted("motion through the cyclic exchange"), drive.owed.lent({key: before}):
         modes_of_the_loop(drive, session, key)
         try:
             yield
@@ -90,9 +91,9 @@ async def _choose(axis: Axis, session: CyclicSession, key: str, mode: int) -> No
     if power is None or not session.running:
         # The link may have been lost meanwhile, and another drive be there now.
         await confirm_identity(drive)
-        await drive.write(key, mode)
+        await drive.energise(key, mode, axis.grant(key))
         return
-    await power.drive_to(session.station(drive), State.SWITCH_ON_DISABLED, mode)
+    await loop.give_back_mode(session, drive, mode, axis.grant(key))
     deadline = time.monotonic() + _TAKEN_S
     while await drive.raw(key) != mode:
         if time.monotonic() > deadline:

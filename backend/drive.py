@@ -13,10 +13,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from backend.batches import asked_in_batches
 from backend.change_marks import ChangeMarks
 from backend.drive_listeners import DriveListeners
+from backend.motion.authority import MotionAuthority
+from backend.motion.classes import held_still, motion_of
+from backend.motion.doors import refused
+from backend.motion.grant import Grant
+from backend.motion.stopping import stops
 from backend.motion_keys import command_keys, motion_keys
 from backend.owed import Owed
 from backend.ports import Port, address_of, carries
-from backend.readings import CommandRecord, Reading, WriteRecord
+from backend.readings import CommandRecord, Reading, Refusal, WriteRecord
 from backend.rest import Rest
 from backend.value_check import checked, named
 from drivers import cia402
@@ -31,6 +36,11 @@ from drivers.errors import (
 from drivers.link import Found, LinkQuality
 from profiles.schema import Parameter, Profile, Raw
 
+#: States in which the motor has power (CiA 402-2 table 28).
+_POWERED = frozenset({
+    cia402.State.OPERATION_ENABLED, cia402.State.QUICK_STOP_ACTIVE, cia402.State.FAULT_REACTION,
+})  # fmt: skip
+
 
 class Drive:
     """One drive of the bench.
@@ -38,8 +48,17 @@ class Drive:
     ``readings`` holds the last answer for every parameter that was read.
     """
 
-    def __init__(self, drive_id: str, name: str, profile: Profile, ports: Sequence[Port]) -> None:
+    def __init__(
+        self,
+        drive_id: str,
+        name: str,
+        profile: Profile,
+        ports: Sequence[Port],
+        authority: MotionAuthority | None = None,
+    ) -> None:
         self.id = drive_id
+        #: Who may move it: the bench's, or one of its own outside a server.
+        self.authority = MotionAuthority() if authority is None else authority
         self.name = name
         self.rest = Rest(name)
         self.owed = Owed()
@@ -316,10 +335,46 @@ class Drive:
         ``value`` is a raw value, or one in the parameter's unit with ``raw=False``.
 
         Raises:
+            NotGranted: it can put energy into the motor; the error says where that is done.
             NotAllowed, OutOfRange: nothing was sent.
             Rejected: the drive refused.
             LinkTimeout: the outcome is unknown, and reading back failed as well.
         """
+        self._refuse_energising(key, value)
+        parameter, value = self._to_be_written(key, value, raw=raw)
+        await self._require_harmless(parameter)
+        return await self._written(parameter, value)
+
+    async def energise(self, key: str, raw: Raw, grant: Grant) -> Reading:
+        """Like `write`, of a raw value to an object that can put energy into the motor.
+
+        Raises:
+            NotGranted: the grant is not for this object, or has ended.
+        """
+        parameter, raw = self._to_be_written(key, raw, raw=True)
+        self.require_grant(grant, parameter.key, restores=self.owed.restores(parameter.key, raw))
+        return await self._written(parameter, raw)
+
+    async def put_back(self, key: str, raw: Raw) -> Reading:
+        """Write a borrowed value back, of whatever class, by the work that had borrowed it.
+
+        Raises:
+            NotGranted: it energises, and the calling work holds no grant.
+            DriveError: as `write`.
+        """
+        if motion_of(self.parameter(key)) != "energises":
+            return await self.write(key, raw)
+        return await self.energise(key, raw, self.authority.require_held(self.id, self.name, key))
+
+    def require_grant(self, grant: Grant, key: str, *, restores: bool = False) -> None:
+        """This grant permits to write this object now.
+
+        Raises:
+            NotGranted: it does not.
+        """
+        self.authority.require(grant, self.id, self.name, key, restores=restores)
+
+    def _to_be_written(self, key: str, value: Raw, *, raw: bool) -> tuple[Parameter, Raw]:
         parameter = self.parameter(key)
         self.require_identity()
         if not raw and isinstance(value, (int, float)):
@@ -331,10 +386,43 @@ class Drive:
                     OutOfRange(f"{value:g} is no number", remedy="give a number that is finite"),
                     parameter,
                 ) from error
-        value = self.check(parameter, value)
+        return parameter, self.check(parameter, value)
+
+    def _refuse_energising(self, key: str, value: Raw) -> None:
+        """Raises NotGranted where this object can put energy into the motor, whatever the value."""
+        parameter = self.parameter(key)
+        if motion_of(parameter) != "energises":
+            return
+        self.port_for(parameter)
+        error = refused(self.name, self.profile, parameter)
+        self.listeners.refused(Refusal(self.id, self.name, parameter.key, value, error.message))
+        raise error
+
+    async def _require_harmless(self, parameter: Parameter) -> None:
+        """Writing it changes no motion that goes on, and nothing of an axis with power.
+
+        Raises:
+            NotAllowed: the axis is enabled or moved, and a motion relies on it.
+        """
+        if not held_still(parameter):
+            return
+        if self.authority.held(self.id) is not None:
+            return  # changed for the length of a motion, by the motion itself
+        if (mover := self.authority.mover_of(self.id)) is not None:
+            by = f" by {mover.actor}" if mover.actor else ""
+            raise NotAllowed(
+                f"{self.name}: {parameter.key} {parameter.name} is not changed during a motion "
+                f"({mover.purpose}{by})",
+                drive=self.name,
+                parameter=parameter.key,
+                remedy="wait for its end, or stop it",
+            )
+        await self._require_no_power(parameter)
+
+    async def _written(self, parameter: Parameter, value: Raw) -> Reading:
         port = self.port_for(parameter)
         if parameter.settable == "stopped":
-            await self._require_stopped(parameter)
+            await self._require_no_power(parameter)
         await self._before_change(parameter)
         known = self.readings.get(parameter.key)
         before = known.raw if known else None
@@ -395,13 +483,43 @@ class Drive:
                 remedy="check the cables; if it was exchanged, accept it on the Connect page",
             )
 
-    async def command(self, key: str, raw: int) -> None:
+    async def command(self, key: str, raw: int, grant: Grant) -> None:
         """Write a motion object without reading back (set-points, control word).
 
         Raises:
+            NotGranted: the grant is not for this object, or has ended.
             DriveError: as `write`.
         """
         parameter = self.parameter(key)
+        restores = self.owed.restores(parameter.key, raw)
+        self.require_grant(grant, parameter.key, restores=restores)
+        await self._sent(parameter, raw)
+
+    async def relax(self, key: str, raw: int) -> None:
+        """Write what only ends motion or takes power away, without reading back or a grant.
+
+        Raises:
+            ValueError: this value can move the axis, so it needs a grant.
+            DriveError: as `write`.
+        """
+        parameter = self.parameter(key)
+        if motion_of(parameter) == "energises" and not stops(self.profile, parameter, raw):
+            raise ValueError(f"{parameter.key} = {raw} does not only stop")
+        await self._sent(parameter, raw)
+
+    async def trigger(self, key: str, raw: int) -> None:
+        """Write an object that runs something and moves nothing, without reading back.
+
+        Raises:
+            NotGranted: it can put energy into the motor.
+            DriveError: as `write`.
+        """
+        self._refuse_energising(key, raw)
+        parameter = self.parameter(key)
+        await self._require_harmless(parameter)
+        await self._sent(parameter, raw)
+
+    async def _sent(self, parameter: Parameter, raw: int) -> None:
         port = self.port_for(parameter)
         self.rest.interrupt()
         self.owed.commanded(parameter.key, raw)
@@ -444,12 +562,18 @@ class Drive:
         if known.raw is not None:
             self._changes.stored[parameter.key] = known.raw
 
-    async def _require_stopped(self, parameter: Parameter) -> None:
+    async def _require_no_power(self, parameter: Parameter) -> None:
+        """Raises NotAllowed where the motor has power."""
         status = self.key("status_word")
         if status is None:
             return
-        state = self.decode_state(await self.raw(status))
-        if state is cia402.State.OPERATION_ENABLED:
+        try:
+            state = self.decode_state(await self.raw(status))
+        except DriveError as error:
+            # What was wanted is what the person knows of.
+            error.parameter = parameter.key
+            raise
+        if state in _POWERED:
             raise NotAllowed(
                 f"{self.name}: {parameter.key} {parameter.name} can be set only while the motor "
                 "is not enabled",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from backend.readings import CommandRecord, Reading, WriteRecord
+from backend.readings import CommandRecord, Reading, Refusal, WriteRecord
 
 
 class DriveListeners:
@@ -14,6 +14,7 @@ class DriveListeners:
         self._readings: list[Callable[[list[Reading]], None]] = []
         self._writes: list[Callable[[WriteRecord], None]] = []
         self._commands: list[Callable[[CommandRecord], None]] = []
+        self._refusals: list[Callable[[Refusal], None]] = []
 
     def add(self, listener: Callable[[list[Reading]], None]) -> Callable[[], None]:
         """Call ``listener`` with every batch of new readings, until what is returned is called."""
@@ -27,6 +28,15 @@ class DriveListeners:
     def add_commands(self, listener: Callable[[CommandRecord], None]) -> None:
         """Call ``listener`` after everything that `Drive.command` sent, whatever came of it."""
         self._commands.append(listener)
+
+    def add_refusals(self, listener: Callable[[Refusal], None]) -> None:
+        """Call ``listener`` after every write that was refused as it can move the axis."""
+        self._refusals.append(listener)
+
+    def refused(self, refusal: Refusal) -> None:
+        """Tell a refusal."""
+        for listener in self._refusals:
+            listener(refusal)
 
     def read(self, readings: list[Reading]) -> None:
         """Tell new readings."""

@@ -11,12 +11,15 @@ import asyncio
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 from backend.access import Leases
 from backend.axis import Axis
 from backend.drive import Drive
 from backend.functions import functions_of
 from backend.jobs import Job, JobResult, JobRunner, Progress
+from backend.motion.grant import Grant
+from backend.readings import Reading
 from backend.restoring import CLEANUP_TIMEOUT_S, shielded
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange, Rejected
@@ -42,6 +45,7 @@ class ForcingSession:
     reason: str = ""
     before: dict[str, int] = field(default_factory=dict)
     over: bool = False
+    grant: Grant | None = None
     lock: asyncio.Lock = field(default_factory=asyncio.Lock)
 
     def renew(self) -> None:
@@ -176,7 +180,7 @@ class ForcingSession:
             raw = raw | bit if value else raw & ~bit
         if drive.readings[place.key].raw == raw:
             return
-        kept = (await drive.write(place.key, raw)).raw
+        kept = (await self._sent(place.key, raw)).raw
         if kept != raw:
             raise Rejected(
                 f"{drive.name}: {place.key} is 0x{raw:X} as written, and 0x{kept:X} as read back"
@@ -188,6 +192,11 @@ class ForcingSession:
                 value=kept,
                 remedy="perhaps process data of the running exchange hold this object; end it",
             )
+
+    async def _sent(self, key: str, raw: int) -> Reading:
+        if self.grant is None:
+            raise RuntimeError("terminals are overruled only in a session that runs")
+        return await self.axis.drive.energise(key, raw, self.grant)
 
 
 class ForcingSessions:
@@ -268,6 +277,16 @@ class ForcingSessions:
         self, session: ForcingSession, ready: asyncio.Future[None], progress: Progress
     ) -> JobResult:
         axis, keys = session.axis, session.keys
+        held = axis.granted(
+            session.spec.title, keys=frozenset(keys), ended=partial(_end_for, session)
+        )
+        with held as session.grant:
+            return await self._overruling(session, ready, progress)
+
+    async def _overruling(
+        self, session: ForcingSession, ready: asyncio.Future[None], progress: Progress
+    ) -> JobResult:
+        axis, keys = session.axis, session.keys
         try:
             async with axis.restoring(*keys) as before:
                 session.before = {key: int(raw) for key, raw in before.items()}
@@ -315,6 +334,10 @@ class ForcingSessions:
         return ""
 
 
+def _end_for(session: ForcingSession, why: str) -> None:
+    session.reason = session.reason or why
+
+
 def _words(session: ForcingSession) -> str:
     if not session.values:
         return "nothing is overruled yet"
@@ -332,7 +355,7 @@ async def apply_settings(axis: Axis, keys: tuple[str, ...]) -> None:
     quirk = drive.profile.quirk("write_settings")
     if quirk is None or quirk.key is None or quirk.raw is None or not needs_settings(drive, keys):
         return
-    await drive.command(quirk.key, quirk.raw)
+    await drive.trigger(quirk.key, quirk.raw)
     await asyncio.sleep(_APPLY_S)
     drive.mark_applied("write_settings")
 

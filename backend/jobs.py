@@ -7,6 +7,7 @@ import itertools
 import secrets
 import time
 from collections.abc import Awaitable, Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -70,6 +71,7 @@ class JobRunner:
     """Starts jobs and keeps the last hundred that ended.
 
     ``permit`` is called with the drive's id when a motion job begins; it may refuse by raising.
+    ``granted`` gives what a job holds for its length: its permission to move its axis.
     """
 
     KEEP = 100
@@ -78,8 +80,10 @@ class JobRunner:
         self,
         changed: Callable[[Job], None] = lambda _job: None,
         permit: Callable[[str], None] = lambda _drive: None,
+        granted: Callable[[Job], AbstractContextManager[object]] = lambda _job: nullcontext(),
     ) -> None:
         self._permit = permit
+        self._granted = granted
         self._jobs: dict[str, Job] = {}
         self._numbers = itertools.count(1)
         # A page outlives a restart of the server: its old jobs must not be taken for new ones.
@@ -159,7 +163,8 @@ class JobRunner:
 
     async def _run(self, job: Job, work: Work) -> None:
         try:
-            job.result = await work(job.progress)
+            with self._granted(job):
+                job.result = await work(job.progress)
             job.state = "done"
             job.progress.fraction = 1.0
         except asyncio.CancelledError:

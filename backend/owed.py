@@ -122,6 +122,11 @@ class Owed:
         """A motion has changed this for its length, and puts it back."""
         return key in self._lent
 
+    def restores(self, key: str, raw: Raw) -> bool:
+        """Whether writing this raw value puts back what a motion has changed."""
+        debt = self._debts.get(key)
+        return raw in self._lent.get(key, ()) or (debt is not None and debt.raw == raw)
+
     def commanded(self, key: str, raw: Raw) -> None:
         """A motion object is about to be written, which nobody reads back.
 

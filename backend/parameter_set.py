@@ -15,6 +15,8 @@ from datetime import UTC, datetime
 from typing import Any, Literal
 
 from backend.drive import Drive
+from backend.motion.classes import motion_of
+from backend.motion.doors import refused
 from backend.readings import Reading
 from drivers.errors import DriveError, NotAllowed
 from profiles.schema import Parameter, Profile, Raw
@@ -24,7 +26,9 @@ VERSION = 1
 SUFFIX = ".sdset"
 MAX_BYTES = 4_000_000
 
-Status = Literal["differs", "same", "not_in_drive", "not_in_file", "invalid", "read_only"]
+Status = Literal[
+    "differs", "same", "not_in_drive", "not_in_file", "invalid", "read_only", "energises"
+]
 
 
 class BadSet(NotAllowed):
@@ -266,6 +270,10 @@ def _difference(
         return Difference(parameter, row.key, row.raw, now, "invalid", error.message)
     if row.raw == now:
         return Difference(parameter, row.key, row.raw, now, "same")
+    if motion_of(parameter) == "energises":
+        no = refused(drive.name, drive.profile, parameter)
+        problem = f"{no.message}; {no.remedy}"
+        return Difference(parameter, row.key, row.raw, now, "energises", problem)
     return Difference(
         parameter, row.key, row.raw, now, "differs", selected=not parameter.motor_individual
     )

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import time
+from contextlib import AbstractContextManager
+from functools import partial
 
 from backend.causes import hints
 from backend.cyclic import CyclicSession
 from backend.drive import Drive
 from backend.faults import read_active_faults
+from backend.motion import loop
+from backend.motion.authority import Ended
+from backend.motion.envelope import Envelope
+from backend.motion.grant import Grant
+from backend.motion.stopping import stops
 from backend.ports import address_of
 from backend.restoring import shielded
 from drivers import cia402
@@ -61,6 +68,7 @@ class PowerState:
         """Write 6040h.
 
         Raises:
+            NotGranted: the word enables or moves the axis, and the calling work holds no grant.
             NotAllowed: STOP was pressed and the word would enable the axis again.
         """
         if self.cyclic_power() is not None:
@@ -71,17 +79,50 @@ class PowerState:
             )
         if word == cia402.QUICK_STOP:
             word = self._stop_word
-        enables = word & cia402.ENABLE_OPERATION == cia402.ENABLE_OPERATION
-        if self.stopped and enables:
+        key = self.drive.require("control_word")
+        if not stops(self.drive.profile, self.drive.parameter(key), word):
+            await self._control_with_grant(key, word)
+            return
+        await self.drive.relax(key, word)
+        self.control_word = word
+
+    async def _control_with_grant(self, key: str, word: int) -> None:
+        """A word by which the drive may go to, or move in, Operation enabled."""
+        if self.stopped:
             raise NotAllowed(
                 f"{self.drive.name}: STOP was pressed",
                 drive=self.drive.name,
                 remedy="start a new motion when it is safe",
             )
-        if enables:
-            self.drive.require_identity()
-        await self.drive.command(self.drive.require("control_word"), word)
+        self.drive.require_identity()
+        await self.drive.command(key, word, self.grant(key))
         self.control_word = word
+
+    def grant(self, key: str | None = None) -> Grant:
+        """The grant that the calling work holds.
+
+        Raises:
+            NotGranted: none.
+        """
+        return self.drive.authority.require_held(self.drive.id, self.drive.name, key)
+
+    def granted(
+        self,
+        purpose: str,
+        envelope: Envelope | None = None,
+        *,
+        keys: frozenset[str] | None = None,
+        ended: Ended | None = None,
+    ) -> AbstractContextManager[Grant]:
+        """A grant for this axis for the length of the block; see `MotionAuthority.granted`.
+
+        Raises:
+            Busy: other work has one.
+        """
+        drive = self.drive
+        return drive.authority.granted(
+            drive.id, drive.name, purpose, envelope=envelope, keys=keys, ended=ended
+        )
 
     def cyclic_power(self) -> OwnsPowerState | None:
         """The cyclic loop, while it runs and owns this axis' control word."""
@@ -115,19 +156,22 @@ class PowerState:
                 drive=self.drive.name,
                 remedy="start a new motion when it is safe",
             )
-        station = session.station(self.drive)
         if goal is State.OPERATION_ENABLED and await self.state() is State.FAULT:
             raise await self._refused(State.FAULT, goal)
         try:
-            await power.drive_to(station, goal, None if mode is None else int(mode))
+            if goal is State.OPERATION_ENABLED or mode is not None:
+                await loop.drive_to(session, self.drive, goal, mode, self.grant())
+            else:
+                await loop.lower(session, self.drive, goal)
             await self._until_there(goal, timeout_s)
         except BaseException:
             # The loop would go on trying, and enable when nobody waits for it any more: when the
             # main power comes, or a fault goes.
             if goal is State.OPERATION_ENABLED:
-                off = State.SWITCH_ON_DISABLED
                 try:
-                    await shielded(lambda: power.drive_to(station, off), timeout_s, self.drive.name)
+                    off = State.SWITCH_ON_DISABLED
+                    cut = partial(loop.lower, session, self.drive, off)
+                    await shielded(cut, timeout_s, self.drive.name)
                 except DriveError:
                     self.owes_stop = True
             raise
@@ -250,7 +294,8 @@ class PowerState:
                 drive=drive.name,
                 remedy="choose one of its modes",
             )
-        await drive.command(drive.require("mode"), int(mode))
+        key = drive.require("mode")
+        await drive.command(key, int(mode), self.grant(key))
         display = drive.key("mode_display")
         if display is None:
             return

@@ -49,3 +49,14 @@ class CommandRecord:
     parameter: str
     raw: int
     problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A write that was not sent as it can move the axis and nobody had the permission."""
+
+    drive: str
+    name: str
+    key: str
+    wanted: Raw
+    why: str

@@ -81,7 +81,7 @@ async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
                         # The link may have been lost meanwhile, and another drive be there now.
                         await confirm_identity(drive)
                         same = True
-                    await drive.write(key, raw)
+                    await drive.put_back(key, raw)
                 del left[key]
             except DriveError as error:
                 failed.append(f"{key} (was {drive.owed.original(key, raw)}): {error.message}")

@@ -7,10 +7,13 @@ way in (`backend.api.convert_motion`), and its messages are written in the unit 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from backend.mechanics_calc import Mechanics
-from backend.units import AxisUnits
 from drivers.errors import NotAllowed
+
+if TYPE_CHECKING:
+    from backend.units import AxisUnits
 
 
 @dataclass(frozen=True, slots=True)

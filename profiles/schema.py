@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from profiles.functions import Functions, referenced_keys
+from profiles.motion.rule import Motion, MotionOrigin, MotionRule
 from profiles.record import Frozen
 
 DataType = Literal[
@@ -74,6 +75,18 @@ class Parameter(Frozen):
     motor_individual: bool = Field(
         default=False, description="belongs to one motor or station; never cloned by default"
     )
+    motion: Motion | None = Field(
+        default=None,
+        description="whether writing it can cause motion; filled in from the motion rules, "
+        "None for what cannot be written",
+    )
+    safe_in_motion: bool = Field(
+        default=False, description="at_enable, and may be changed while the axis is enabled"
+    )
+    motion_origin: MotionOrigin | None = Field(
+        default=None, description="who gave the motion class"
+    )
+    motion_reason: str = Field(default="", description="what gives it this motion class")
     help: str = ""
     source: str = Field(description="manual:line, for example 004:5432")
     also_printed: tuple[str, ...] = Field(
@@ -494,6 +507,9 @@ class Profile(Frozen):
     gains: GainSpec | None = None
     quirks: tuple[Quirk, ...] = ()
     functions: Functions = Functions()
+    motion_rules: tuple[MotionRule, ...] = Field(
+        default=(), description="motion classes of the maker's objects; the first that fits counts"
+    )
     conflicts: tuple[Conflict, ...] = ()
     manual_chapters: tuple[Chapter, ...] = Field(
         default=(), description="the whole manual, chapter behind chapter, without a gap"
@@ -507,6 +523,11 @@ class Profile(Frozen):
     def by_key(self) -> dict[str, Parameter]:
         """Parameters by key."""
         return {p.key: p for p in self.parameters}
+
+    @property
+    def from_description(self) -> bool:
+        """Made from a maker's file or a drive's own dictionary, not from a numbered manual."""
+        return not (self.manual.isdigit() or self.manual == "CiA")
 
     @cached_property
     def unit_keys(self) -> frozenset[str]:

@@ -42,6 +42,7 @@ TOLD_THERE = frozenset(
         "PUT": (
             "/session/password", "/invitations/{invitation_id}/grant", "/sets/{file}",
             f"{_DRIVE}/parameters", f"{_DRIVE}/parameters/{{key}}",
+            f"{_DRIVE}/motion-settings/{{key}}",
             f"{_DRIVE}/io/forcing/{{name}}", f"{_DRIVE}/io/probes/{{number}}",
             f"{_DRIVE}/notches", f"{_DRIVE}/gains",
         ),

@@ -14,6 +14,8 @@ from backend.journal import Entry
 from backend.matching import match_profiles
 from backend.member import Member
 from backend.monitor import Snapshot
+from backend.motion.classes import motion_of
+from backend.motion.doors import door_of
 from backend.parameter_set import Difference
 from backend.readings import Reading
 from backend.tools.procedures import describe
@@ -216,6 +218,8 @@ def parameter_row(
 ) -> models_parameters.ParameterRow:
     """Description and value of a parameter."""
     why = drive.unreachable_why(parameter)
+    energises = motion_of(parameter) == "energises"
+    door = door_of(drive.profile, parameter) if energises else None
     return models_parameters.ParameterRow.model_construct(
         key=parameter.key,
         number=parameter.number,
@@ -235,6 +239,10 @@ def parameter_row(
         effective=parameter.effective,
         settable=parameter.settable,
         motor_individual=parameter.motor_individual,
+        motion=motion_of(parameter),
+        safe_in_motion=parameter.safe_in_motion,
+        motion_page="" if door is None else door.page,
+        motion_how="" if door is None else door.how,
         help=parameter.help,
         source=parameter.source,
         also_printed=list(parameter.also_printed),

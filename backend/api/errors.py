@@ -57,6 +57,7 @@ _TITLES = {
     "restore-failed": "Not everything was restored",
     "not-found": "Not found",
     "not-logged-in": "Not logged in",
+    "not-granted": "Needs the permission to move",
     "forbidden": "Forbidden",
     "too-often": "Too often",
     "wrong-method": "Wrong method",

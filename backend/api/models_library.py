@@ -112,6 +112,7 @@ class ThreeWayRow(Message):
         "not_in_drive",
         "invalid",
         "read_only",
+        "energises",
     ] = Field(description="theirs, drive: changed only there; both: to the same; conflict: not")
     problem: str = ""
     motor_individual: bool = False

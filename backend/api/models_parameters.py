@@ -31,6 +31,15 @@ class ParameterInfo(Message):
     effective: str
     settable: str
     motor_individual: bool
+    motion: Literal["none", "at_enable", "energises"] = Field(
+        description="whether writing it can move the axis: never; only with the power off; or by "
+        "itself, so that it is no matter of a parameter table"
+    )
+    safe_in_motion: bool = Field(description="at_enable, and may be changed with the power on")
+    motion_page: Literal["", "motion", "io", "parameters"] = Field(
+        description="page on which an object that energises is used; empty for all others"
+    )
+    motion_how: str = Field(description="what to do there, for an object that energises")
     help: str
     source: str
     also_printed: list[str]

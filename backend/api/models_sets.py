@@ -60,7 +60,9 @@ class DiffRow(Message):
     drive_value: Raw | None
     default_raw: Raw | None
     default_value: Raw | None
-    status: Literal["differs", "same", "not_in_drive", "not_in_file", "invalid", "read_only"]
+    status: Literal[
+        "differs", "same", "not_in_drive", "not_in_file", "invalid", "read_only", "energises"
+    ]
     problem: str = ""
     motor_individual: bool = False
     selected: bool = Field(description="proposed for writing")

@@ -114,6 +114,8 @@ _API: dict[str, Need] = {
     "PUT /drives/{drive_id}/parameters": _PARAMETERS,
     "GET /drives/{drive_id}/parameters/{key}": _LOOK,
     "PUT /drives/{drive_id}/parameters/{key}": _PARAMETERS,
+    # Settings that can start a motion at once: with the right to move, not with that to write.
+    "PUT /drives/{drive_id}/motion-settings/{key}": _MOTION,
     "POST /drives/{drive_id}/jobs/put-back": _PARAMETERS,
     "DELETE /drives/{drive_id}/owed": _PARAMETERS,
     "GET /drives/{drive_id}/procedures": _LOOK,

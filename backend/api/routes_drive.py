@@ -35,12 +35,16 @@ from backend.api.models_parameters import (
 )
 from backend.api.models_sets import LoadSetRequest
 from backend.bench import Bench
+from backend.drive import Drive
 from backend.jobs import JobResult, Progress
 from backend.member import Member
+from backend.motion.assign import assign
+from backend.motion.classes import held_still, motion_of
 from backend.readings import Reading
 from backend.tools import cyclic_motion, homing, move, parameters, procedures
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
+from profiles.schema import Parameter, Raw
 
 router = APIRouter(prefix="/drives/{drive_id}")
 
@@ -194,9 +198,11 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
     parameter = drive.parameter(key)
     old = drive.readings.get(parameter.key)
     value, raw = (request.value, False) if request.raw is None else (request.raw, True)
-    matters = drive.matters_to_motion(parameter.key)
-    with bench.motion.keeping_still(member) if matters else contextlib.nullcontext():
-        if drive.commands_motion(parameter.key):
+    matters = drive.matters_to_motion(parameter.key) or held_still(parameter)
+    # What energises is refused whatever moves; the rest waits until nothing does.
+    still = matters and motion_of(parameter) != "energises"
+    with bench.motion.keeping_still(member) if still else contextlib.nullcontext():
+        if still and drive.commands_motion(parameter.key):
             await _require_disabled(member, parameter.key)
         reading = await drive.write(key, 0 if value is None else value, raw=raw)
     bench.journal.add(
@@ -207,6 +213,55 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
     if parameter.key in drive.profile.unit_keys:
         member.axis.forget()
     return reading
+
+
+@router.put("/motion-settings/{key}")
+async def write_motion_setting(
+    bench: TheBench, member: Controlled, key: str, request: ParameterWrite
+) -> ParameterValue:
+    """Write a setting that can start a motion at once; only while the motor has no power.
+
+    Functions of terminals, control sources and the mapping of process data. The shaft is watched:
+    where it begins to turn, the setting is put back and the axis is stopped.
+    """
+    _require_known(member, key)
+    drive = member.drive
+    parameter = drive.parameter(key)
+    raw = _raw_of(drive, parameter, request)
+    old = drive.readings.get(parameter.key)
+    bench.motion.require_stays(member)
+    with bench.motion.keeping_still(member):
+        reading = await assign(member.axis, parameter.key, raw)
+    bench.journal.add(
+        f"{drive.name}: {parameter.key} {parameter.name}: "
+        f"{old.value if old else 'not read'} → {reading.value}",
+        level="warning",
+        drive=drive.id,
+    )
+    return convert.reading(drive, reading.key)
+
+
+def _raw_of(drive: Drive, parameter: Parameter, request: ParameterWrite) -> Raw:
+    """The raw value that is asked for, in whichever of the two ways."""
+    if (request.raw is None) == (request.value is None):
+        raise OutOfRange(
+            f"{drive.name}: {parameter.key}: give either raw or value",
+            drive=drive.name,
+            parameter=parameter.key,
+            remedy="send exactly one of the two",
+        )
+    if request.raw is not None:
+        return request.raw
+    value = 0 if request.value is None else request.value
+    try:
+        return value if isinstance(value, str) else parameter.to_raw(value)
+    except OverflowError as error:
+        raise OutOfRange(
+            f"{drive.name}: {parameter.key}: {value:g} is no number",
+            drive=drive.name,
+            parameter=parameter.key,
+            remedy="give a number that is finite",
+        ) from error
 
 
 async def _require_disabled(member: Member, key: str) -> None:

@@ -10,7 +10,7 @@ from backend.audit.asked import settings_now
 from backend.audit.facts import Fact, Kind, Value
 from backend.audit.log import AuditLog
 from backend.jobs import Job
-from backend.readings import CommandRecord, WriteRecord
+from backend.readings import CommandRecord, Refusal, WriteRecord
 
 #: Jobs that only read what the pages show anyway.
 _UNREMARKABLE = frozenset({"reread", "read_all"})
@@ -69,6 +69,20 @@ class Witness:
                 old=record.before,
                 new=new,
                 outcome=outcome,
+                detail=detail,
+            )
+        )
+
+    def refused(self, refusal: Refusal) -> None:
+        """Somebody tried to move an axis by a parameter."""
+        detail: dict[str, Value] = {"drive": refusal.drive, "wanted": refusal.wanted}
+        self._audit.add(
+            Fact(
+                "write",
+                "refused",
+                axis=refusal.name,
+                target=refusal.key,
+                outcome=refusal.why,
                 detail=detail,
             )
         )

@@ -15,6 +15,8 @@ from backend.commands.values import Compared
 from backend.drive import Drive
 from backend.files import write_atomically
 from backend.library import SetLibrary
+from backend.motion.classes import motion_of
+from backend.motion.doors import refused
 from backend.parameter_set import ParameterSet
 from backend.tools import parameters, procedures
 from drivers.errors import NotAllowed
@@ -37,6 +39,8 @@ async def put(place: Place, assignments: list[str], *, raw: bool) -> None:
             # Everything is checked before the first byte is written.
             known = value if raw or isinstance(value, str) else parameter.to_raw(value)
             drive.check(parameter, known)
+            if motion_of(parameter) == "energises":
+                raise refused(drive.name, drive.profile, parameter)
         for parameter, value in wanted:
             print(values.line(parameter, await drive.write(parameter.key, value, raw=raw)))
 

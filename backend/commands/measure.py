@@ -193,8 +193,9 @@ async def exchanging(
         await session.start(cycle_ms / 1e3)
         axis.session = session
         try:
-            async with profile_speed.prepared(axis, session, envelope, consent):
-                yield axis, session
+            with axis.granted("measurement from the command line", envelope):
+                async with profile_speed.prepared(axis, session, envelope, consent):
+                    yield axis, session
         finally:
             axis.session = None
             await session.stop()

@@ -19,7 +19,7 @@ from backend.files import write_atomically
 from drivers.errors import NotAllowed
 from profiles import drive_names, load_profile
 from profiles.check import check as check_profile
-from profiles.check import coverage
+from profiles.check import coverage, motion_counts, unclassified
 from profiles.export import show as shown
 from profiles.importer import (
     ImportedProfile,
@@ -168,6 +168,8 @@ def check(drive: Annotated[str | None, typer.Argument()] = None) -> None:
         findings = check_profile(profile)
         print(f"{name}: {len(profile.parameters)} parameters, {len(profile.faults)} faults, "
               f"{len(findings)} findings")  # fmt: skip
+        counts = ", ".join(f"{count} {motion}" for motion, count in motion_counts(profile).items())
+        print(f"  motion classes: {counts}; {len(unclassified(profile))} not classified")
         for finding in findings:
             print(f"  {finding}")
         for line in coverage(profile):

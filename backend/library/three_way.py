@@ -13,7 +13,7 @@ from profiles.schema import Parameter, Raw
 
 Status = Literal[
     "same", "theirs", "drive", "both", "conflict",
-    "not_in_theirs", "not_in_drive", "invalid", "read_only",
+    "not_in_theirs", "not_in_drive", "invalid", "read_only", "energises",
 ]  # fmt: skip
 
 

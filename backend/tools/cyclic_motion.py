@@ -21,6 +21,7 @@ from backend.cyclic import CyclicSession
 from backend.cyclic_mode import keeping_mode
 from backend.drive import Drive
 from backend.jobs import JobResult, Progress
+from backend.motion import loop
 from backend.ports import address_of
 from backend.tools.jog import Hold, JogSettings, require_scale
 from drivers import link as bus
@@ -154,7 +155,7 @@ async def generate(
         trajectory = bus.Trajectory(
             session.station(drive), target, raw, await _limits(axis, settings.envelope, start)
         )
-        await _play(session, trajectory, len(raw) * cycle_s, progress)
+        await _play(axis, session, trajectory, len(raw) * cycle_s, progress)
         end = await axis.position_raw()
     return {"cycles": len(raw), "moved_rev": units.position(end - start)}
 
@@ -209,7 +210,8 @@ async def jog_cyclic(
         # Enabling takes longer than a button may be held: released meanwhile, nothing moves.
         if reason := hold.ended():
             return {"reason": reason, "moved_rev": 0.0}
-        await session.cyclic.play([bus.Trajectory(station, target, raw, limits)])
+        trajectory = bus.Trajectory(station, target, raw, limits)
+        await loop.play(session, drive, trajectory, axis.grant())
         progress(0.0, "moving")
         reason = await _while_held(session, station, hold)
         await session.cyclic.halt(station)
@@ -265,6 +267,7 @@ async def _limits(axis: Axis, envelope: Envelope, start: int) -> bus.Envelope:
 
 
 async def _play(
+    axis: Axis,
     session: CyclicSession,
     trajectory: bus.Trajectory,
     duration_s: float,
@@ -276,7 +279,7 @@ async def _play(
         NotAllowed: the loop ended it. LinkTimeout: it takes many times as long as it should.
     """
     station = trajectory.station
-    await session.cyclic.play([trajectory])
+    await loop.play(session, axis.drive, trajectory, axis.grant())
     began = time.monotonic()
     while (elapsed := time.monotonic() - began) < duration_s or _plays(session, station):
         if elapsed > _PATIENCE * duration_s + _STATE_TIMEOUT_S:

@@ -165,7 +165,7 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
         if hold.ended():
             continue
         if target != last_target:
-            await drive.command(target_key, target)
+            await drive.command(target_key, target, axis.grant(target_key))
             await axis.control(toggle | cia402.NEW_SET_POINT)
             await axis.control(toggle)
             last_target = target

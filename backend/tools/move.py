@@ -210,7 +210,8 @@ async def _to(
     await _still_inside(axis, start, envelope)
     word = cia402.ENABLE_OPERATION | cia402.CHANGE_IMMEDIATELY
     await axis.control(word)
-    await drive.command(drive.require("position_target"), target)
+    key = drive.require("position_target")
+    await drive.command(key, target, axis.grant(key))
     await axis.control(word | cia402.NEW_SET_POINT)
     own = drive.profile.quirk("own_status_word") is not None
     reached_bit = 1 << 15 if own else cia402.STATUS_TARGET_REACHED
@@ -276,13 +277,13 @@ async def _hold(axis: Axis, settings: MoveSettings, start: int, progress: Progre
     """Velocity or torque for the envelope's time, inside its travel and speed."""
     drive, units, envelope = axis.drive, await axis.units(), settings.envelope
     role, raw = _require_inside(axis, units, settings)
-    await drive.command(drive.require(role), raw)
+    await drive.command(drive.require(role), raw, axis.grant())
     began = time.monotonic()
     while (elapsed := time.monotonic() - began) < envelope.time_s:
         progress(elapsed / envelope.time_s, "running")
         await _still_inside(axis, start, envelope)
         await asyncio.sleep(_POLL_S)
-    await drive.command(drive.require(role), 0)
+    await drive.relax(drive.require(role), 0)
 
 
 async def _still_inside(axis: Axis, start: int, envelope: Envelope) -> int:

@@ -13,6 +13,7 @@ from backend.drive_identity import confirm_identity
 from backend.jobs import JobResult
 from backend.library import SetStore
 from backend.library.identity import doubts
+from backend.motion.grant import NotGranted
 from backend.parameter_set import ParameterSet
 from backend.readings import Reading
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
@@ -230,7 +231,10 @@ async def _write_verified(drive: Drive, key: str, raw: Raw) -> Written:
     except LinkLost:
         raise
     except DriveError as error:
-        return Written(key, before, raw, None, ok=False, problem=error.message)
+        problem = error.message
+        if isinstance(error, NotGranted):
+            problem += f"; {error.remedy}"
+        return Written(key, before, raw, None, ok=False, problem=problem)
     if after != raw:
         text = f"the drive keeps {after} instead of {raw}"
         return Written(key, before, raw, after, ok=False, problem=text)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Sequence
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, nullcontext
 
 from backend.axis import Axis
+from backend.drive import Drive
 from backend.jobs import JobResult, Progress
+from backend.motion.classes import motion_of
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, Rejected
 from profiles.schema import (
@@ -70,6 +72,21 @@ async def run_procedure(
             remedy="disable the axis first",
         )
     words = describe(procedure)
+    moves = any(_energises(drive, step) for step in procedure.steps)
+    with axis.granted(procedure.title) if moves else nullcontext():
+        await _carry_out(axis, procedure, words, progress)
+    _remember(axis, procedure.name)
+    return {"procedure": procedure.name, "steps": words}
+
+
+def _energises(drive: Drive, step: Step) -> bool:
+    return isinstance(step, WriteStep) and motion_of(drive.parameter(step.key)) == "energises"
+
+
+async def _carry_out(
+    axis: Axis, procedure: Procedure, words: Sequence[str], progress: Progress
+) -> None:
+    drive = axis.drive
     async with AsyncExitStack() as left_alone:
         for number, step in enumerate(procedure.steps):
             progress(number / len(procedure.steps), words[number])
@@ -86,8 +103,6 @@ async def run_procedure(
                 raise
             if isinstance(step, WaitStep):
                 await left_alone.aclose()
-    _remember(axis, procedure.name)
-    return {"procedure": procedure.name, "steps": words}
 
 
 def _rest_from(steps: Sequence[Step], number: int) -> float:
@@ -108,15 +123,17 @@ async def _step(axis: Axis, step: Step) -> None:
     match step:
         case WriteStep():
             value = drive.check(drive.parameter(step.key), step.raw)
-            if isinstance(value, str):
+            if _energises(drive, step):
+                await drive.command(step.key, int(value), axis.grant(step.key))
+            elif isinstance(value, str):
                 await drive.write(step.key, value)
             else:
-                await drive.command(step.key, int(value))
+                await drive.trigger(step.key, int(value))
         case RewriteStep():
             for key in sorted(drive.unsaved):
                 # Read again: what is stored must be what the drive holds, not what was seen last.
                 raw = (await drive.read(key)).raw
-                if raw is not None:
+                if raw is not None and motion_of(drive.parameter(key)) != "energises":
                     await drive.write(key, raw)
         case WaitStep():
             await asyncio.sleep(step.seconds)

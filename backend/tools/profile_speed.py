@@ -127,14 +127,22 @@ async def prepared(
     ramps = [drive.require("profile_acceleration"), drive.require("profile_deceleration")]
     limits = list(await existing(drive, [drive.key("max_torque")]))
     modes = await axis.restorable_mode()
-    async with axis.restoring(*ramps, *limits, *modes):
-        for key in modes:
-            modes_of_the_loop(drive, session, key)
-        await axis.limit_torque(limits, _ABOVE * envelope.torque_percent)
-        await _write_ramps(axis, ramps, _SLOW_RPM_S)
-        await _require_signed(axis, session, envelope)
-        await _write_ramps(axis, ramps, None)
-        yield
+    with axis.granted("measurement by speed", envelope):
+        async with axis.restoring(*ramps, *limits, *modes):
+            await _prepare(axis, session, envelope, modes, ramps, limits)
+            yield
+
+
+async def _prepare(
+    axis: Axis, session: CyclicSession, envelope: Envelope,
+    modes: list[str], ramps: list[str], limits: list[str],
+) -> None:  # fmt: skip
+    for key in modes:
+        modes_of_the_loop(axis.drive, session, key)
+    await axis.limit_torque(limits, _ABOVE * envelope.torque_percent)
+    await _write_ramps(axis, ramps, _SLOW_RPM_S)
+    await _require_signed(axis, session, envelope)
+    await _write_ramps(axis, ramps, None)
 
 
 @asynccontextmanager

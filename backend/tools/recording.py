@@ -19,6 +19,7 @@ import numpy.typing as npt
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession, channel
 from backend.jobs import Progress
+from backend.motion import loop
 from backend.ports import address_of
 from backend.tools.alignment import BoolArray, FloatArray, Run, aligned
 from backend.tools.interrupted import interrupted, raise_if_ended, require_held
@@ -294,7 +295,7 @@ async def _drive_through(
     count = len(trajectory.values)
     station = trajectory.station
     try:
-        catch.begin(await session.cyclic.play([trajectory]))
+        catch.begin(await loop.play(session, axis.drive, trajectory, axis.grant()))
     except NotAllowed as error:
         raise interrupted(error) from error
     heard, deadline, judged = 0, time.monotonic() + _TAIL_S, 0

@@ -41,5 +41,6 @@ async def settle(axis: Axis, *, asked: bool) -> JobResult:
             back[debt.key] = debt.raw
         else:
             left[debt.key] = f"{now} now, which no measurement left there"
-    await put_back_in_time(axis, back)
+    with axis.granted("put back what a motion left"):
+        await put_back_in_time(axis, back)
     return {"back": dict(back), "left": dict(left)}

@@ -76,7 +76,7 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
         for key, raw in before.items():
             try:
                 if (await drive.read(key)).raw != raw:
-                    await drive.write(key, raw)
+                    await drive.put_back(key, raw)
                     changed = True
                 del left[key]
             except DriveError as error:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from profiles.importer.description import DescribedEntry, Description
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.loader import load_profile
+from profiles.motion.classify import classified
 from profiles.schema import (
     INTEGER_RANGE,
     DataType,
@@ -108,7 +109,7 @@ def build_profile(
         pdo=_pdo_spec(description, parameters, report),
         chapters={description.file: "imported; not checked against a manual"},
     )
-    return ImportedProfile(profile, report)
+    return ImportedProfile(classified(profile), report)
 
 
 def slug(name: str) -> str:

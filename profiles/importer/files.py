@@ -11,6 +11,7 @@ from profiles.importer.build import ImportedProfile, build_profile
 from profiles.importer.eds import read_eds
 from profiles.importer.esi import esi_devices, read_esi
 from profiles.importer.report import ImportFailed, ImportReport
+from profiles.loader import CLASS_FIELDS
 from profiles.schema import Profile
 
 
@@ -115,5 +116,7 @@ def write_profile(imported: Profile, folder: Path) -> Path:
 
 def profile_yaml(profile: Profile) -> str:
     """The profile as YAML with one parameter per line group, defaults left out."""
-    data = profile.model_dump(mode="json", exclude_defaults=True)
+    data = profile.model_dump(
+        mode="json", exclude_defaults=True, exclude={"parameters": {"__all__": set(CLASS_FIELDS)}}
+    )
     return yaml.safe_dump(data, allow_unicode=True, sort_keys=False, width=100)

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from drivers.virtual.wires.netns import unavailable
+from profiles.loader import load_profile
 from tests.support.station import HANG_S, Station, until
 
 URL = "ethercat://virtual0"
@@ -52,8 +53,10 @@ def raw(station: Station, family: str, key: str) -> Any:
 
 
 def put(station: Station, family: str, key: str, value: int) -> None:
-    path = f"/drives/{family}/parameters/{key}"
-    station.ok(station.http.put(path, json={"raw": value}))
+    """Through the door that the parameter's motion class has."""
+    moves = load_profile(family).by_key[key].motion == "energises"
+    door = "motion-settings" if moves else "parameters"
+    station.ok(station.http.put(f"/drives/{family}/{door}/{key}", json={"raw": value}))
 
 
 def terminals(station: Station, family: str) -> dict[str, Any]:

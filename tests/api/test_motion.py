@@ -319,7 +319,9 @@ def test_setpoints_of_an_enabled_axis_are_not_written_by_hand(station: Station, 
     )
     answer = station.http.put(f"/drives/{x}/parameters/60FF:00", json={"raw": 100000})
     assert answer.status_code == 409
-    assert "commands motion" in answer.json()["detail"]
+    assert answer.json()["type"] == "urn:servodeck:not-granted"
     assert at_rest(station, x)
     station.ok(station.http.post(f"/drives/{x}/transition", json={"goal": "Switch on disabled"}))
-    station.ok(station.http.put(f"/drives/{x}/parameters/60FF:00", json={"raw": 0}))
+    # Nor of one that is not: the write that enables it would then move it.
+    answer = station.http.put(f"/drives/{x}/parameters/60FF:00", json={"raw": 0})
+    assert answer.json()["type"] == "urn:servodeck:not-granted"

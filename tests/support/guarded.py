@@ -82,8 +82,12 @@ class Page(Live):
 class GuardedServer:
     """``people`` may be moved in time by ``later``; ``bench`` has the axis x."""
 
-    def __init__(self, folder: Path, *, accounts: bool = True) -> None:
+    def __init__(
+        self, folder: Path, *, accounts: bool = True,
+        making: Callable[[Path], Awaitable[tuple[Bench, Member]]] | None = None,
+    ) -> None:  # fmt: skip
         self.servo = Servo()
+        self._making = making or (lambda folder: bench_with(self.servo, folder))
         self.folder = folder
         self.people = People(folder, accounts_needed=accounts, passwords=CHEAP)
         self.ahead = timedelta(0)
@@ -123,7 +127,7 @@ class GuardedServer:
 
         async def main() -> None:
             self._loop = asyncio.get_running_loop()
-            self.bench, self.member = await bench_with(self.servo, self.folder)
+            self.bench, self.member = await self._making(self.folder)
             serving = Serving(accounts=self.people.accounts_needed)
             config = _config(self.bench, self.people, serving, None)
             self.app, self.config = config.app, config

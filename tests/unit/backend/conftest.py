@@ -12,6 +12,8 @@ from backend.drive import Drive
 from backend.member import Member
 from backend.ports import Port
 from drivers.link import Found
+from profiles.motion.classify import classified
+from profiles.motion.rule import MotionRule
 from profiles.schema import (
     Identity,
     LinkSpec,
@@ -31,7 +33,7 @@ SPEC = LinkSpec(kind="mlink", watchdog=Watchdog(present=False), source="test")
 
 @pytest.fixture
 def profile() -> Profile:
-    return Profile(
+    return classified(Profile(
         drive="sample",
         title="Sample drive",
         manual="000",
@@ -76,7 +78,10 @@ def profile() -> Profile:
                 steps=(WriteStep(do="write", key="200D:01", raw=0x65766173),),
             ),
         ),
-    )  # fmt: skip
+        motion_rules=(
+            MotionRule(keys=("2000-5FFF", "PA_00-PA_FF"), motion="none", reason="a sample"),
+        ),
+    ))  # fmt: skip
 
 
 @pytest.fixture
@@ -131,4 +136,4 @@ async def http(bench: Bench) -> AsyncIterator[httpx.AsyncClient]:
 def changed(profile: Profile, **fields: object) -> Profile:
     """The profile with other fields, checked anew."""
     old = {name: getattr(profile, name) for name in Profile.model_fields}
-    return Profile.model_validate({**old, **fields})
+    return classified(Profile.model_validate({**old, **fields}))

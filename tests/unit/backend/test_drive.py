@@ -107,7 +107,8 @@ async def test_unsaved_and_pending_marks(drive: Drive) -> None:
 
 
 async def test_commands_are_never_unsaved(drive: Drive) -> None:
-    await drive.write("6040:00", 6)
+    with drive.authority.granted(drive.id, drive.name, "a test") as grant:
+        await drive.energise("6040:00", 6, grant)
     await drive.write("200D:01", 0x65766173)
     assert not drive.unsaved
 

@@ -167,20 +167,21 @@ async def test_no_motion_begins_on_a_bus_that_is_searched(
 async def test_what_was_not_enabled_in_time_is_not_enabled_later(x: Member) -> None:
     """No main power: the loop tried on, and enabled by itself when the power came."""
     loop = Loop(x)
-    with pytest.raises(NotAllowed, match="does not go to"):
+    with x.axis.granted("a test"), pytest.raises(NotAllowed, match="does not go to"):
         await x.axis.go_to_cyclic(loop, State.OPERATION_ENABLED, Mode.CSP, 0.01)  # type: ignore[arg-type]
     assert loop.goals == [State.OPERATION_ENABLED, State.SWITCH_ON_DISABLED]
 
 
 async def test_an_enabling_that_was_cancelled_does_not_go_on(x: Member) -> None:
     loop = Loop(x)
-    enabling = asyncio.create_task(
-        x.axis.go_to_cyclic(loop, State.OPERATION_ENABLED, Mode.CSP, 5.0)  # type: ignore[arg-type]
-    )
-    while not loop.goals:  # noqa: ASYNC110 - a list has no event
-        await asyncio.sleep(0)
-    enabling.cancel()
-    await asyncio.wait([enabling])
+    with x.axis.granted("a test"):
+        enabling = asyncio.create_task(
+            x.axis.go_to_cyclic(loop, State.OPERATION_ENABLED, Mode.CSP, 5.0)  # type: ignore[arg-type]
+        )
+        while not loop.goals:  # noqa: ASYNC110 - a list has no event
+            await asyncio.sleep(0)
+        enabling.cancel()
+        await asyncio.wait([enabling])
     assert enabling.cancelled()
     assert loop.goals[-1] is State.SWITCH_ON_DISABLED
 

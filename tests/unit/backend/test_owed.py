@@ -318,8 +318,9 @@ async def test_the_mode_that_a_killed_server_left_comes_back_by_itself(
 
 async def test_set_points_leave_no_trace_of_themselves(x: Member) -> None:
     """A jog sends a thousand of them in a minute."""
-    for target in range(50):
-        await x.drive.command("607A:00", target)
+    with x.axis.granted("a jog") as grant:
+        for target in range(50):
+            await x.drive.command("607A:00", target, grant)
     x.drive.owed.add({"607A:00": 0})
     assert x.drive.owed.debts[0].left == frozenset()
 

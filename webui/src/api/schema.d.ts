@@ -1016,6 +1016,29 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/motion-settings/{key}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /**
+         * Write Motion Setting
+         * @description Write a setting that can start a motion at once; only while the motor has no power.
+         *
+         *     Functions of terminals, control sources and the mapping of process data. The shaft is watched:
+         *     where it begins to turn, the setting is put back and the axis is stopped.
+         */
+        put: operations["write_motion_setting"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/notches": {
         parameters: {
             query?: never;
@@ -3419,7 +3442,7 @@ export interface components {
              * Status
              * @enum {string}
              */
-            status: "differs" | "same" | "not_in_drive" | "not_in_file" | "invalid" | "read_only";
+            status: "differs" | "same" | "not_in_drive" | "not_in_file" | "invalid" | "read_only" | "energises";
             /** Unit */
             unit: string;
         };
@@ -5533,6 +5556,23 @@ export interface components {
             max_raw: number | null;
             /** Min Raw */
             min_raw: number | null;
+            /**
+             * Motion
+             * @description whether writing it can move the axis: never; only with the power off; or by itself, so that it is no matter of a parameter table
+             * @enum {string}
+             */
+            motion: "none" | "at_enable" | "energises";
+            /**
+             * Motion How
+             * @description what to do there, for an object that energises
+             */
+            motion_how: string;
+            /**
+             * Motion Page
+             * @description page on which an object that energises is used; empty for all others
+             * @enum {string}
+             */
+            motion_page: "" | "motion" | "io" | "parameters";
             /** Motor Individual */
             motor_individual: boolean;
             /** Name */
@@ -5551,6 +5591,11 @@ export interface components {
              */
             reachable: boolean;
             reading: components["schemas"]["ParameterValue"];
+            /**
+             * Safe In Motion
+             * @description at_enable, and may be changed with the power on
+             */
+            safe_in_motion: boolean;
             /** Scale */
             scale: number;
             /** Settable */
@@ -7530,7 +7575,7 @@ export interface components {
              * @description theirs, drive: changed only there; both: to the same; conflict: not
              * @enum {string}
              */
-            status: "same" | "theirs" | "drive" | "both" | "conflict" | "not_in_theirs" | "not_in_drive" | "invalid" | "read_only";
+            status: "same" | "theirs" | "drive" | "both" | "conflict" | "not_in_theirs" | "not_in_drive" | "invalid" | "read_only" | "energises";
             /** Theirs Raw */
             theirs_raw: number | string | null;
             /** Theirs Value */
@@ -16309,6 +16354,150 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MissingPort"][];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    write_motion_setting: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                key: string;
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ParameterWrite"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ParameterValue"];
                 };
             };
             /** @description Not a request of this interface */

@@ -95,6 +95,7 @@ export const library = {
   'three.status.not_in_drive': ['not in this drive', '驱动器中没有'],
   'three.status.invalid': ['not valid', '无效'],
   'three.status.read_only': ['read only', '只读'],
+  'three.status.energises': ['can move the axis', '可能使轴运动'],
   'three.help': [
     'Only clear changes of the set are ticked. Tick a conflict to take the value of the set.',
     '仅勾选参数集中明确的更改。勾选冲突项则采用参数集的值。',

@@ -96,6 +96,27 @@ export const parameters = {
   'mark.unused': ['not in use', '未使用'],
   'mark.stopped': ['set at stop', '停机设置'],
   'mark.readOnly': ['read only', '只读'],
+  'mark.energises': ['moves', '致动'],
+  'parameters.motion': ['Motion', '运动'],
+  'motion.none': ['cannot move the axis', '不会使轴运动'],
+  'motion.at_enable': [
+    'changes how the axis moves: set only while it is disabled',
+    '影响轴的运动：仅在未使能时可设置',
+  ],
+  'motion.at_enable.safe': [
+    'changes how the axis moves; may be set while it is enabled',
+    '影响轴的运动；使能时也可设置',
+  ],
+  'motion.energises': [
+    'can put energy into the motor: not written here',
+    '可能使电机得电：不能在此写入',
+  ],
+  'motion.goMotion': ['Open the Motion page', '打开运动页面'],
+  'motion.goIo': ['Open the I/O page', '打开 I/O 页面'],
+  'motion.script': [
+    'Its value is set by a script that has the right to move (PUT …/motion-settings/{key}), with the axis disabled.',
+    '需由具有运动权限的脚本（PUT …/motion-settings/{key}）在轴未使能时设置。',
+  ],
   'mark.unreachable': ['not on this link', '此链路不可达'],
   'compare.with': ['Compare with', '比较对象'],
   'compare.defaults': ['the defaults of the manual', '手册默认值'],
@@ -121,6 +142,7 @@ export const parameters = {
   'diff.not_in_file': ['not in the file', '文件中没有'],
   'diff.invalid': ['not valid', '无效'],
   'diff.read_only': ['read only', '只读'],
+  'diff.energises': ['can move the axis', '可能使轴运动'],
   'load.open': ['Load ({count})', '载入（{count}）'],
   'load.title': ['Load {file}', '载入 {file}'],
   'load.text': [

@@ -39,4 +39,5 @@ const MARKS: Record<ThreeWayRow['status'], string> = {
   not_in_drive: 'refused',
   invalid: 'refused',
   read_only: 'quiet',
+  energises: 'refused',
 }

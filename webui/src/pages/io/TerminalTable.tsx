@@ -41,12 +41,16 @@ export function TerminalTable({
   const write = useAction()
   const [asked, setAsked] = useState<{ terminal: TerminalInfo; code: number } | null>(null)
   const put = (key: string, raw: number) => write.run(() => store(key, raw))
+  const rows = useRows(drive)
   const store = async (key: string, raw: number) => {
+    const params = { path: { drive_id: drive, key } }
+    const body = { raw, value: null }
+    const moves = rows?.find((row) => row.key === key)?.motion === 'energises'
     const value: ParameterValue = await ask(
-      api.PUT('/api/v1/drives/{drive_id}/parameters/{key}', {
-        params: { path: { drive_id: drive, key } },
-        body: { raw, value: null },
-      }),
+      // A function that jogs or enables needs the right to move, and a shaft that stands.
+      moves
+        ? api.PUT('/api/v1/drives/{drive_id}/motion-settings/{key}', { params, body })
+        : api.PUT('/api/v1/drives/{drive_id}/parameters/{key}', { params, body }),
     )
     setReadings(drive, [value])
     // Until the terminals are read anew, no second one can be given the same function unseen.

@@ -77,6 +77,7 @@ export function Detail({
       {reading.unsaved && <p className="note info">{t('parameters.unsavedHelp')}</p>}
       {!row.reachable && <p className="note warn">{row.unreachable_why}</p>}
       {editable(row) && <Editor drive={drive} row={row} />}
+      {row.motion === 'energises' && <OtherDoor drive={drive} row={row} />}
       <div className="row">
         {row.access !== 'wo' && row.reachable && (
           <Button loading={act.busy} onClick={() => void read()}>
@@ -98,6 +99,24 @@ export function Detail({
       <OnWatchList drive={drive} row={row} />
       <Facts row={row} />
     </aside>
+  )
+}
+
+/** Where an object is used that can move the axis, and so has no field here. */
+function OtherDoor({ drive, row }: { drive: string; row: ParameterRow }) {
+  const t = useT()
+  const page = row.motion_page
+  return (
+    <div className="note warn">
+      <p>{t('motion.energises')}</p>
+      {page === 'motion' || page === 'io' ? (
+        <a href={`#/axis/${encodeURIComponent(drive)}/${page}`}>
+          {t(page === 'io' ? 'motion.goIo' : 'motion.goMotion')}
+        </a>
+      ) : (
+        page === '' && <p>{t('motion.script', { key: row.key })}</p>
+      )}
+    </div>
   )
 }
 
@@ -284,6 +303,12 @@ function Facts({ row }: { row: ParameterRow }) {
         <dd>{t(`effective.${pendingKey(row.effective)}`)}</dd>
         <dt>{t('parameters.settable')}</dt>
         <dd>{t(row.settable === 'stopped' ? 'settable.stopped' : 'settable.any')}</dd>
+        {row.access !== 'ro' && (
+          <>
+            <dt>{t('parameters.motion')}</dt>
+            <dd>{t(row.safe_in_motion ? 'motion.at_enable.safe' : `motion.${row.motion}`)}</dd>
+          </>
+        )}
         {row.motor_individual && (
           <>
             <dt>{t('parameters.individual')}</dt>

@@ -39,4 +39,5 @@ const MARKS: Record<DiffRow['status'], string> = {
   not_in_file: 'quiet',
   invalid: 'refused',
   read_only: 'quiet',
+  energises: 'refused',
 }

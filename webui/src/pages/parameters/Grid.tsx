@@ -173,7 +173,7 @@ export function Grid({
 }
 
 export function editable(row: ParameterRow): boolean {
-  return row.access !== 'ro' && row.reachable
+  return row.access !== 'ro' && row.reachable && row.motion !== 'energises'
 }
 
 /** Ask for the rows in sight again and again while `watching`. */

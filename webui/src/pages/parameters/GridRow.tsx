@@ -247,6 +247,11 @@ function Marks({ row, edit, problem, differs, reading }: Props & { reading: Para
       )}
       {row.settable === 'stopped' && <span className="mark quiet">{t('mark.stopped')}</span>}
       {row.access === 'ro' && <span className="mark quiet">{t('mark.readOnly')}</span>}
+      {row.motion === 'energises' && (
+        <span className="mark quiet" title={t('motion.energises')}>
+          {t('mark.energises')}
+        </span>
+      )}
       {!row.reachable && (
         <span className="mark quiet" title={row.unreachable_why}>
           {t('mark.unreachable')}

@@ -13,6 +13,7 @@ from drivers.errors import Busy, DriveError
 
 if TYPE_CHECKING:
     from backend.bench import Bench
+    from backend.jobs import Job
 
 
 class Motion:
@@ -21,6 +22,7 @@ class Motion:
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
         self._stops: set[asyncio.Task[dict[str, str]]] = set()
+        self._later: set[asyncio.Task[None]] = set()
         #: Drives of which something is changed that no motion may begin with.
         self._still: Counter[str] = Counter()
         #: Drives that are being removed.
@@ -94,6 +96,34 @@ class Motion:
         )
         member.axis.permit()
 
+    def granted(self, job: Job) -> contextlib.AbstractContextManager[object]:
+        """What a job holds for its length: a grant where it moves its axis.
+
+        Work that keeps its axis still (`Job.stoppable`) has none. When the grant ends before the
+        job does, the job is cancelled and brings its axis to rest.
+        """
+        member = self._bench.members.get(job.drive or "")
+        if member is None or not job.motion or not job.stoppable:
+            return contextlib.nullcontext()
+        drive = member.drive
+
+        def ended(_why: str) -> None:
+            if job.task is not None:
+                job.task.cancel()
+
+        return self._bench.authority.granted(drive.id, drive.name, job.title, ended=ended)
+
+    def unattended(self, drive_id: str, why: str) -> None:
+        """Nobody may leave this axis enabled any longer: it loses its power."""
+        member = self._bench.members.get(drive_id)
+        if member is None or member.axis.stopped:
+            return  # STOP takes the power off, and says what became of the axis
+        text = f"{member.drive.name} loses its power, nobody looks after it: {why}"
+        self._bench.journal.add(text, level="warning", drive=drive_id)
+        task = asyncio.create_task(self.let_go(drive_id), name=f"unattended-{drive_id}")
+        self._later.add(task)
+        task.add_done_callback(self._later.discard)
+
     async def stop(self, drive_ids: Sequence[str]) -> dict[str, str]:
         """Quick stop of these drives, all at once; motion jobs are cancelled.
 
@@ -104,6 +134,7 @@ class Motion:
         for member in members:
             # Before anything else runs: nothing in progress may enable the axis from here on.
             member.axis.stopped = True
+            self._bench.authority.revoke(member.drive.id, "STOP was pressed")
             job = self._bench.jobs.moving(member.drive.id)
             if job is not None and job.stoppable and job.task is not None:
                 # Cancelled before the write, so that it sends nothing after it but its cleanup.

@@ -1,0 +1,245 @@
+"""Who may move which axis now. Everything that can put energy into a motor asks here.
+
+A grant is held by the work that asked for it: the task, and the tasks that it starts, such as
+cleanups. A route that runs beside a motion of the same axis does not hold the motion's grant.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
+from dataclasses import dataclass
+
+from backend.motion.envelope import Envelope
+from backend.motion.grant import Grant, NotGranted
+from backend.people.identity import acting_person
+from drivers.errors import Busy
+
+#: No motion is permitted for longer than this without being asked for anew.
+LONGEST_S = 4 * 3600.0
+#: An axis that was left enabled through no page loses its power after this time.
+UNATTENDED_S = 600.0
+
+#: Called with the reason when the time of a grant is over before the work that holds it ends.
+Ended = Callable[[str], None]
+
+_held: ContextVar[tuple[Grant, ...]] = ContextVar("grants", default=())
+
+
+@dataclass(slots=True, eq=False)
+class _Record:
+    """A grant that was issued and is not given back. ``why`` it ended, empty while it is live."""
+
+    grant: Grant
+    ended: Ended | None
+    why: str = ""
+    timer: asyncio.TimerHandle | None = None
+
+
+class MotionAuthority:
+    """Issues the grants of the axes of one bench, or of one drive outside a server."""
+
+    def __init__(self) -> None:
+        self._records: dict[str, list[_Record]] = {}
+        self._listeners: list[Callable[[str], None]] = []
+
+    def listen(self, listener: Callable[[str], None]) -> None:
+        """Call ``listener`` with a drive's id after each of its grants began or ended."""
+        self._listeners.append(listener)
+
+    # --- who may move -------------------------------------------------------------------
+
+    def grant_of(self, drive: str) -> Grant | None:
+        """The grant by which this axis may move now, the innermost one; None where none is live."""
+        live = self._live(drive)
+        whole = [grant for grant in live if grant.keys is None]
+        return (whole or live)[-1] if live else None
+
+    def mover_of(self, drive: str) -> Grant | None:
+        """The live grant of a motion that goes on.
+
+        An axis that is only left enabled has none, nor one of which terminals are overruled.
+        """
+        live = [g for g in self._live(drive) if not g.standing and g.keys is None]
+        return live[-1] if live else None
+
+    def held(self, drive: str, key: str | None = None) -> Grant | None:
+        """The grant of this axis that the calling work holds; also one that was ended meanwhile.
+
+        With ``key`` only one that covers this object.
+        """
+        known = {record.grant for record in self._records.get(drive, ())}
+        for grant in reversed(_held.get()):
+            if grant in known and (key is None or grant.covers(key)):
+                return grant
+        return None
+
+    def require_held(self, drive: str, name: str, key: str | None = None) -> Grant:
+        """Like `held`.
+
+        Raises:
+            NotGranted: the calling work holds none.
+        """
+        grant = self.held(drive, key)
+        if grant is None:
+            raise NotGranted(
+                f"{name}: nobody asked for this motion, so it is not begun",
+                drive=name,
+                parameter=key,
+                remedy="begin it on the Motion page",
+            )
+        return grant
+
+    def require(
+        self, grant: Grant, drive: str, name: str, key: str, *, restores: bool = False
+    ) -> None:
+        """This grant permits to write this object of this drive now.
+
+        One that has ended still lets the work put back what it had changed (``restores``).
+
+        Raises:
+            NotGranted: it is of another drive or object, or it has ended.
+        """
+        record = self._record(grant)
+        if grant.drive != drive or record is None or not grant.covers(key):
+            raise NotGranted(
+                f"{name}: {key} can move the axis, and the permission at hand is not for it",
+                drive=name,
+                parameter=key,
+                remedy="begin the motion anew on the Motion page",
+            )
+        why = record.why or ("its time is over" if time.monotonic() > grant.until else "")
+        if why and not restores:
+            raise NotGranted(
+                f"{name}: {grant.purpose}: the permission to move has ended: {why}",
+                drive=name,
+                parameter=key,
+                remedy="begin the motion anew when it is safe",
+            )
+
+    # --- issuing and ending -------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def granted(
+        self,
+        drive: str,
+        name: str,
+        purpose: str,
+        *,
+        envelope: Envelope | None = None,
+        keys: frozenset[str] | None = None,
+        lasts_s: float = LONGEST_S,
+        ended: Ended | None = None,
+    ) -> Iterator[Grant]:
+        """A grant for the length of the block, held by the calling work.
+
+        Inside another one of the same work it ends with that at the latest. ``ended`` is called
+        when its time is over before the block ends; the work must then bring its axis to rest.
+
+        Raises:
+            Busy: other work has a grant for this axis.
+        """
+        grant = self._issue(drive, name, purpose, envelope, keys, lasts_s, ended)
+        _held.set((*_held.get(), grant))
+        try:
+            yield grant
+        finally:
+            _held.set(tuple(each for each in _held.get() if each is not grant))
+            self.end(grant)
+
+    def standing(self, drive: str, purpose: str, *, lasts_s: float, ended: Ended) -> Grant:
+        """A grant for an axis that is left enabled, until `end`; it takes the place of an older."""
+        for record in list(self._records.get(drive, ())):
+            if record.grant.standing:
+                self.end(record.grant)
+        grant = Grant(drive, acting_person(), purpose, time.monotonic() + lasts_s, standing=True)
+        self._add(_Record(grant, ended))
+        return grant
+
+    def end(self, grant: Grant) -> None:
+        """Give a grant back. Nothing is told to the work that had it."""
+        record = self._record(grant)
+        if record is None:
+            return
+        if record.timer is not None:
+            record.timer.cancel()
+        self._records[grant.drive].remove(record)
+        if not self._records[grant.drive]:
+            del self._records[grant.drive]
+        self._changed(grant.drive)
+
+    def revoke(self, drive: str, why: str) -> None:
+        """All grants of this axis end now, whoever holds them: nothing is commanded any more.
+
+        Their holders are not told: whoever calls this brings the axis to rest.
+        """
+        for record in self._records.get(drive, ()):
+            record.why = record.why or why
+        self._changed(drive)
+
+    def _expire(self, record: _Record) -> None:
+        if record.why:
+            return
+        record.why = "its time is over"
+        self._changed(record.grant.drive)
+        if record.ended is not None:
+            record.ended(record.why)
+
+    def _issue(
+        self,
+        drive: str,
+        name: str,
+        purpose: str,
+        envelope: Envelope | None,
+        keys: frozenset[str] | None,
+        lasts_s: float,
+        ended: Ended | None,
+    ) -> Grant:
+        outer = self.held(drive)
+        mine = set(_held.get())
+        for other in self._live(drive):
+            if other.standing or other in mine:
+                continue
+            apart = keys is not None and other.keys is not None and not keys & other.keys
+            if keys is None and other.keys is not None:
+                continue  # overruled terminals go with a motion
+            if keys is not None and other.keys is None:
+                continue
+            if not apart:
+                raise Busy(
+                    f"{name} is moved already: {other.purpose}",
+                    drive=name,
+                    remedy="wait for it to end, or stop it",
+                )
+        until = time.monotonic() + lasts_s
+        if outer is not None:
+            until = min(until, outer.until)
+        grant = Grant(drive, acting_person(), purpose, until, envelope, keys)
+        self._add(_Record(grant, ended))
+        return grant
+
+    def _add(self, record: _Record) -> None:
+        grant = record.grant
+        self._records.setdefault(grant.drive, []).append(record)
+        left_s = grant.until - time.monotonic()
+        if math.isfinite(left_s):
+            loop = asyncio.get_running_loop()
+            record.timer = loop.call_later(max(0.0, left_s), self._expire, record)
+        self._changed(grant.drive)
+
+    def _live(self, drive: str) -> list[Grant]:
+        now = time.monotonic()
+        records = self._records.get(drive, ())
+        return [r.grant for r in records if not r.why and now <= r.grant.until]
+
+    def _record(self, grant: Grant) -> _Record | None:
+        records = self._records.get(grant.drive, ())
+        return next((record for record in records if record.grant is grant), None)
+
+    def _changed(self, drive: str) -> None:
+        for listener in self._listeners:
+            listener(drive)

@@ -1,0 +1,27 @@
+"""Within what a motion must stay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from backend.travel_units import TravelUnit
+
+
+@dataclass(frozen=True, slots=True)
+class Envelope:
+    """Limits of one motion, in the axis' units: travel from the start point in rev, rpm, %, s.
+
+    ``travel_unit`` and ``travel_per_rev`` are the unit of who asked, for what is told to them.
+    """
+
+    travel_rev: float
+    speed_rpm: float
+    torque_percent: float
+    time_s: float
+    travel_unit: str = "rev"
+    travel_per_rev: float = 1.0
+
+    @property
+    def shown(self) -> TravelUnit:
+        """The unit for messages."""
+        return TravelUnit(self.travel_unit, self.travel_per_rev)

@@ -1,0 +1,71 @@
+"""The loop of a cyclic exchange, commanded with a grant: enabling, modes and trajectories."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from backend.motion.grant import Grant
+from drivers.cia402 import Mode, State
+from drivers.errors import NotAllowed
+from drivers.link import OwnsPowerState, Trajectory
+
+if TYPE_CHECKING:
+    from backend.cyclic import CyclicSession
+    from backend.drive import Drive
+
+
+async def drive_to(
+    session: CyclicSession, drive: Drive, goal: State, mode: Mode | None, grant: Grant
+) -> None:
+    """Let the loop walk the state machine, also to Operation enabled, and choose a mode.
+
+    Raises:
+        NotGranted: the grant is not for this axis, or has ended.
+        NotAllowed: the exchange does not own the power states.
+    """
+    drive.require_grant(grant, drive.require("control_word"))
+    number = None if mode is None else int(mode)
+    await _owner(session, drive).drive_to(session.station(drive), goal, number)
+
+
+async def give_back_mode(session: CyclicSession, drive: Drive, mode: int, grant: Grant) -> None:
+    """Let the loop write the mode that the drive had before the motion, with the power off.
+
+    Raises:
+        NotGranted: the grant is not for this axis.
+    """
+    drive.require_grant(grant, drive.require("mode"), restores=True)
+    off = State.SWITCH_ON_DISABLED
+    await _owner(session, drive).drive_to(session.station(drive), off, mode)
+
+
+async def lower(session: CyclicSession, drive: Drive, goal: State) -> None:
+    """Let the loop go to a state without power at the motor; needs no grant.
+
+    Raises:
+        ValueError: the motor has power in this state.
+    """
+    if goal is State.OPERATION_ENABLED:
+        raise ValueError("Operation enabled needs a grant")
+    await _owner(session, drive).drive_to(session.station(drive), goal)
+
+
+async def play(session: CyclicSession, drive: Drive, trajectory: Trajectory, grant: Grant) -> int:
+    """Give the loop set-points to play; see `drivers.link.Cyclic.play`.
+
+    Raises:
+        NotGranted: the grant is not for this axis, or has ended.
+    """
+    drive.require_grant(grant, drive.require("control_word"))
+    return await session.cyclic.play([trajectory])
+
+
+def _owner(session: CyclicSession, drive: Drive) -> OwnsPowerState:
+    power = session.power()
+    if power is None:
+        raise NotAllowed(
+            f"{drive.name}: this exchange does not own the power states",
+            drive=drive.name,
+            remedy="end the exchange",
+        )
+    return power
