@@ -115,17 +115,11 @@ def require_scale(axis: Axis, units: AxisUnits, settings: JogSettings) -> None:
     """A jog must know how far a revolution is, and its speed must be one the drive can have.
 
     Raises:
-        NotAllowed: the resolution is unknown, so no stopping distance can be computed.
+        ScaleUnknown: what a revolution or a speed is, is not certain.
         OutOfRange: the speed is below the drive's resolution.
     """
     drive = axis.drive
-    if units.counts_per_rev is None:
-        raise NotAllowed(
-            f"{drive.name}: increments per revolution are unknown, so the stopping distance of a "
-            "jog cannot be computed",
-            drive=drive.name,
-            remedy="set feed constant and gear ratio on the Parameters page",
-        )
+    units.require_certain()
     if units.velocity_raw(settings.speed_rpm) <= 0:
         raise OutOfRange(
             f"{drive.name}: {settings.shown.say_speed(settings.speed_rpm)} is below the "
