@@ -122,9 +122,13 @@ class OutOfRange(DriveError):
 
 
 class NotAllowed(DriveError):
-    """Read-only, wrong state, missing permission or unmet precondition."""
+    """Read-only, wrong state, missing permission or unmet precondition.
+
+    ``names_faults``: the message already names the faults that the drive has.
+    """
 
     kind = "not-allowed"
+    names_faults = False
 
 
 class NotInUse(NotAllowed):
