@@ -258,9 +258,10 @@ class Axis(ScaledAxis):
             faults = [f"{fault.code} {fault.name}" for fault in await self.active_faults()]
         except DriveError:
             return
-        if faults and faults[0] not in error.message:
+        if faults and not error.names_faults:
             error.message += f" ({', '.join(faults)})"
             error.args = (error.message,)
+            error.names_faults = True
 
     async def leave_cyclic(self, session: CyclicSession, timeout_s: float) -> None:
         """Brake and take the power off through the loop; nothing interrupts this.

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from drivers.cia402 import State
 from drivers.errors import DriveError
+from drivers.halt import LoopState
 from profiles.schema import DataType, LinkKind, Profile
 
 
@@ -288,5 +289,5 @@ class OwnsPowerState(Protocol):
     async def reset_fault(self, station: int) -> None:
         """Reset a fault once; the axis stays disabled."""
 
-    def axis_state(self, station: int) -> tuple[str, str, str]:
+    def axis_state(self, station: int) -> LoopState:
         """Power state, phase of the setpoints, and why the last motion was ended by force."""

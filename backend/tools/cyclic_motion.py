@@ -25,7 +25,7 @@ from backend.ports import address_of
 from backend.tools.jog import Hold, JogSettings, require_scale
 from drivers import link as bus
 from drivers.cia402 import Mode
-from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
+from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, motion_halted
 
 _RENEW_S = 0.05
 _STATE_TIMEOUT_S = 5.0
@@ -295,12 +295,13 @@ async def _play(
 def _plays(session: CyclicSession, station: int) -> bool:
     """Whether values are still to come, where the loop tells."""
     power = session.power()
-    return power is not None and power.axis_state(station)[1] == "playing"
+    return power is not None and power.axis_state(station).phase == "playing"
 
 
 def _raise_if_ended(session: CyclicSession, station: int) -> None:
     power = session.power()
-    if power is not None and (reason := power.axis_state(station)[2]):
-        raise NotAllowed(
-            f"station {station}: {reason}", remedy="see the Alarms page; check the envelope"
+    halt = None if power is None else power.axis_state(station).halted
+    if halt is not None:
+        raise motion_halted(
+            f"station {station}", halt, remedy="see the Alarms page; check the envelope"
         )

@@ -211,7 +211,7 @@ async def _forgotten(axis: Axis, session: CyclicSession) -> None:
     power, station = session.power(), session.station(axis.drive)
     deadline = time.monotonic() + _TAIL_S
     while time.monotonic() < deadline:
-        if power is None or not power.axis_state(station)[2]:
+        if power is None or not power.axis_state(station).halted:
             return
         await asyncio.sleep(_RENEW_S / 2)
 
@@ -244,7 +244,7 @@ async def play(
     torque that came since, and ends the motion early, by braking, when it returns True.
 
     Raises:
-        NotAllowed: the envelope ended the motion; the reason is in words.
+        MotionHalted: the envelope ended the motion; `MotionHalted.halt` is why.
         Interrupted: so did anything else, such as a fault.
         LinkLost: samples did not come.
     """
