@@ -56,7 +56,9 @@ class Halted:
     """The end of a motion by force.
 
     ``quantity`` is what was watched, ``value`` and ``limit`` are in raw drive units; all three are
-    None where the cause is no limit. ``note`` holds what else is known, for people only.
+    None where the cause is no limit. Of a contradiction, ``value`` is what 606Ch says and ``limit``
+    what the position says, both in raw units of 606Ch. ``note`` holds what else is known, for
+    people only.
     """
 
     cause: HaltCause
@@ -82,6 +84,11 @@ class Halted:
             return "the setpoints were not renewed in time: the axis is braked and disabled"
         if self.cause is HaltCause.LEFT_ENABLED:
             return f"the drive left Operation enabled: {self.note}"
+        if self.cause is HaltCause.CONTRADICTION and self.value is not None:
+            return (
+                f"606Ch says {self.value:.6g}, the position says {self.limit or 0.0:.6g} (raw units "
+                f"of 606Ch; {self.note}): the axis is braked and disabled"
+            )
         return self.note or _WORDS[self.cause]
 
     def to_wire(self) -> dict[str, Any]:

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.halt import LoopState
+from drivers.motion.feedback import FeedbackScale
 from profiles.schema import DataType, LinkKind, Profile
 
 
@@ -184,6 +185,8 @@ class Envelope:
     speed_max: float | None = None
     torque_max: float | None = None
     following_error_max: float | None = None
+    feedback: FeedbackScale | None = None
+    """How 606Ch and 6064h hang together: both are compared then, and the speed limit watches both."""
 
 
 @dataclass(frozen=True, slots=True)

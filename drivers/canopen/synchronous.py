@@ -293,6 +293,8 @@ class SyncLoop:
             self._flush()
             self._dropped += missed
             self._statistics.skipped += missed
+            for axis in self.images.axes.values():
+                axis.skip(missed)
             self._cycle += missed
             self._block_start_s += missed * self.cycle_s
 

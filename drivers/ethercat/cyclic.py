@@ -204,6 +204,8 @@ class CyclicLoop:
             self.next_ns += skipped * self.cycle_ns
             self.number += skipped
             self.counters.overruns += skipped
+            for image in self.images:
+                image.axis.skip(skipped)
             self._resynced = RESYNCED
         late_us = late // 1000
         self._late_ns = late

@@ -12,7 +12,7 @@ from drivers.ethercat import setup as setup_
 from drivers.ethercat.al_status import ERROR_BIT, AlState
 from drivers.ethercat.cyclic import CyclicLoop, Image, layout, percentile_us
 from drivers.ethercat.lanes import Done, Lanes
-from drivers.ethercat.motion import Limits, Motion
+from drivers.ethercat.motion import Motion, limits_of
 from drivers.ethercat.playback import AxisLoop
 from drivers.ethercat.preparation import Preparation, Report
 from drivers.ethercat.protocol import Message
@@ -348,7 +348,7 @@ def _motion(item: Message, cycle_ns: int) -> Motion:
     return Motion(
         target=item["target"],
         values=values,
-        limits=Limits(**item["limits"]),
+        limits=limits_of(item["limits"]),
         renew_cycles=max(round(item["renew_s"] * 1e9 / cycle_ns), 1),
         longest_step=item["longest_step"],
         offset=item.get("offset"),

@@ -33,7 +33,8 @@ from drivers.ethercat.motion import (
     Motion,
     Phase,
 )
-from drivers.halt import HaltCause, Halted, Quantity
+from drivers.halt import HaltCause, Halted
+from drivers.motion.guard import SpeedGuard
 
 STOP_S = 0.1
 """From any speed to standstill; shorter than the 200 ms in which a lost setpoint must end."""
@@ -97,6 +98,9 @@ class AxisLoop:
         self._moved = 0
         """Increments since the cycle before."""
         self._moved_at_stop = 0
+        self._cycle_s = cycle_s
+        self._cycles = 0
+        self._speed_guard = SpeedGuard(None, None)
 
     # Commands ------------------------------------------------------------------------------
 
@@ -159,6 +163,7 @@ class AxisLoop:
         self._life = motion.renew_cycles
         self.phase = Phase.PLAYING
         self.halted = None
+        self._speed_guard = SpeedGuard(motion.limits.feedback, motion.limits.speed_max)
 
     def renew(self) -> None:
         """Extend the life of the setpoints."""
@@ -195,6 +200,7 @@ class AxisLoop:
 
     def step(self, values: Sequence[int]) -> None:
         """Outputs of the next cycle from the inputs of this one, which must be valid."""
+        self._cycles += 1
         place = self._in.get(MODE_SHOWN)
         if place is not None:
             self._mode = values[place]
@@ -225,12 +231,17 @@ class AxisLoop:
         Once it has braked, the axis is told to quick-stop whether or not it is heard: nobody knows
         whether it stands, and disabled by other words it would coast.
         """
+        self._cycles += 1
         if self.phase is not Phase.IDLE:
             self._advance()
         elif self.goal not in (None, State.OPERATION_ENABLED) and CONTROL in self._out:
             word = self.outputs[self._out[CONTROL]]
             if word & cia402.ENABLE_OPERATION == cia402.ENABLE_OPERATION:
                 self.outputs[self._out[CONTROL]] = self._dialect.quick_stop
+
+    def skip(self, cycles: int) -> None:
+        """Cycles that the computer was too late for: time passed, and nothing was exchanged."""
+        self._cycles += cycles
 
     def _fell_out(self) -> None:
         if self.goal is State.OPERATION_ENABLED:
@@ -259,17 +270,18 @@ class AxisLoop:
             if limits.position_max is not None and position > limits.position_max:
                 self.stop(Halted.beyond("position", position, limits.position_max))
                 return
-        watched: tuple[tuple[Quantity, int, float | None], ...] = (
-            ("speed", ACTUAL_VELOCITY, limits.speed_max),
-            ("torque", ACTUAL_TORQUE, limits.torque_max),
-        )
-        for name, index, limit in watched:
-            value = self._value(values, index)
-            if limit is not None and value is not None and abs(value) > limit:
-                if name == "torque":
-                    self._no_faster_than_it_turns(values)
-                self.stop(Halted.beyond(name, value, limit))
-                return
+        velocity = self._value(values, ACTUAL_VELOCITY)
+        at_s = self._cycles * self._cycle_s
+        place = None if position is None else round(position)
+        halt = self._speed_guard.look(place, velocity, at_s)
+        if halt is not None:
+            self.stop(halt)
+            return
+        torque, most = self._value(values, ACTUAL_TORQUE), limits.torque_max
+        if most is not None and torque is not None and abs(torque) > most:
+            self._no_faster_than_it_turns(values)
+            self.stop(Halted.beyond("torque", torque, most))
+            return
         if limits.following_error_max is not None:
             error = self._following_error(values)
             if abs(error) > limits.following_error_max:

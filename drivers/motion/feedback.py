@@ -27,6 +27,8 @@ _APART = 3.0
 """Factor between the two beyond which a speed limit was met by a wrong value, not by a speed."""
 _LIMIT_MARGIN = 1.15
 """A speed by position is a mean over cycles that are not quite equally long."""
+_INSTANT = 4
+"""Samples over which a speed beyond its limit is compared with the position, there and then."""
 _WRAP = 2**32
 
 WINDOW_S = 0.04
@@ -65,9 +67,10 @@ class Contradiction:
 
 @dataclass(slots=True)
 class _Part:
-    moved: int
-    told: float
-    time_s: float
+    moved: int = 0
+    told: float = 0.0
+    time_s: float = 0.0
+    peak_told: float = 0.0
 
 
 class FeedbackWatch:
@@ -77,8 +80,9 @@ class FeedbackWatch:
         self._scale = scale
         self._part_s = window_s / _PARTS
         self._parts: deque[_Part] = deque(maxlen=_PARTS)
-        self._open = _Part(0, 0.0, 0.0)
+        self._open = _Part()
         self._last: tuple[int, float, float] | None = None
+        self._newest: deque[tuple[int, float, float]] = deque(maxlen=_INSTANT)
         self._samples = 0
         self._votes = 0
         self._finest = 0.0
@@ -87,6 +91,7 @@ class FeedbackWatch:
     def take(self, position: int, velocity: float, at_s: float) -> Contradiction | None:
         """One sample: raw 6064h and 606Ch at a time [s]; what contradicts, once it is certain."""
         last, self._last = self._last, (position, velocity, at_s)
+        self._newest.append(self._last)
         if last is None or at_s <= last[2]:
             return None
         step = abs(velocity - last[1])
@@ -97,23 +102,19 @@ class FeedbackWatch:
         part.moved += _difference(position, last[0])
         part.told += 0.5 * (velocity + last[1]) * elapsed
         part.time_s += elapsed
+        part.peak_told = max(part.peak_told, abs(velocity))
         self._samples += 1
         if part.time_s < self._part_s or self._samples < 2:
             return None
         self._parts.append(part)
-        self._open, self._samples = _Part(0, 0.0, 0.0), 0
+        self._open, self._samples = _Part(), 0
         return self._judge() if len(self._parts) == _PARTS else None
 
     def interrupt(self) -> None:
         """The position was set anew (homing), or samples are missing: begin a new window."""
         self._parts.clear()
-        self._open, self._samples, self._votes, self._last = _Part(0, 0.0, 0.0), 0, 0, None
-
-    def by_position(self) -> float | None:
-        """Speed by position over the newest parts, raw 606Ch; None while there is too little."""
-        recent = self._recent()
-        moved, time_s = sum(p.moved for p in recent), sum(p.time_s for p in recent)
-        return None if not time_s else moved / time_s * self._scale.velocity_per_inc_s
+        self._newest.clear()
+        self._open, self._samples, self._votes, self._last = _Part(), 0, 0, None
 
     def too_fast(self, limit: float) -> float | None:
         """The speed by position [raw 606Ch] where it is certainly beyond this limit."""
@@ -127,17 +128,36 @@ class FeedbackWatch:
             least > limit * _LIMIT_MARGIN
         ) else None
 
-    def explains(self, told: float, seen: float) -> Contradiction | None:
-        """Whether a speed beyond its limit by one of the two is denied by the other."""
-        low, high = sorted((abs(told), abs(seen)))
-        denied = low * _APART < high and high - low > self._ignored
-        return Contradiction(_kind(told, seen, self._ignored), told, seen) if denied else None
+    def denied(self) -> Contradiction | None:
+        """Whether the position denies the speed that 606Ch has told over the newest samples."""
+        newest = list(self._newest)
+        time_s = newest[-1][2] - newest[0][2]
+        if time_s <= 0:
+            return None
+        told = sum(
+            0.5 * (new[1] + old[1]) * (new[2] - old[2])
+            for old, new in zip(newest, newest[1:], strict=False)
+        ) / time_s  # fmt: skip
+        moved = _difference(newest[-1][0], newest[0][0])
+        per = self._scale.velocity_per_inc_s
+        most = (abs(moved) + _COUNTS) / time_s * abs(per)
+        return self._of(told, moved, time_s) if self._apart(most, abs(told)) else None
 
-    def told_lately(self) -> float | None:
-        """Mean of 606Ch over the newest parts; None while there is too little."""
+    def unnoticed(self, seen: float) -> Contradiction | None:
+        """Whether 606Ch denies this speed of the position: it never told of one like it lately."""
         recent = self._recent()
-        time_s = sum(p.time_s for p in recent)
-        return None if not time_s else sum(p.told for p in recent) / time_s
+        if not self._apart(max(part.peak_told for part in recent), abs(seen)):
+            return None
+        time_s = sum(part.time_s for part in recent)
+        moved = sum(part.moved for part in recent)
+        return self._of(sum(part.told for part in recent) / time_s, moved, time_s)
+
+    def _apart(self, low: float, high: float) -> bool:
+        return low * _APART < high and high - low > self._ignored
+
+    def _of(self, told: float, moved: int, time_s: float) -> Contradiction:
+        seen = moved / time_s * self._scale.velocity_per_inc_s
+        return Contradiction(_kind(told, seen, moved), told, seen)
 
     def _recent(self) -> list[_Part]:
         return [*list(self._parts)[-2:], self._open]
@@ -165,7 +185,7 @@ class FeedbackWatch:
         self._votes += 1
         if self._votes < _VOTES:
             return None
-        return Contradiction(_kind(told, seen, self._ignored), told, seen)
+        return self._of(told, sum(part.moved for part in self._parts), time_s)
 
 
 def _difference(new: int, old: int) -> int:
@@ -173,10 +193,10 @@ def _difference(new: int, old: int) -> int:
     return (new - old + _WRAP // 2) % _WRAP - _WRAP // 2
 
 
-def _kind(told: float, seen: float, ignored: float) -> Disagreement:
-    if abs(told) < min(ignored, 0.1 * abs(seen)):
+def _kind(told: float, seen: float, moved: int) -> Disagreement:
+    if abs(told) < 1.0:
         return Disagreement.SPEED_STANDS
-    if abs(seen) < min(ignored, 0.1 * abs(told)):
+    if abs(moved) <= _COUNTS:
         return Disagreement.POSITION_STANDS
     if told * seen < 0 and 0.5 < abs(told / seen) < 2:
         return Disagreement.SIGN
