@@ -152,11 +152,19 @@ class EnvelopeExceeded(MotionHalted):
 
 
 def motion_halted(
-    where: str, halt: Halted, *, drive: str | None = None, remedy: str | None = None
+    where: str,
+    halt: Halted,
+    *,
+    words: str | None = None,
+    drive: str | None = None,
+    remedy: str | None = None,
 ) -> MotionHalted:
-    """The error for a halt of ``where``, a station or a drive by name."""
+    """The error for a halt of ``where``, a station or a drive by name.
+
+    ``words`` are those in the units of the axis, where they are known.
+    """
     kind = EnvelopeExceeded if halt.cause in ENVELOPE_CAUSES else MotionHalted
-    return kind(f"{where}: {halt.words}", halt=halt, drive=drive, remedy=remedy)
+    return kind(f"{where}: {words or halt.words}", halt=halt, drive=drive, remedy=remedy)
 
 
 def exceeded(error: DriveError) -> HaltCause | None:

@@ -22,6 +22,7 @@ from backend.cyclic_mode import keeping_mode
 from backend.drive import Drive
 from backend.jobs import JobResult, Progress
 from backend.ports import address_of
+from backend.scales.words import halt_remedy, halt_words
 from backend.tools.jog import Hold, JogSettings, require_scale
 from drivers import link as bus
 from drivers.cia402 import Mode
@@ -134,7 +135,7 @@ async def generate(
         OutOfRange: the signal leaves the envelope; nothing has moved.
         NotAllowed: the loop ended the motion; the reason is in words.
     """
-    units, drive = await axis.units(), axis.drive
+    units, drive = await axis.require_certain_scales(), axis.drive
     cycle_s = _cycle(session)
     values = signal(settings, cycle_s)
     mode = Mode[settings.mode]
@@ -154,7 +155,7 @@ async def generate(
         trajectory = bus.Trajectory(
             session.station(drive), target, raw, await _limits(axis, settings.envelope, start)
         )
-        await _play(session, trajectory, len(raw) * cycle_s, progress)
+        await _play(axis, session, trajectory, len(raw) * cycle_s, progress)
         end = await axis.position_raw()
     return {"cycles": len(raw), "moved_rev": units.position(end - start)}
 
@@ -187,7 +188,7 @@ async def jog_cyclic(
     Raises:
         NotAllowed: as `generate`.
     """
-    units, drive = await axis.units(), axis.drive
+    units, drive = await axis.require_certain_scales(), axis.drive
     cycle_s = _cycle(session)
     require_scale(axis, units, settings)
     progress(0.0, "enabling")
@@ -211,7 +212,7 @@ async def jog_cyclic(
             return {"reason": reason, "moved_rev": 0.0}
         await session.cyclic.play([bus.Trajectory(station, target, raw, limits)])
         progress(0.0, "moving")
-        reason = await _while_held(session, station, hold)
+        reason = await _while_held(axis, session, hold)
         await session.cyclic.halt(station)
         if not await axis.standstill(2.0):
             raise LinkTimeout(
@@ -236,10 +237,11 @@ def run_up(travel: float, speed: float, slope: float, cycle_s: float) -> Signal:
     return np.asarray(np.where(t < ramp, rising, np.where(t < ramp + cruise, level, falling)))
 
 
-async def _while_held(session: CyclicSession, station: int, hold: Hold) -> str:
+async def _while_held(axis: Axis, session: CyclicSession, hold: Hold) -> str:
+    station = session.station(axis.drive)
     while not (reason := hold.ended()):
         await session.cyclic.renew(station)
-        _raise_if_ended(session, station)
+        _raise_if_ended(axis, session)
         await asyncio.sleep(_RENEW_S)
     return reason
 
@@ -261,10 +263,12 @@ async def _limits(axis: Axis, envelope: Envelope, start: int) -> bus.Envelope:
         position_max=start + travel,
         speed_max=units.velocity_raw(envelope.speed_rpm * 1.2 + 20.0),
         torque_max=units.torque_raw(envelope.torque_percent),
+        feedback=units.feedback,
     )
 
 
 async def _play(
+    axis: Axis,
     session: CyclicSession,
     trajectory: bus.Trajectory,
     duration_s: float,
@@ -285,11 +289,11 @@ async def _play(
                 remedy="look at the link quality: the computer skips many cycles",
             )
         await session.cyclic.renew(station)
-        _raise_if_ended(session, station)
+        _raise_if_ended(axis, session)
         progress(min(elapsed / duration_s, 1.0), "playing")
         left_s = duration_s - elapsed
         await asyncio.sleep(min(_RENEW_S, left_s) if left_s > 0 else _RENEW_S)
-    _raise_if_ended(session, station)
+    _raise_if_ended(axis, session)
 
 
 def _plays(session: CyclicSession, station: int) -> bool:
@@ -298,10 +302,15 @@ def _plays(session: CyclicSession, station: int) -> bool:
     return power is not None and power.axis_state(station).phase == "playing"
 
 
-def _raise_if_ended(session: CyclicSession, station: int) -> None:
+def _raise_if_ended(axis: Axis, session: CyclicSession) -> None:
+    station = session.station(axis.drive)
     power = session.power()
     halt = None if power is None else power.axis_state(station).halted
     if halt is not None:
         raise motion_halted(
-            f"station {station}", halt, remedy="see the Alarms page; check the envelope"
+            axis.drive.name,
+            halt,
+            words=halt_words(halt, axis.known_units),
+            drive=axis.drive.name,
+            remedy=halt_remedy(halt, "see the Alarms page; check the envelope"),
         )

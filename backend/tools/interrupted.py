@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
+from backend.scales.words import halt_remedy, halt_words
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, NotAllowed, motion_halted
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
@@ -36,9 +37,10 @@ def interrupted(error: NotAllowed) -> Interrupted:
     )  # fmt: skip
 
 
-def interrupted_by(name: str, halt: Halted) -> Interrupted:
-    """A halt of the drive ``name`` that nothing else may be tried after."""
-    error = Interrupted(f"{name}: {halt.words}", drive=name, remedy=_LOOK)
+def interrupted_by(axis: Axis, halt: Halted) -> Interrupted:
+    """A halt of this axis that nothing else may be tried after."""
+    name, words = axis.drive.name, halt_words(halt, axis.known_units)
+    error = Interrupted(f"{name}: {words}", drive=name, remedy=halt_remedy(halt, _LOOK))
     error.halt = halt
     return error
 
@@ -48,7 +50,7 @@ def require_held(axis: Axis, session: CyclicSession) -> None:
     power = session.power()
     halt = None if power is None else power.axis_state(session.station(axis.drive)).halted
     if halt is not None and halt.cause is HaltCause.LEFT_ENABLED:
-        raise interrupted_by(axis.drive.name, halt)
+        raise interrupted_by(axis, halt)
 
 
 async def require_enabled(axis: Axis) -> None:
@@ -59,7 +61,7 @@ async def require_enabled(axis: Axis) -> None:
     """
     state = await axis.state()
     if state is not State.OPERATION_ENABLED:
-        raise interrupted_by(axis.drive.name, Halted(HaltCause.LEFT_ENABLED, note=state.value))
+        raise interrupted_by(axis, Halted(HaltCause.LEFT_ENABLED, note=state.value))
 
 
 async def ends_all(axis: Axis, error: DriveError) -> bool:
@@ -82,11 +84,11 @@ def raise_if_ended(axis: Axis, session: CyclicSession) -> None:
     if halt is not None:
         if halt.cause in _OF_THE_MOTION:
             raise motion_halted(
-                name, halt, drive=name,
+                name, halt, words=halt_words(halt, axis.known_units), drive=name,
                 remedy="check load, limits and gains, then widen the envelope only if the machine "
                 "allows it",
             )  # fmt: skip
-        raise interrupted_by(name, halt)
+        raise interrupted_by(axis, halt)
     if not session.running:
         raise LinkLost(
             f"{name}: the cyclic exchange ended during the measurement", drive=name,

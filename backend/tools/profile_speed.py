@@ -115,6 +115,7 @@ async def prepared(
         RestoreFailed: on leaving, naming what could not be put back.
     """
     drive = axis.drive
+    await axis.require_certain_scales()
     require_consent(session, drive, consent)
     if drive.id not in session.by_speed:
         async with keeping_mode(axis, session):

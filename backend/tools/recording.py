@@ -20,8 +20,9 @@ from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession, channel
 from backend.jobs import Progress
 from backend.ports import address_of
+from backend.scales.compare import disagreement_of
 from backend.tools.alignment import BoolArray, FloatArray, Run, aligned
-from backend.tools.interrupted import interrupted, raise_if_ended, require_held
+from backend.tools.interrupted import interrupted, interrupted_by, raise_if_ended, require_held
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed
@@ -190,9 +191,11 @@ async def enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterat
     On every way out the axis is braked and disabled.
 
     Raises:
+        ScaleUnknown: a scale is not certain, so that the envelope would say nothing.
         Interrupted: it cannot be enabled, or the drive has a fault at the end.
     """
     inside = False
+    await axis.require_certain_scales()
     try:
         async with axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S):
             await _forgotten(axis, session)
@@ -225,6 +228,7 @@ async def bus_limits(axis: Axis, envelope: Envelope, start_raw: int) -> bus.Enve
         position_max=start_raw + travel,
         speed_max=units.velocity_raw(envelope.speed_rpm),
         torque_max=units.torque_raw(envelope.torque_percent),
+        feedback=units.feedback,
     )
 
 
@@ -278,7 +282,20 @@ async def play(
     table, valid = await asyncio.to_thread(
         aligned, whole, catch.runs(), drive.name, ended_early=ended_early
     )
+    await _require_agreement(axis, bridged(table, valid), period_s)
     return await _in_si(axis, whole, table, valid, period_s, rated_torque_nm)
+
+
+async def _require_agreement(axis: Axis, table: FloatArray, period_s: float) -> None:
+    """Nothing is computed from a 606Ch that the position contradicts.
+
+    Raises:
+        Interrupted: naming both speeds.
+    """
+    scale = (await axis.units()).feedback
+    halt = None if scale is None else disagreement_of(table[:, 0], table[:, 1], period_s, scale)
+    if halt is not None:
+        raise interrupted_by(axis, halt)
 
 
 async def _drive_through(

@@ -61,6 +61,7 @@ async def sweep(
         LinkLost: samples were lost; nothing is concluded from the rest.
     """
     check(settings)
+    await axis.require_certain_scales()
     if settings.hold is None and axis.drive.id in session.by_speed:
         # Profile velocity without ramps: what a reference is does not change between two cycles.
         settings = replace(settings, hold="zero")

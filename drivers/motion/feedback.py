@@ -25,14 +25,14 @@ _VOTES = 2 * _PARTS
 """Windows in a row, each a part later, that must disagree."""
 _APART = 3.0
 """Factor between the two beyond which a speed limit was met by a wrong value, not by a speed."""
-_LIMIT_MARGIN = 1.15
-"""A speed by position is a mean over cycles that are not quite equally long."""
 _INSTANT = 4
 """Samples over which a speed beyond its limit is compared with the position, there and then."""
 _WRAP = 2**32
 
 WINDOW_S = 0.04
 """Of a cyclic exchange. Polled signals need longer ones."""
+LIMIT_MARGIN = 1.15
+"""A speed by position is a mean over cycles that are not quite equally long."""
 
 
 class Disagreement(StrEnum):
@@ -124,9 +124,7 @@ class FeedbackWatch:
         moved, time_s = sum(p.moved for p in recent), sum(p.time_s for p in recent)
         per = abs(self._scale.velocity_per_inc_s)
         least = (abs(moved) - _COUNTS) / time_s * per
-        return moved / time_s * self._scale.velocity_per_inc_s if (
-            least > limit * _LIMIT_MARGIN
-        ) else None
+        return moved / time_s * self._scale.velocity_per_inc_s if least > limit else None
 
     def denied(self) -> Contradiction | None:
         """Whether the position denies the speed that 606Ch has told over the newest samples."""
@@ -156,8 +154,9 @@ class FeedbackWatch:
         return low * _APART < high and high - low > self._ignored
 
     def _of(self, told: float, moved: int, time_s: float) -> Contradiction:
-        seen = moved / time_s * self._scale.velocity_per_inc_s
-        return Contradiction(_kind(told, seen, moved), told, seen)
+        within = abs(moved) <= _COUNTS
+        seen = 0.0 if within else moved / time_s * self._scale.velocity_per_inc_s
+        return Contradiction(disagreement(told, seen), told, seen)
 
     def _recent(self) -> list[_Part]:
         return [*list(self._parts)[-2:], self._open]
@@ -193,10 +192,11 @@ def _difference(new: int, old: int) -> int:
     return (new - old + _WRAP // 2) % _WRAP - _WRAP // 2
 
 
-def _kind(told: float, seen: float, moved: int) -> Disagreement:
+def disagreement(told: float, seen: float) -> Disagreement:
+    """How a speed by 606Ch and one by the position disagree, both in raw units of 606Ch."""
     if abs(told) < 1.0:
         return Disagreement.SPEED_STANDS
-    if abs(moved) <= _COUNTS:
+    if seen == 0.0:
         return Disagreement.POSITION_STANDS
     if told * seen < 0 and 0.5 < abs(told / seen) < 2:
         return Disagreement.SIGN

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from drivers.halt import HaltCause, Halted
-from drivers.motion.feedback import WINDOW_S, Contradiction, FeedbackScale, FeedbackWatch
+from drivers.motion.feedback import LIMIT_MARGIN, WINDOW_S, Contradiction, FeedbackScale, FeedbackWatch
 
 
 class SpeedGuard:
-    """For one motion. ``limit`` is the speed limit in raw 606Ch, None where there is none."""
+    """For one motion. ``limit`` is the speed limit in raw 606Ch, None where there is none.
+
+    By the position the axis is too fast beyond ``margin`` times the limit: samples are not quite
+    equally far apart.
+    """
 
     def __init__(
-        self, scale: FeedbackScale | None, limit: float | None, window_s: float = WINDOW_S
+        self,
+        scale: FeedbackScale | None,
+        limit: float | None,
+        window_s: float = WINDOW_S,
+        margin: float = LIMIT_MARGIN,
     ) -> None:
         self._watch = None if scale is None else FeedbackWatch(scale, window_s)
         self._limit = limit
+        self._margin = margin
 
     def look(self, position: int | None, velocity: float | None, at_s: float) -> Halted | None:
         """Why one sample of raw 6064h and 606Ch at a time [s] ends the motion; None: it goes on."""
@@ -26,7 +35,7 @@ class SpeedGuard:
             return Halted.beyond("speed", velocity, limit) if denied is None else _of(denied)
         if certain is not None:
             return _of(certain)
-        if watch is None or limit is None or (seen := watch.too_fast(limit)) is None:
+        if watch is None or limit is None or (seen := watch.too_fast(limit * self._margin)) is None:
             return None
         denied = watch.unnoticed(seen)
         return Halted.beyond("speed", seen, limit) if denied is None else _of(denied)

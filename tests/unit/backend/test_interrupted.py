@@ -30,6 +30,8 @@ HELD, MEANT = {"2005:03": 700}, {"2005:03": 200}
 class Axis:
     """Holds one gain; disabled, without a fault, whenever it is asked."""
 
+    known_units = None
+
     def __init__(self) -> None:
         self.held = dict(HELD)
         self.drive = SimpleNamespace(

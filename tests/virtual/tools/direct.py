@@ -30,7 +30,7 @@ from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat.cyclic import layout, places
 from drivers.ethercat.mapping import Pdo, plan_station
-from drivers.ethercat.motion import Limits, Motion
+from drivers.ethercat.motion import Motion, limits_of
 from drivers.ethercat.playback import AxisLoop
 from drivers.ethercat.setup import interpolation_period
 from drivers.halt import HaltCause, Halted, LoopState
@@ -346,7 +346,7 @@ class DirectLink:
             self._loop.play(
                 Motion(
                     t.target.index or 0, array.array("q", t.values.tolist()),
-                    Limits(**asdict(t.envelope)), _PATIENCE * 1000, step,
+                    limits_of(asdict(t.envelope)), _PATIENCE * 1000, step,
                     None if t.offset_target is None else t.offset_target.index,
                     None if offset is None else array.array("q", offset.tolist()),
                 )
