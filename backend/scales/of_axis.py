@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from backend.drive import Drive
 from backend.power import PowerState
 from backend.readings import Reading
 from backend.scales.taught import Taught
 from backend.units import AxisUnits, read_units
 from profiles.schema import Raw
+
+
+@dataclass(frozen=True, slots=True)
+class SmallMoves:
+    """The small moves by increments so far: the last one, and the longest of all.
+
+    ``raw_per_inc_s``: raw 606Ch per increment per second in the last one; None: not found.
+    """
+
+    moved: int
+    longest: int
+    raw_per_inc_s: float | None
 
 
 class ScaledAxis(PowerState):
@@ -18,6 +32,8 @@ class ScaledAxis(PowerState):
         self._units: AxisUnits | None = None
         self._taught: Taught | None = None
         self._unit_raws: dict[str, Raw | None] = {}
+        #: None until one was made since this axis is connected.
+        self.small_moves: SmallMoves | None = None
         drive.listeners.add(self._units_may_have_changed)
 
     async def units(self) -> AxisUnits:
@@ -56,6 +72,11 @@ class ScaledAxis(PowerState):
         """Scales as a person states or confirms them; they count from the next motion on."""
         self._taught = taught
         self.forget_scales()
+
+    def moved_small(self, moved: int, raw_per_inc_s: float | None) -> None:
+        """A small move by increments has ended well."""
+        before = 0 if self.small_moves is None else self.small_moves.longest
+        self.small_moves = SmallMoves(moved, max(abs(moved), before), raw_per_inc_s)
 
     def forget_scales(self) -> None:
         """The gearing changed, or may have: it is read before the next use."""

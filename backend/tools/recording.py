@@ -26,6 +26,7 @@ from backend.tools.interrupted import interrupted, interrupted_by, raise_if_ende
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed
+from drivers.motion.feedback import FeedbackScale
 
 _RENEW_S = 0.03
 _STATE_TIMEOUT_S = 5.0
@@ -185,8 +186,12 @@ def takes_torque(axis: Axis, session: CyclicSession) -> bool:
 
 
 @asynccontextmanager
-async def enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterator[int]:
+async def enabled(
+    axis: Axis, session: CyclicSession, mode: Mode, *, by_increments: bool = False
+) -> AsyncIterator[int]:
     """Operation enabled through the loop, for the length of the block; yields the position.
+
+    ``by_increments`` as in `Axis.enabled_cyclic`.
 
     On every way out the axis is braked and disabled.
 
@@ -195,9 +200,11 @@ async def enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterat
         Interrupted: it cannot be enabled, or the drive has a fault at the end.
     """
     inside = False
-    await axis.require_certain_scales()
+    if not by_increments:
+        await axis.require_certain_scales()
+    entered = axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S, by_increments=by_increments)
     try:
-        async with axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S):
+        async with entered:
             await _forgotten(axis, session)
             inside = True
             yield await axis.position_raw()
@@ -241,8 +248,11 @@ async def play(
     progress: Callable[[float], None],
     *,
     until: Callable[[FloatArray], bool] | None = None,
+    raw: bool = False,
 ) -> Recording:
     """Play one sequence on an enabled axis and return the recording.
+
+    ``raw``: its signals stay in raw units, of an axis whose scales are to be found.
 
     ``until`` is called about 20 times a second with the rows [n, 3] of raw position, velocity and
     torque that came since, and ends the motion early, by braking, when it returns True.
@@ -282,18 +292,20 @@ async def play(
     table, valid = await asyncio.to_thread(
         aligned, whole, catch.runs(), drive.name, ended_early=ended_early
     )
-    await _require_agreement(axis, bridged(table, valid), period_s)
-    return await _in_si(axis, whole, table, valid, period_s, rated_torque_nm)
+    if limits.feedback is not None:
+        _require_agreement(axis, bridged(table, valid), period_s, limits.feedback)
+    return await _in_si(axis, whole, table, valid, period_s, rated_torque_nm, raw=raw)
 
 
-async def _require_agreement(axis: Axis, table: FloatArray, period_s: float) -> None:
+def _require_agreement(
+    axis: Axis, table: FloatArray, period_s: float, scale: FeedbackScale
+) -> None:
     """Nothing is computed from a 606Ch that the position contradicts.
 
     Raises:
         Interrupted: naming both speeds.
     """
-    scale = (await axis.units()).feedback
-    halt = None if scale is None else disagreement_of(table[:, 0], table[:, 1], period_s, scale)
+    halt = disagreement_of(table[:, 0], table[:, 1], period_s, scale)
     if halt is not None:
         raise interrupted_by(axis, halt)
 
@@ -349,14 +361,18 @@ async def _in_si(
     valid: BoolArray,
     period_s: float,
     rated_torque_nm: float,
+    *,
+    raw: bool,
 ) -> Recording:
     units = await axis.units()
+    to_rad = 1.0 if raw else units.position(1.0) * 2 * np.pi
+    to_rad_s = 1.0 if raw else units.velocity(1.0) * 2 * np.pi / 60.0
     count = len(table)
     table = bridged(table, valid)
     return Recording(
         sample_rate_hz=1.0 / period_s,
-        position_rad=table[:, 0] * (units.position(1.0) * 2 * np.pi),
-        velocity_rad_s=table[:, 1] * (units.velocity(1.0) * 2 * np.pi / 60.0),
+        position_rad=table[:, 0] * to_rad,
+        velocity_rad_s=table[:, 1] * to_rad_s,
         torque_nm=table[:, 2] * (units.torque(1.0) / 100.0 * rated_torque_nm),
         sent=whole[:count, 0],
         offset=whole[:count, 1] if whole.shape[1] > 1 else np.zeros(count),
