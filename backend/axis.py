@@ -21,11 +21,9 @@ from backend.motion.envelope import Envelope
 from backend.motion.grant import Grant
 from backend.optional import existing, torque_limits
 from backend.people.identity import acting
-from backend.power import PowerState
 from backend.quick_stop import quick_stop_keys, raise_quick_stop
-from backend.readings import Reading
 from backend.restoring import CLEANUP_TIMEOUT_S, shielded
-from backend.units import AxisUnits, read_units
+from backend.scales.of_axis import ScaledAxis
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError
@@ -34,13 +32,11 @@ from profiles.schema import Raw
 __all__ = ["Axis", "Envelope"]
 
 
-class Axis(PowerState):
+class Axis(ScaledAxis):
     """Power state and motion permission of one drive."""
 
     def __init__(self, drive: Drive) -> None:
         super().__init__(drive)
-        self._units: AxisUnits | None = None
-        self._unit_raws: dict[str, Raw | None] = {}
         #: A person enabled it by a transition, and nobody took that back here.
         self._left_enabled = False
         #: The page by which that was done; None where it was no page.
@@ -48,34 +44,10 @@ class Axis(PowerState):
         self._standing: Grant | None = None
         #: Told why, when nobody may leave the axis enabled any longer; power is to be taken off.
         self.unattended: Callable[[str], None] = lambda _why: None
-        drive.listeners.add(self._units_may_have_changed)
-
-    async def units(self) -> AxisUnits:
-        """Units with the present gearing, read once until `forget`."""
-        if self._units is None:
-            units = await read_units(self.drive)
-            known = self.drive.readings
-            self._unit_raws = {
-                key: known[key].raw for key in self.drive.profile.unit_keys if key in known
-            }
-            self._units = units
-        return self._units
-
-    @property
-    def known_units(self) -> AxisUnits | None:
-        """Units as they were read last; None before that, and after the gearing changed."""
-        return self._units
-
-    def _units_may_have_changed(self, readings: list[Reading]) -> None:
-        """Whoever wrote the gearing (a page, a set, the panel): units are read anew."""
-        for reading in readings:
-            known = self._unit_raws.get(reading.key)
-            if known is not None and reading.raw is not None and reading.raw != known:
-                self._units = None
 
     def forget(self) -> None:
         """The drive restarted or its gearing changed."""
-        self._units = None
+        self.forget_scales()
         self.control_word = 0
 
     async def position_raw(self) -> int:
@@ -166,8 +138,7 @@ class Axis(PowerState):
 
     async def standstill(self, timeout_s: float) -> bool:
         """Whether the axis came to rest (position unchanged over 30 ms) within the time."""
-        units = await self.units()
-        tolerance = max(2, units.position_raw(0.0005))
+        tolerance = (await self.units()).rest_tolerance()
         deadline = time.monotonic() + timeout_s
         last = await self.position_raw()
         while time.monotonic() < deadline:
@@ -208,6 +179,7 @@ class Axis(PowerState):
                 drive=drive.name,
                 remedy="end the cyclic exchange, or use CSP, CSV or CST",
             )
+        await self.require_certain_scales()
         with self.granted(cia402.MODE_NAMES[mode], envelope):
             async with self._enabled(mode, envelope):
                 yield
@@ -253,14 +225,20 @@ class Axis(PowerState):
 
     @asynccontextmanager
     async def enabled_cyclic(
-        self, session: CyclicSession, mode: Mode, timeout_s: float
+        self, session: CyclicSession, mode: Mode, timeout_s: float, *, by_increments: bool = False
     ) -> AsyncIterator[None]:
         """Operation enabled through the loop; braked and disabled on every way out.
 
+        ``by_increments`` is for the small move that teaches a scale; every other motion needs
+        scales that are certain.
+
         Raises:
+            ScaleUnknown: they are not.
             NotAllowed: it cannot be enabled, the loop ended the motion, or the drive has a fault
                 at its end. Where the drive has a fault, the message names it.
         """
+        if not by_increments:
+            await self.require_certain_scales()
         with self.granted(cia402.MODE_NAMES[mode]):
             try:
                 await self.go_to_cyclic(session, State.OPERATION_ENABLED, mode, timeout_s)
@@ -290,9 +268,10 @@ class Axis(PowerState):
             faults = [f"{fault.code} {fault.name}" for fault in await self.active_faults()]
         except DriveError:
             return
-        if faults and faults[0] not in error.message:
+        if faults and not error.names_faults:
             error.message += f" ({', '.join(faults)})"
             error.args = (error.message,)
+            error.names_faults = True
 
     async def leave_cyclic(self, session: CyclicSession, timeout_s: float) -> None:
         """Brake and take the power off through the loop; nothing interrupts this.

@@ -1,4 +1,4 @@
-"""What the bench remembers of one axis beside its connection: mechanics and watch list.
+"""What the bench remembers of one axis beside its connection: mechanics, watch list, scales.
 
 One small file per axis in the state folder, written whole or not at all.
 """
@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from backend.files import write_atomically
 from backend.mechanics_calc import Mechanics
+from backend.scales.taught import Taught
 
 
 class AxisRecord(BaseModel):
@@ -21,6 +22,7 @@ class AxisRecord(BaseModel):
 
     mechanics: Mechanics | None = None
     watch: tuple[str, ...] = Field(default=(), description="parameter keys, in order")
+    scales: Taught | None = Field(default=None, description="as a person states or confirmed them")
 
 
 class AxisStore:

@@ -214,6 +214,7 @@ class Bench:
         axis.unattended = partial(self.motion.unattended, drive.id)
         self._unstopped -= places
         drive_id = drive.id
+        axis.teach(self.axis_records.get(drive_id).scales)
         monitor = Monitor(
             axis,
             self.journal,
@@ -326,7 +327,12 @@ class Bench:
         serial = await read_serial(drive)
         drive.found = replace(drive.found or Found(drive.ports[0].station), serial=serial)
         drive.identity_warning = ""
-        # What was left in the drive that was here before is no matter of this one.
+        # What was said of the drive that was here before is no matter of this one.
+        member.axis.teach(None)
+        member.axis.small_moves = None
+        record = self.axis_records.get(drive_id)
+        if record.scales is not None:
+            self.axis_records.put(drive_id, record.model_copy(update={"scales": None}))
         drive.owed.settle([debt.key for debt in drive.owed.debts])
         self.journal.add(f"{drive.name}: serial number {serial} accepted", drive=drive.id)
         self._remember()

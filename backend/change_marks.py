@@ -29,7 +29,7 @@ class ChangeMarks:
 
     def applied(self, *what: str) -> None:
         """What waited for one of ``what`` (write_settings, reenable, power_cycle) acts now."""
-        for key in [key for key, reason in self.pending.items() if reason in what]:
+        for key in [key for key, until in self.pending.items() if until in what]:
             del self.pending[key]
 
     def forget(self) -> None:

@@ -41,6 +41,10 @@ COMMANDS = {
         "functions:gear_command",
         "Electronic gear for a screw, belt, rack or rotary table; writes only with --write.",
     ),
+    "scales": (
+        "scales:app",
+        "What a raw position and speed mean: show, state, or teach by a small move (moves).",
+    ),
     "braking": ("functions:braking", "Energy of braking, and the resistor that it takes."),
     "sweep": (
         "measure:sweep",

@@ -156,7 +156,9 @@ class ForcingSession:
         if not needs_settings(drive, self.keys):
             return
         waiting = drive.pending.items()
-        others = [key for key, why in waiting if why == "write_settings" and key not in self.keys]
+        others = [
+            key for key, until in waiting if until == "write_settings" and key not in self.keys
+        ]
         if others:
             raise NotAllowed(
                 f"{drive.name}: {len(others)} changed parameters would begin to act with this: "

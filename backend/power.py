@@ -224,11 +224,13 @@ class PowerState:
         if goal is State.OPERATION_ENABLED:
             causes += await hints(self.drive)
         why = "; ".join(causes) or "the drive gives no reason"
-        return NotAllowed(
+        error = NotAllowed(
             f"{self.drive.name} stays in “{state.value}” and does not go to “{goal.value}”: {why}",
             drive=self.drive.name,
             remedy="remove the cause named and try again" if causes else "see the Alarms page",
         )
+        error.names_faults = state in (State.FAULT, State.FAULT_REACTION)
+        return error
 
     async def blocked_by(self) -> list[str]:
         """Known causes that keep the axis from being enabled, in words."""
@@ -246,7 +248,7 @@ class PowerState:
             causes.append("no main power: the DC bus is not charged, or STO is open")
         if not own and not word & cia402.STATUS_REMOTE and state in enabled_states:
             causes.append("the drive is not under bus control (remote bit is 0)")
-        waiting = [k for k, why in drive.pending.items() if why == "write_settings"]
+        waiting = [k for k, until in drive.pending.items() if until == "write_settings"]
         if waiting:
             causes.append(f"write-settings pending for {len(waiting)} parameters")
         return causes

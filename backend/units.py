@@ -6,63 +6,123 @@ each profile's ``units``, which carries the manual's line.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from backend.drive import Drive
 from backend.optional import existing
+from backend.scales.resolve import by_text, origin_of, read_told, scales_of
+from backend.scales.scale import Doubt, Origin, Quantity, Scale, Scales, ScaleUnknown
+from backend.scales.taught import Taught
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.motion.feedback import FeedbackScale
 from profiles.schema import Parameter, UnitSpec
 
-#: Raw units per rpm for families that count speed in turns; inc/s depends on the gearing.
-_RAW_PER_RPM = {"rpm": 1.0, "0.1 rpm": 10.0}
 #: Raw units per 1 % of rated torque.
 _RAW_PER_PERCENT = {"‰ rated": 10.0, "0.1 %": 10.0, "% rated": 1.0, "0.01 %": 100.0}
+#: A difference of 606Ch from the position below this is the rounding of a coarse 606Ch.
+_IGNORED_RPM = 30.0
+_RAW = "raw"
 
 
 @dataclass(frozen=True, slots=True)
 class AxisUnits:
-    """Scales of one axis. ``counts_per_rev`` is None where the resolution is unknown."""
+    """Scales of one axis. ``counts_per_rev`` is None where the resolution is unknown.
+
+    To show a raw value is always possible: without a certain scale it is shown as it is, under its
+    raw name. To make a raw value of one in engineering units raises `ScaleUnknown` then, so that
+    no tool can move by a unit that nobody knows.
+    """
 
     spec: UnitSpec
     counts_per_rev: float | None
+    stated: Scales | None = None
+    """As they were found; None: as the profile's texts have them."""
+    drive: str = "the drive"
+
+    @property
+    def scales(self) -> Scales:
+        """The three scales with their origins."""
+        if self.stated is not None:
+            return self.stated
+        per_rev, spec = self.counts_per_rev, self.spec
+        origin = origin_of(spec, Quantity.POSITION)
+        position = Scale(
+            Quantity.POSITION, per_rev, spec.position, origin, spec.source,
+            Doubt.NO_RESOLUTION if per_rev is None else None,
+        )  # fmt: skip
+        velocity, acceleration = (
+            by_text(quantity, text, per_rev, Origin.MANUAL, spec)
+            for quantity, text in (
+                (Quantity.VELOCITY, spec.velocity), (Quantity.ACCELERATION, spec.acceleration),
+            )  # fmt: skip
+        )
+        return Scales(position, velocity, acceleration)
 
     @property
     def names(self) -> dict[str, str]:
         """Unit shown for each quantity."""
-        turns = self.counts_per_rev is not None
+        scales, turns = self.scales, self.counts_per_rev is not None
         return {
-            "position": "rev" if turns else self.spec.position,
-            "velocity": "rpm" if self._raw_per_rpm is not None else self.spec.velocity,
-            "acceleration": "rpm/s" if self._raw_per_rpm is not None else self.spec.acceleration,
+            "position": "rev" if turns else scales.position.raw_unit or _RAW,
+            "velocity": "rpm" if scales.velocity.certain else scales.velocity.raw_unit or _RAW,
+            "acceleration": "rpm/s" if scales.acceleration.certain
+            else scales.acceleration.raw_unit or _RAW,
             "torque": "%",
-            "following_error": "rev" if turns else self.spec.position,
+            "following_error": "rev" if turns else scales.position.raw_unit or _RAW,
             "dc_voltage": "V",
             "temperature": "°C",
-        }
+        }  # fmt: skip
+
+    def _raw_per(self, scale: Scale) -> float:
+        """Raises ScaleUnknown where it is not certain."""
+        if scale.raw_per_unit is None:
+            raise ScaleUnknown(self.drive, scale)
+        return scale.raw_per_unit
 
     @property
-    def _raw_per_rpm(self) -> float | None:
-        if self.spec.velocity == "inc/s":
-            return None if self.counts_per_rev is None else self.counts_per_rev / 60.0
-        return _RAW_PER_RPM.get(self.spec.velocity)
+    def _per_rev(self) -> float:
+        if self.counts_per_rev is None:
+            scale = self.scales.position
+            if scale.certain:
+                scale = Scale(
+                    Quantity.POSITION, None, scale.raw_unit, Origin.UNKNOWN,
+                    doubt=Doubt.NO_RESOLUTION,
+                )  # fmt: skip
+            raise ScaleUnknown(self.drive, scale)
+        return self.counts_per_rev
 
-    # Without a known scale the raw unit is shown under its own name, so 1:1 is right there.
+    def require_certain(self) -> None:
+        """Position and speed have certain scales, so that an envelope means what it says.
+
+        Raises:
+            ScaleUnknown: one has not; what to do is in its remedy.
+        """
+        self._per_rev  # noqa: B018 - raises
+        self._raw_per(self.scales.velocity)
 
     def position(self, raw: float) -> float:
-        """Increments to revolutions."""
+        """Increments to revolutions, or the increments themselves."""
         return raw / (self.counts_per_rev or 1.0)
 
     def position_raw(self, revolutions: float) -> int:
-        """Revolutions to increments."""
-        return round(revolutions * (self.counts_per_rev or 1.0))
+        """Revolutions to increments.
+
+        Raises:
+            ScaleUnknown: increments per revolution are not certain.
+        """
+        return round(revolutions * self._per_rev)
 
     def velocity(self, raw: float) -> float:
-        """Raw speed to rpm."""
-        return raw / (self._raw_per_rpm or 1.0)
+        """Raw speed to rpm, or the raw speed itself."""
+        return raw / (self.scales.velocity.raw_per_unit or 1.0)
 
     def velocity_raw(self, rpm: float) -> int:
-        """Rpm to raw speed."""
-        return round(rpm * (self._raw_per_rpm or 1.0))
+        """Rpm to raw speed.
+
+        Raises:
+            ScaleUnknown: the unit of speeds is not certain.
+        """
+        return round(rpm * self._raw_per(self.scales.velocity))
 
     def velocity_raw_of(self, parameter: Parameter, rpm: float) -> int:
         """Rpm to the raw speed of an object whose own unit may differ from that of 60FFh.
@@ -73,14 +133,22 @@ class AxisUnits:
             return round(parameter.to_raw(rpm))
         return self.velocity_raw(rpm)
 
+    @property
+    def ramps_are_times(self) -> bool:
+        """Whether ramps are times to a speed; the larger number is the gentler ramp then."""
+        return self.spec.acceleration.startswith("ms")
+
     def acceleration_raw(self, rpm_per_s: float) -> int:
-        """Rpm/s to the raw ramp: a rate, or a time in ms for families that say so."""
+        """Rpm/s to the raw ramp: a rate, or a time in ms for families that say so.
+
+        Raises:
+            ScaleUnknown: the unit of ramps is not certain.
+        """
+        per = self._raw_per(self.scales.acceleration)
         reference = self.spec.ramp_reference_rpm
-        if self.spec.acceleration.startswith("ms") and reference is not None:
+        if self.ramps_are_times and reference is not None:
             return max(1, round(1000.0 * reference / rpm_per_s))
-        if self.spec.acceleration.startswith("inc/s"):
-            return max(1, round(rpm_per_s * (self.counts_per_rev or 60.0) / 60.0))
-        return max(1, round(rpm_per_s * _RAW_PER_RPM.get(self.spec.velocity, 1.0)))
+        return max(1, round(rpm_per_s * per))
 
     def torque(self, raw: float) -> float:
         """Raw torque to % of rated."""
@@ -89,6 +157,18 @@ class AxisUnits:
     def torque_raw(self, percent: float) -> int:
         """% of rated to raw torque."""
         return round(percent * _RAW_PER_PERCENT.get(self.spec.torque, 10.0))
+
+    @property
+    def feedback(self) -> FeedbackScale | None:
+        """How 606Ch and 6064h hang together; None where a scale is not certain."""
+        per_rpm = self.scales.velocity.raw_per_unit
+        if per_rpm is None or self.counts_per_rev is None:
+            return None
+        return FeedbackScale(60.0 * per_rpm / self.counts_per_rev, _IGNORED_RPM * abs(per_rpm))
+
+    def rest_tolerance(self) -> int:
+        """Increments that an axis at rest may move by: 0.0005 rev, where that is known."""
+        return max(2, round(0.0005 * (self.counts_per_rev or 0.0)))
 
 
 def gentlest_ramp_rpm_s(drive: Drive, key: str) -> float | None:
@@ -123,41 +203,26 @@ def ramp_raw(units: AxisUnits, drive: Drive, key: str, rpm_per_s: float) -> int:
     )
 
 
-async def read_units(drive: Drive) -> AxisUnits:
-    """Units of an axis with its present gearing.
+async def read_units(drive: Drive, taught: Taught | None = None) -> AxisUnits:
+    """Units of an axis with its present gearing, and what was ``taught`` of it.
 
     User increments per motor revolution are ``feed/feed_revs * shaft_revs/motor_revs`` where the
-    family has a feed constant, else the profile's resolution divided by the gear ratio. A feed
-    constant of 0 leaves the resolution unknown (M6-L with P05.05 = 0, 000:1276). Gear ratio and
-    feed constant are optional in CiA 402-2 (clause 7, 6091h and 6092h): where the drive says that
-    it has no such object, nothing is geared, and without a feed constant the resolution is unknown.
+    family has a feed constant, else the encoder's resolution (608Fh or the family's own), else the
+    profile's, divided by the gear ratio. A feed constant of 0 leaves the resolution unknown (M6-L
+    with P05.05 = 0, 000:1276). Gear ratio, feed constant and resolution are optional in CiA 402-2
+    (clause 7): where the drive says that it has no such object, nothing is geared, and without feed
+    constant and resolution nothing is known. Units are those of 60A8h to 60AAh where it has them.
 
     Raises:
-        DriveError: the gear parameters cannot be read.
+        DriveError: the objects cannot be read.
         NotAllowed: a unit switch of the drive is not where the profile's units hold.
     """
-    spec = drive.profile.units
     await _check_unit_switches(drive)
-    keys = [
-        key
-        for key in (spec.gear_numerator, spec.gear_denominator, spec.feed, spec.feed_revolutions)
-        if key is not None and not drive.unreachable_why(drive.parameter(key))
-    ]
-    raw: dict[str, float] = {}
-    for key, reading in (await existing(drive, keys)).items():
-        value = reading.raw
-        if isinstance(value, (int, float)) and (value > 0 or key == spec.feed):
-            raw[key] = float(value)
-
-    def of(key: str | None) -> float:
-        return raw.get(key or "", 1.0)
-
-    ratio = of(spec.gear_numerator) / of(spec.gear_denominator)
-    if spec.feed is not None and spec.feed in raw:
-        per_rev: float | None = of(spec.feed) / of(spec.feed_revolutions) or None
-    else:
-        per_rev = await encoder_counts(drive) or spec.counts_per_rev
-    return AxisUnits(spec, None if per_rev is None else per_rev / ratio)
+    told = await read_told(drive)
+    if drive.profile.units.feed not in told.raws:
+        told = replace(told, encoder=await encoder_counts(drive))
+    scales = scales_of(drive.profile.units, told, taught)
+    return AxisUnits(drive.profile.units, scales.position.raw_per_unit, scales, drive.name)
 
 
 #: Encoders with fewer or more bits than these are a misread parameter.
@@ -167,7 +232,8 @@ _ENCODER_BITS = range(10, 33)
 async def encoder_counts(drive: Drive) -> int | None:
     """Increments per revolution of the encoder that is connected, where the drive tells them.
 
-    R6L motors come with 17 or 23 bits (002:589), and its gear counts in encoder increments.
+    R6L motors come with 17 or 23 bits (002:589), and its gear counts in encoder increments. A
+    family without a parameter of its own has 608Fh, if it has that.
 
     Raises:
         DriveError: the parameter cannot be read.
@@ -180,7 +246,12 @@ async def encoder_counts(drive: Drive) -> int | None:
         if key == gear.encoder_counts_key:
             return raw or None
         return 1 << raw if raw in _ENCODER_BITS else None
-    return None
+    counts, turns = (drive.profile.by_key.get(key) for key in ("608F:01", "608F:02"))
+    if counts is None or drive.unreachable_why(counts):
+        return None
+    found = await existing(drive, [p.key for p in (counts, turns) if p is not None])
+    raws = [reading.raw for reading in found.values() if isinstance(reading.raw, int)]
+    return None if not raws or not all(raws) else round(raws[0] / (raws[1] if raws[1:] else 1))
 
 
 async def _check_unit_switches(drive: Drive) -> None:

@@ -64,13 +64,14 @@ def named(
     drive: str, error: DriveError, parameter: Parameter, value: Raw | None = None
 ) -> DriveError:
     """The same error, naming drive and parameter in its text."""
-    # A link names the node; the person knows the drive by the name on the bench.
-    error.drive = drive
+    # A link names the node; the person knows the drive by the name on the bench. What was raised
+    # for this drive already has its name in the text.
+    anonymous, error.drive = error.drive != drive, drive
     error.at(parameter=parameter.key)
     if value is not None and error.value is None:
         error.value = value
     prefix = f"{drive}: {parameter.key} {parameter.name}: "
-    if not error.message.startswith(drive):
+    if anonymous:
         error.message = prefix + error.message
         error.args = (error.message,)
     return error

@@ -10,13 +10,17 @@
     ├── Rejected         the drive understood and refused (abort or exception code)
     ├── OutOfRange       the value does not fit the parameter; nothing was sent
     ├── NotAllowed       access, state or permission forbids it; nothing was sent
-    │   └── NotInUse     the drive's own count leaves this entry out
+    │   ├── NotInUse     the drive's own count leaves this entry out
+    │   └── MotionHalted the cyclic loop ended the motion by force; ``halt`` says why
+    │       └── EnvelopeExceeded  a limit of the envelope was passed
     └── Busy             somebody or something else holds the axis or the bus
 
 Third-party exceptions are translated to these once, at the driver's edge.
 """
 
 from __future__ import annotations
+
+from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
 
 
 class DriveError(Exception):
@@ -118,15 +122,54 @@ class OutOfRange(DriveError):
 
 
 class NotAllowed(DriveError):
-    """Read-only, wrong state, missing permission or unmet precondition."""
+    """Read-only, wrong state, missing permission or unmet precondition.
+
+    ``names_faults``: the message already names the faults that the drive has.
+    """
 
     kind = "not-allowed"
+    names_faults = False
 
 
 class NotInUse(NotAllowed):
     """An entry of a list beyond the count that the drive tells: there is nothing to be read."""
 
     kind = "not-in-use"
+
+
+class MotionHalted(NotAllowed):
+    """The cyclic loop ended a motion by force. ``halt`` is the cause, to decide by."""
+
+    def __init__(
+        self, message: str, *, halt: Halted, drive: str | None = None, remedy: str | None = None
+    ) -> None:
+        super().__init__(message, drive=drive, remedy=remedy)
+        self.halt = halt
+
+
+class EnvelopeExceeded(MotionHalted):
+    """A limit of the motion envelope was passed, so the axis was braked and disabled."""
+
+
+def motion_halted(
+    where: str,
+    halt: Halted,
+    *,
+    words: str | None = None,
+    drive: str | None = None,
+    remedy: str | None = None,
+) -> MotionHalted:
+    """The error for a halt of ``where``, a station or a drive by name.
+
+    ``words`` are those in the units of the axis, where they are known.
+    """
+    kind = EnvelopeExceeded if halt.cause in ENVELOPE_CAUSES else MotionHalted
+    return kind(f"{where}: {words or halt.words}", halt=halt, drive=drive, remedy=remedy)
+
+
+def exceeded(error: DriveError) -> HaltCause | None:
+    """The limit of the envelope that ended a motion with this error; None for any other error."""
+    return error.halt.cause if isinstance(error, EnvelopeExceeded) else None
 
 
 class Busy(DriveError):

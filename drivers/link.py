@@ -17,6 +17,8 @@ import numpy.typing as npt
 
 from drivers.cia402 import State
 from drivers.errors import DriveError
+from drivers.halt import LoopState
+from drivers.motion.feedback import FeedbackScale
 from profiles.schema import DataType, LinkKind, Profile
 
 
@@ -183,6 +185,8 @@ class Envelope:
     speed_max: float | None = None
     torque_max: float | None = None
     following_error_max: float | None = None
+    feedback: FeedbackScale | None = None
+    """How 606Ch and 6064h hang together: both are compared then, and the speed limit watches both."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,5 +292,5 @@ class OwnsPowerState(Protocol):
     async def reset_fault(self, station: int) -> None:
         """Reset a fault once; the axis stays disabled."""
 
-    def axis_state(self, station: int) -> tuple[str, str, str]:
+    def axis_state(self, station: int) -> LoopState:
         """Power state, phase of the setpoints, and why the last motion was ended by force."""

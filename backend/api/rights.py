@@ -145,6 +145,12 @@ _API: dict[str, Need] = {
     "GET /drives/{drive_id}/record": _LOOK,
     "PUT /drives/{drive_id}/mechanics": _PARAMETERS,
     "PUT /drives/{drive_id}/watch": _PARAMETERS,
+    # Whoever says what a revolution is decides how far the next motion goes.
+    "GET /drives/{drive_id}/scales": _LOOK,
+    "PUT /drives/{drive_id}/scales": _MOTION,
+    "DELETE /drives/{drive_id}/scales": _MOTION,
+    "POST /drives/{drive_id}/scales/confirm": _MOTION,
+    "POST /drives/{drive_id}/jobs/small_move": _MOTION,
     "POST /drives/{drive_id}/gear/plan": _LOOK,
     "POST /drives/{drive_id}/gear/write": _PARAMETERS,
     "POST /calculate/braking": _LOOK,

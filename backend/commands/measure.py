@@ -181,12 +181,14 @@ async def exchanging(
     consent: bool,
 ) -> AsyncIterator[tuple[Axis, CyclicSession]]:  # fmt: skip
     """The drive with its bus exchanging process data, all of it ended afterwards."""
+    from backend.commands.scales import take_taught
     from backend.tools import profile_speed
 
     if url is None:
         raise NotAllowed("give a bus URL, or --server and --axis", remedy="see --help")
     async with drive_at(url, station, profile) as drive:
         axis = Axis(drive)
+        await take_taught(axis)
         link = drive.ports[0].link
         by_speed = {drive.id} if profile_speed.needed(drive, link) else set[str]()
         session = CyclicSession(link, [drive], by_speed)

@@ -55,16 +55,20 @@ def build(evidence: Evidence, target: Path) -> None:
         StorageFailed: the disk does not take it.
     """
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=target.parent, prefix=".bundle-") as folder:
-            part = Path(folder) / "bundle.zip"
-            with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=3) as archive:
-                _fill(archive, evidence, Path(folder))
-            with part.open("rb") as file:
-                os.fsync(file.fileno())
-            part.replace(target)
+        _build(evidence, target)
     except OSError as error:
         raise _failed(target, error.strerror or str(error)) from error
+
+
+def _build(evidence: Evidence, target: Path) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".bundle-") as folder:
+        part = Path(folder) / "bundle.zip"
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=3) as archive:
+            _fill(archive, evidence, Path(folder))
+        with part.open("rb") as file:
+            os.fsync(file.fileno())
+        part.replace(target)
 
 
 def _failed(target: Path, why: str) -> StorageFailed:
@@ -144,9 +148,9 @@ def main() -> int:
     os.nice(NICE)
     evidence = pickle.load(sys.stdin.buffer)  # noqa: S301 - from the server that started us
     try:
-        build(evidence, Path(sys.argv[1]))
-    except StorageFailed as error:
-        sys.stderr.write(error.message.partition(": ")[2])
+        _build(evidence, Path(sys.argv[1]))
+    except OSError as error:
+        sys.stderr.write(error.strerror or str(error))
         return 1
     return 0
 

@@ -227,7 +227,7 @@ class RecordingReader:
         state: Literal["complete", "interrupted", "failed"] = "complete"
         if end is None:
             state = "interrupted"
-        elif reason == "failed":
+        elif facts.get("problem"):
             state = "failed"
         return Summary(
             header=self.header,

@@ -93,7 +93,8 @@ def measured_from(
 
 
 def _sentence(file: str, error: DriveError) -> str:
-    return error.message if file in error.message else f"{file}: {error.message}"
+    """What names the file as its value has it in the text already."""
+    return error.message if error.value == file else f"{file}: {error.message}"
 
 
 def _measured(store: MeasurementStore, file: str) -> Measured:

@@ -130,14 +130,18 @@ def _online_copy(source: Path, target: Path) -> Path:
             new.execute("PRAGMA journal_mode=DELETE").close()
             found = new.execute("PRAGMA integrity_check").fetchone()[0]
     except sqlite3.Error as error:
-        found = str(error)
+        raise _damaged(source, str(error)) from error
     if found != "ok":
-        raise BackupFailed(
-            f"the database {source} is damaged: {found}",
-            value=str(source),
-            remedy="keep the older backups and restore one of them",
-        )
+        raise _damaged(source, found)
     return target
+
+
+def _damaged(source: Path, found: str) -> BackupFailed:
+    return BackupFailed(
+        f"the database {source} is damaged: {found}",
+        value=str(source),
+        remedy="keep the older backups and restore one of them",
+    )
 
 
 def _shared_copy(store: Store, folder: Path) -> Path:

@@ -42,7 +42,7 @@ from backend.tools.tune_present import Trials
 from backend.tools.tune_time import NOT_AGAIN, TimeLeft
 from backend.tools.tune_verify import Check, Keep, Verified, otherwise, unseen
 from drivers.cia402 import State
-from drivers.errors import NotAllowed
+from drivers.errors import EnvelopeExceeded, NotAllowed
 
 #: A response with more of its samples at a torque limit is none.
 _SATURATED = 0.25
@@ -51,8 +51,6 @@ _BY_STEP = (
     "verified by its standstill and its step alone: too few lines of the tuned loop stand out of "
     "the noise for its margins to be read"
 )
-#: How the loop tells that it has ended a motion for its torque.
-_TOO_MUCH_TORQUE = "is beyond the limit"
 #: Gains that hardly any axis oscillates with, for measuring one that does with its own.
 #: With the inertia that the drive holds, and with that of the motor alone.
 _SOFT_HZ, _SOFT_ALONE_HZ = 5.0, 20.0
@@ -141,11 +139,10 @@ async def _tuned(
     gains = await _steady_gains(axis, session, facts)
     try:
         found = await _measured(axis, session, settings, facts, gains, progress, keep, time_left)
-    except NotAllowed as error:
-        faulty = await axis.state() in (State.FAULT, State.FAULT_REACTION)
-        if gains or faulty or _TOO_MUCH_TORQUE not in error.message:
+    except EnvelopeExceeded:
+        if gains or await axis.state() in (State.FAULT, State.FAULT_REACTION):
             raise
-        # It stood still, but its own gains answer a motion with all the torque there is.
+        # It stood still, but with its own gains a motion leaves the envelope, mostly by its torque.
         gains = _soft_gains(axis, facts)
         found = await _measured(
             axis, session, settings, facts, gains, progress, keep, time_left, home

@@ -23,10 +23,11 @@ from backend.drive import Drive
 from backend.jobs import JobResult, Progress
 from backend.motion import loop
 from backend.ports import address_of
+from backend.scales.words import halt_remedy, halt_words
 from backend.tools.jog import Hold, JogSettings, require_scale
 from drivers import link as bus
 from drivers.cia402 import Mode
-from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
+from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, motion_halted
 
 _RENEW_S = 0.05
 _STATE_TIMEOUT_S = 5.0
@@ -135,7 +136,7 @@ async def generate(
         OutOfRange: the signal leaves the envelope; nothing has moved.
         NotAllowed: the loop ended the motion; the reason is in words.
     """
-    units, drive = await axis.units(), axis.drive
+    units, drive = await axis.require_certain_scales(), axis.drive
     cycle_s = _cycle(session)
     values = signal(settings, cycle_s)
     mode = Mode[settings.mode]
@@ -188,7 +189,7 @@ async def jog_cyclic(
     Raises:
         NotAllowed: as `generate`.
     """
-    units, drive = await axis.units(), axis.drive
+    units, drive = await axis.require_certain_scales(), axis.drive
     cycle_s = _cycle(session)
     require_scale(axis, units, settings)
     progress(0.0, "enabling")
@@ -213,7 +214,7 @@ async def jog_cyclic(
         trajectory = bus.Trajectory(station, target, raw, limits)
         await loop.play(session, drive, trajectory, axis.grant())
         progress(0.0, "moving")
-        reason = await _while_held(session, station, hold)
+        reason = await _while_held(axis, session, hold)
         await session.cyclic.halt(station)
         if not await axis.standstill(2.0):
             raise LinkTimeout(
@@ -238,10 +239,11 @@ def run_up(travel: float, speed: float, slope: float, cycle_s: float) -> Signal:
     return np.asarray(np.where(t < ramp, rising, np.where(t < ramp + cruise, level, falling)))
 
 
-async def _while_held(session: CyclicSession, station: int, hold: Hold) -> str:
+async def _while_held(axis: Axis, session: CyclicSession, hold: Hold) -> str:
+    station = session.station(axis.drive)
     while not (reason := hold.ended()):
         await session.cyclic.renew(station)
-        _raise_if_ended(session, station)
+        _raise_if_ended(axis, session)
         await asyncio.sleep(_RENEW_S)
     return reason
 
@@ -263,6 +265,7 @@ async def _limits(axis: Axis, envelope: Envelope, start: int) -> bus.Envelope:
         position_max=start + travel,
         speed_max=units.velocity_raw(envelope.speed_rpm * 1.2 + 20.0),
         torque_max=units.torque_raw(envelope.torque_percent),
+        feedback=units.feedback,
     )
 
 
@@ -288,22 +291,28 @@ async def _play(
                 remedy="look at the link quality: the computer skips many cycles",
             )
         await session.cyclic.renew(station)
-        _raise_if_ended(session, station)
+        _raise_if_ended(axis, session)
         progress(min(elapsed / duration_s, 1.0), "playing")
         left_s = duration_s - elapsed
         await asyncio.sleep(min(_RENEW_S, left_s) if left_s > 0 else _RENEW_S)
-    _raise_if_ended(session, station)
+    _raise_if_ended(axis, session)
 
 
 def _plays(session: CyclicSession, station: int) -> bool:
     """Whether values are still to come, where the loop tells."""
     power = session.power()
-    return power is not None and power.axis_state(station)[1] == "playing"
+    return power is not None and power.axis_state(station).phase == "playing"
 
 
-def _raise_if_ended(session: CyclicSession, station: int) -> None:
+def _raise_if_ended(axis: Axis, session: CyclicSession) -> None:
+    station = session.station(axis.drive)
     power = session.power()
-    if power is not None and (reason := power.axis_state(station)[2]):
-        raise NotAllowed(
-            f"station {station}: {reason}", remedy="see the Alarms page; check the envelope"
+    halt = None if power is None else power.axis_state(station).halted
+    if halt is not None:
+        raise motion_halted(
+            axis.drive.name,
+            halt,
+            words=halt_words(halt, axis.known_units),
+            drive=axis.drive.name,
+            remedy=halt_remedy(halt, "see the Alarms page; check the envelope"),
         )

@@ -9,10 +9,10 @@ import numpy as np
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
 from backend.tools.axis_facts import AxisFacts
-from backend.tools.interrupted import too_strong
 from backend.tools.recording import Play, bus_limits, cycle_s, enabled, play, quiet
 from drivers.cia402 import Mode
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, exceeded
+from drivers.halt import HaltCause
 
 _TURN = 2 * np.pi
 #: Nearer than the larger of these (turns, share of the travel) is near enough.
@@ -55,7 +55,7 @@ async def go_back(
                 facts,
             )  # fmt: skip
         except NotAllowed as error:
-            if slower >= _SLOWEST or not too_strong(error):
+            if slower >= _SLOWEST or exceeded(error) is not HaltCause.TORQUE:
                 raise
             slower *= 2.0
             await quiet(axis)

@@ -37,7 +37,7 @@ async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobR
         NotAllowed: homing error (bit 13), a fault, or travel beyond the envelope.
         LinkTimeout: not attained in time.
     """
-    drive, units = axis.drive, await axis.units()
+    drive, units = axis.drive, await axis.require_certain_scales()
     known = {method.method: method for method in drive.profile.homing_methods}
     if settings.method not in known:
         raise OutOfRange(

@@ -64,8 +64,8 @@ async def inertia(
     """
     _check(settings)
     require_signals(axis, session, Mode.CSV, False)
+    units = await axis.require_certain_scales()
     facts = await read_facts(axis, settings.rated_torque_nm, settings.motor_inertia_kgm2)
-    units = await axis.units()
     home = await axis.position_raw()
     ends = settings.ends_rev if settings.scheme == "taught" else None
     if ends is not None and not ends[0] < units.position(home) < ends[1]:

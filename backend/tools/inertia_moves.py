@@ -15,13 +15,13 @@ from backend.tools import profile_speed
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.go_back import go_back
 from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.interrupted import Interrupted
 from backend.tools.probe import RoughFit, require_right_sign, rough_fit, smoothed
 from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play, quiet
 from backend.tools.soft_loop import SoftLoop, soft_loop_of
 from backend.tools.temporary import stopping_hard
 from drivers.cia402 import Mode
-from drivers.errors import NotAllowed, OutOfRange
+from drivers.errors import EnvelopeExceeded, NotAllowed, OutOfRange, exceeded
+from drivers.halt import HaltCause
 
 _TURN = 2 * np.pi
 #: A ramp shorter than this excites the machine's resonances more than its inertia.
@@ -168,11 +168,12 @@ async def _first_move(
 ) -> Recording:
     try:
         return await speed_move(axis, session, speed_rpm, envelope, facts, lambda _fraction: None)
-    except NotAllowed as error:
-        if isinstance(error, Interrupted) or "torque" not in error.message:
+    except EnvelopeExceeded as error:
+        if error.halt.cause is not HaltCause.TORQUE:
             raise
-        raise NotAllowed(
+        raise EnvelopeExceeded(
             f"{axis.drive.name}: a short move takes more torque than is permitted: {error.message}",
+            halt=error.halt,
             drive=axis.drive.name,
             remedy="look for a closed brake, a blocked axis or gains that are far too high",
         ) from error
@@ -211,7 +212,7 @@ async def identification_moves(
             )  # fmt: skip
         except NotAllowed as error:
             last = attempt == _ATTEMPTS - 1
-            if last or isinstance(error, Interrupted) or "torque" not in error.message:
+            if last or exceeded(error) is not HaltCause.TORQUE:
                 raise
         await quiet(axis)
         await go_back(axis, session, start, room, facts)

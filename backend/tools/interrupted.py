@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from backend.axis import Axis
 from backend.cyclic import CyclicSession
+from backend.scales.words import halt_remedy, halt_words
 from drivers.cia402 import State
-from drivers.errors import DriveError, LinkLost, NotAllowed
+from drivers.errors import DriveError, LinkLost, NotAllowed, motion_halted
+from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
 
 #: Ends that the loop makes by itself for what a tool has asked of the axis. A smaller motion or
 #: other gains may mend them; nothing mends any other end but a person.
-_OF_THE_MOTION = ("is beyond the limit", "were not renewed in time")
-#: How the loop tells that the drive did it.
-_FELL_OUT = "the drive left Operation enabled"
+_OF_THE_MOTION = ENVELOPE_CAUSES | {HaltCause.EXPIRED}
 _LOOK = (
     "see the Alarms page; without an alarm look at the emergency stop, the drive's supply and "
     "whoever else may disable it, then measure again"
@@ -22,8 +22,11 @@ class Interrupted(NotAllowed):
     """The drive, a switch or a person ended the motion, or did not let it begin.
 
     No work in progress tries anything else then: an emergency stop that was pressed and is
-    released again must not let an axis move by itself (ISO 13850).
+    released again must not let an axis move by itself (ISO 13850). ``halt`` is how the loop ended
+    the motion; None where none had begun.
     """
+
+    halt: Halted | None = None
 
 
 def interrupted(error: NotAllowed) -> Interrupted:
@@ -34,24 +37,20 @@ def interrupted(error: NotAllowed) -> Interrupted:
     )  # fmt: skip
 
 
-def too_fast(error: NotAllowed) -> bool:
-    """Whether the loop ended a motion for its speed, so that a smaller one may be made."""
-    ended = not isinstance(error, Interrupted)
-    return ended and "speed" in error.message and _OF_THE_MOTION[0] in error.message
-
-
-def too_strong(error: NotAllowed) -> bool:
-    """Whether the loop ended a motion for its torque, so that a weaker one may be made."""
-    ended = not isinstance(error, Interrupted)
-    return ended and "torque" in error.message and _OF_THE_MOTION[0] in error.message
+def interrupted_by(axis: Axis, halt: Halted) -> Interrupted:
+    """A halt of this axis that nothing else may be tried after."""
+    name, words = axis.drive.name, halt_words(halt, axis.known_units)
+    error = Interrupted(f"{name}: {words}", drive=name, remedy=halt_remedy(halt, _LOOK))
+    error.halt = halt
+    return error
 
 
 def require_held(axis: Axis, session: CyclicSession) -> None:
     """Disabled by others after its last sample, it must not be enabled again to go home either."""
     power = session.power()
-    reason = "" if power is None else power.axis_state(session.station(axis.drive))[2]
-    if reason.startswith(_FELL_OUT):
-        raise Interrupted(f"{axis.drive.name}: {reason}", drive=axis.drive.name, remedy=_LOOK)
+    halt = None if power is None else power.axis_state(session.station(axis.drive)).halted
+    if halt is not None and halt.cause is HaltCause.LEFT_ENABLED:
+        raise interrupted_by(axis, halt)
 
 
 async def require_enabled(axis: Axis) -> None:
@@ -62,11 +61,7 @@ async def require_enabled(axis: Axis) -> None:
     """
     state = await axis.state()
     if state is not State.OPERATION_ENABLED:
-        raise Interrupted(
-            f"{axis.drive.name}: {_FELL_OUT}: {state.value}",
-            drive=axis.drive.name,
-            remedy=_LOOK,
-        )
+        raise interrupted_by(axis, Halted(HaltCause.LEFT_ENABLED, note=state.value))
 
 
 async def ends_all(axis: Axis, error: DriveError) -> bool:
@@ -80,19 +75,20 @@ def raise_if_ended(axis: Axis, session: CyclicSession) -> None:
     """Raise with the reason when the loop has ended the motion by force.
 
     Raises:
-        NotAllowed: by what was asked of the axis.
+        MotionHalted: by what was asked of the axis; `EnvelopeExceeded` for a limit.
         Interrupted: by something else.
         LinkLost: nothing is exchanged any more.
     """
     power, name = session.power(), axis.drive.name
-    if power is not None and (reason := power.axis_state(session.station(axis.drive))[2]):
-        if any(words in reason for words in _OF_THE_MOTION):
-            raise NotAllowed(
-                f"{name}: {reason}", drive=name,
+    halt = None if power is None else power.axis_state(session.station(axis.drive)).halted
+    if halt is not None:
+        if halt.cause in _OF_THE_MOTION:
+            raise motion_halted(
+                name, halt, words=halt_words(halt, axis.known_units), drive=name,
                 remedy="check load, limits and gains, then widen the envelope only if the machine "
                 "allows it",
             )  # fmt: skip
-        raise Interrupted(f"{name}: {reason}", drive=name, remedy=_LOOK)
+        raise interrupted_by(axis, halt)
     if not session.running:
         raise LinkLost(
             f"{name}: the cyclic exchange ended during the measurement", drive=name,

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
 from backend.optional import ramp_keys
+from backend.scales.polled import PolledGuard
 from backend.travel_units import REVOLUTIONS, TravelUnit
 from backend.units import AxisUnits, ramp_raw
 from drivers import cia402
@@ -81,7 +82,7 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
         NotAllowed: the axis cannot be enabled, or left the envelope.
         DriveError: the link failed; the drive stops by itself as described above.
     """
-    drive, units = axis.drive, await axis.units()
+    drive, units = axis.drive, await axis.require_certain_scales()
     if settings.direction not in (-1, 1):
         raise OutOfRange(
             f"direction {settings.direction} is neither 1 nor -1",
@@ -115,17 +116,11 @@ def require_scale(axis: Axis, units: AxisUnits, settings: JogSettings) -> None:
     """A jog must know how far a revolution is, and its speed must be one the drive can have.
 
     Raises:
-        NotAllowed: the resolution is unknown, so no stopping distance can be computed.
+        ScaleUnknown: what a revolution or a speed is, is not certain.
         OutOfRange: the speed is below the drive's resolution.
     """
     drive = axis.drive
-    if units.counts_per_rev is None:
-        raise NotAllowed(
-            f"{drive.name}: increments per revolution are unknown, so the stopping distance of a "
-            "jog cannot be computed",
-            drive=drive.name,
-            remedy="set feed constant and gear ratio on the Parameters page",
-        )
+    units.require_certain()
     if units.velocity_raw(settings.speed_rpm) <= 0:
         raise OutOfRange(
             f"{drive.name}: {settings.shown.say_speed(settings.speed_rpm)} is below the "
@@ -145,8 +140,11 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
     low, high = drive.parameter(target_key).raw_limits
     due = time.monotonic()
     last_target: int | None = None
+    guard = PolledGuard(axis, units, settings.speed_rpm * 1.3 + 30.0)
     while not (reason := hold.ended()):
-        position, state = await _observe(axis)
+        asked_s = time.monotonic()
+        position, velocity, state = await _observe(axis)
+        guard.look(position, velocity, asked_s)
         if state is not State.OPERATION_ENABLED:
             raise NotAllowed(
                 f"{drive.name} left “{State.OPERATION_ENABLED.value}” while jogging: "
@@ -174,12 +172,12 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
     return reason
 
 
-async def _observe(axis: Axis) -> tuple[int, State]:
+async def _observe(axis: Axis) -> tuple[int, int, State]:
     drive = axis.drive
-    status, position = drive.require("status_word"), drive.require("position_actual")
-    readings = await drive.read_many((status, position))
+    keys = [drive.require(r) for r in ("status_word", "position_actual", "velocity_actual")]
+    readings = await drive.read_many(keys)
     values: list[int] = []
-    for key in (status, position):
+    for key in keys:
         raw = readings[key].raw
         if not isinstance(raw, int):
             raise DriveError(
@@ -189,7 +187,7 @@ async def _observe(axis: Axis) -> tuple[int, State]:
                 remedy="check the cable; the axis stops by itself",
             )
         values.append(raw)
-    return values[1], drive.decode_state(values[0])
+    return values[1], values[2], drive.decode_state(values[0])
 
 
 def _inside(axis: Axis, settings: JogSettings, moved_rev: float) -> None:

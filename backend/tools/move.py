@@ -10,6 +10,7 @@ from typing import Literal
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
 from backend.optional import ramp_keys
+from backend.scales.polled import PolledGuard
 from backend.units import AxisUnits, ramp_raw
 from drivers import cia402
 from drivers.cia402 import Mode, State
@@ -52,15 +53,29 @@ class SequenceSettings:
     envelope: Envelope
 
 
+@dataclass(frozen=True, slots=True)
+class _Watch:
+    """What one motion is held to, from where it began."""
+
+    start: int
+    envelope: Envelope
+    guard: PolledGuard
+
+
+def _watch(axis: Axis, units: AxisUnits, start: int, envelope: Envelope) -> _Watch:
+    return _Watch(start, envelope, PolledGuard(axis, units, envelope.speed_rpm * 1.3 + 30.0))
+
+
 async def move(axis: Axis, settings: MoveSettings, progress: Progress) -> JobResult:
     """One move in a profile mode; ends at the target, or after the envelope's time (PV, PT).
 
     Raises:
         OutOfRange: target or speed outside the envelope; nothing has moved.
         NotAllowed: no consent where it is needed, or the axis left the envelope.
+        MotionHalted: it is too fast, or its speed and position contradict each other.
         LinkTimeout: the target was not reached in time.
     """
-    units = await axis.units()
+    units = await axis.require_certain_scales()
     if settings.mode != "PP":
         _require_watchdog_or_consent(axis, settings.consent)
     async with axis.restoring(*(ramps := await _ramps(axis, settings))):
@@ -77,7 +92,8 @@ async def move(axis: Axis, settings: MoveSettings, progress: Progress) -> JobRes
             start = await axis.position_raw()
             if settings.mode == "PP":
                 target = _target(units, settings, start)
-                await _to(axis, target, start, settings.envelope, progress)
+                watch = _watch(axis, units, start, settings.envelope)
+                await _to(axis, target, watch, progress)
             else:
                 await _hold(axis, settings, start, progress)
             end = await axis.position_raw()
@@ -90,7 +106,7 @@ async def sequence(axis: Axis, settings: SequenceSettings, progress: Progress) -
     Raises:
         OutOfRange, NotAllowed, LinkTimeout: as `move`.
     """
-    units = await axis.units()
+    units = await axis.require_certain_scales()
     first = MoveSettings(
         "PP",
         settings.first,
@@ -107,15 +123,15 @@ async def sequence(axis: Axis, settings: SequenceSettings, progress: Progress) -
         for place in (settings.first, settings.second):
             _require_reachable(axis, units, units.position_raw(place), start, settings.envelope)
         async with axis.enabled(Mode.PP, settings.envelope):
-            start = await axis.position_raw()
+            watch = _watch(axis, units, await axis.position_raw(), settings.envelope)
             for number in range(settings.count):
                 for place in (settings.first, settings.second):
                     progress(number / settings.count, f"cycle {number + 1} of {settings.count}")
                     began = time.monotonic()
                     target = units.position_raw(place)
-                    await _to(axis, target, start, settings.envelope, None)
+                    await _to(axis, target, watch, None)
                     times.append(time.monotonic() - began)
-                    await _dwell(axis, settings.dwell_s, start, settings.envelope)
+                    await _dwell(axis, settings.dwell_s, watch)
     return {"cycles": settings.count, "mean_move_s": sum(times) / len(times)}
 
 
@@ -192,22 +208,21 @@ def _require_reachable(
     drive.check(drive.parameter(drive.require("position_target")), target)
 
 
-async def _dwell(axis: Axis, dwell_s: float, start: int, envelope: Envelope) -> None:
+async def _dwell(axis: Axis, dwell_s: float, watch: _Watch) -> None:
     """Wait, and notice when the axis is pushed away or leaves Operation enabled meanwhile."""
     end = time.monotonic() + dwell_s
     while (left := end - time.monotonic()) > 0:
         await asyncio.sleep(min(left, 5 * _POLL_S))
-        await _still_inside(axis, start, envelope)
+        await _still_inside(axis, watch)
 
 
-async def _to(
-    axis: Axis, target: int, start: int, envelope: Envelope, progress: Progress | None
-) -> None:
+async def _to(axis: Axis, target: int, watch: _Watch, progress: Progress | None) -> None:
     """Set-point handshake (CiA 402-2 clause 10.3.3), then wait for target reached."""
     drive, units = axis.drive, await axis.units()
+    start, envelope = watch.start, watch.envelope
     _require_reachable(axis, units, target, start, envelope)
     # A word that enables must not bring back an axis that somebody or a fault took out.
-    await _still_inside(axis, start, envelope)
+    await _still_inside(axis, watch)
     word = cia402.ENABLE_OPERATION | cia402.CHANGE_IMMEDIATELY
     await axis.control(word)
     key = drive.require("position_target")
@@ -219,7 +234,7 @@ async def _to(
     await _acknowledged(axis)
     await axis.control(word)
     while True:
-        status = await _still_inside(axis, start, envelope)
+        status = await _still_inside(axis, watch)
         position = await axis.position_raw()
         if progress and target != start:
             progress(min(1.0, abs((position - start) / (target - start))), "moving")
@@ -278,17 +293,18 @@ async def _hold(axis: Axis, settings: MoveSettings, start: int, progress: Progre
     drive, units, envelope = axis.drive, await axis.units(), settings.envelope
     role, raw = _require_inside(axis, units, settings)
     await drive.command(drive.require(role), raw, axis.grant())
-    began = time.monotonic()
+    began, watch = time.monotonic(), _watch(axis, units, start, envelope)
     while (elapsed := time.monotonic() - began) < envelope.time_s:
         progress(elapsed / envelope.time_s, "running")
-        await _still_inside(axis, start, envelope)
+        await _still_inside(axis, watch)
         await asyncio.sleep(_POLL_S)
     await drive.relax(drive.require(role), 0)
 
 
-async def _still_inside(axis: Axis, start: int, envelope: Envelope) -> int:
+async def _still_inside(axis: Axis, watch: _Watch) -> int:
     """Status word; ends the motion when the axis left the envelope or Operation enabled."""
-    drive, units = axis.drive, await axis.units()
+    drive, units, envelope = axis.drive, await axis.units(), watch.envelope
+    asked_s = time.monotonic()
     keys = [drive.require(r) for r in ("status_word", "position_actual", "velocity_actual")]
     readings = await drive.read_many(keys)
     raws: list[int] = []
@@ -310,8 +326,7 @@ async def _still_inside(axis: Axis, start: int, envelope: Envelope) -> int:
             drive=drive.name,
             remedy="see the Alarms page",
         )
-    moved, speed = abs(units.position(position - start)), abs(units.velocity(velocity))
-    shown = envelope.shown
+    moved, shown = abs(units.position(position - watch.start)), envelope.shown
     if moved > envelope.travel_rev * 1.02 + 0.05:
         raise NotAllowed(
             f"{drive.name} left the travel limit: {shown.say(moved)} from the start",
@@ -320,12 +335,5 @@ async def _still_inside(axis: Axis, start: int, envelope: Envelope) -> int:
             limit=shown.say(envelope.travel_rev),
             remedy="check load and limits",
         )
-    if speed > envelope.speed_rpm * 1.3 + 30:
-        raise NotAllowed(
-            f"{drive.name} is faster than the envelope: {shown.say_speed(speed)}",
-            drive=drive.name,
-            value=shown.speed(speed),
-            limit=shown.say_speed(envelope.speed_rpm),
-            remedy="check load and limits",
-        )
+    watch.guard.look(position, velocity, asked_s)
     return status

@@ -28,7 +28,6 @@ from backend.jobs import Progress
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
 from backend.tools.go_back import go_back
-from backend.tools.interrupted import too_fast
 from backend.tools.notch import plan_notches
 from backend.tools.notch_meaning import NotchMeaning
 from backend.tools.notch_trials import BEFORE, Trial, least_of, limits_of, raw_of, trials_of
@@ -46,7 +45,8 @@ from backend.tools.recording import (
 from backend.tools.repeats import Repeats
 from backend.tools.temporary import stopping_hard, temporary
 from drivers.cia402 import Mode
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, exceeded
+from drivers.halt import HaltCause
 
 _TURN = 2 * np.pi
 #: Where the notch is tried: share of the sample rate, and limits in Hz.
@@ -277,7 +277,8 @@ class _Free:
                 torque = await self._torque(told)
                 break
             except NotAllowed as error:
-                if self.smaller is None or self._lessened == ATTEMPTS or not too_fast(error):
+                too_fast = exceeded(error) is HaltCause.SPEED
+                if self.smaller is None or self._lessened == ATTEMPTS or not too_fast:
                     raise
                 self._lessened += 1
                 try:

@@ -22,7 +22,8 @@ from backend.io_functions import read_terminals
 from backend.optional import existing
 from backend.tools.recording import Play, bus_limits, cycle_s, enabled, play, quiet
 from drivers.cia402 import Mode, State
-from drivers.errors import LinkTimeout, NotAllowed
+from drivers.errors import LinkTimeout, NotAllowed, exceeded
+from drivers.halt import HaltCause
 from drivers.link import Link, TakesSpeeds
 
 CONSENT = (
@@ -114,6 +115,7 @@ async def prepared(
         RestoreFailed: on leaving, naming what could not be put back.
     """
     drive = axis.drive
+    await axis.require_certain_scales()
     require_consent(session, drive, consent)
     if drive.id not in session.by_speed:
         async with keeping_mode(axis, session):
@@ -200,7 +202,7 @@ async def _require_signed(axis: Axis, session: CyclicSession, envelope: Envelope
                 lambda _fraction: None,
             )  # fmt: skip
     except NotAllowed as error:
-        if "speed" not in error.message and "position" not in error.message:
+        if exceeded(error) not in (HaltCause.SPEED, HaltCause.POSITION):
             raise
         raise _other_way(drive) from error
     if not await axis.standstill(2.0):

@@ -21,11 +21,13 @@ from backend.cyclic import CyclicSession, channel
 from backend.jobs import Progress
 from backend.motion import loop
 from backend.ports import address_of
+from backend.scales.compare import disagreement_of
 from backend.tools.alignment import BoolArray, FloatArray, Run, aligned
-from backend.tools.interrupted import interrupted, raise_if_ended, require_held
+from backend.tools.interrupted import interrupted, interrupted_by, raise_if_ended, require_held
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed
+from drivers.motion.feedback import FeedbackScale
 
 _RENEW_S = 0.03
 _STATE_TIMEOUT_S = 5.0
@@ -185,17 +187,25 @@ def takes_torque(axis: Axis, session: CyclicSession) -> bool:
 
 
 @asynccontextmanager
-async def enabled(axis: Axis, session: CyclicSession, mode: Mode) -> AsyncIterator[int]:
+async def enabled(
+    axis: Axis, session: CyclicSession, mode: Mode, *, by_increments: bool = False
+) -> AsyncIterator[int]:
     """Operation enabled through the loop, for the length of the block; yields the position.
+
+    ``by_increments`` as in `Axis.enabled_cyclic`.
 
     On every way out the axis is braked and disabled.
 
     Raises:
+        ScaleUnknown: a scale is not certain, so that the envelope would say nothing.
         Interrupted: it cannot be enabled, or the drive has a fault at the end.
     """
     inside = False
+    if not by_increments:
+        await axis.require_certain_scales()
+    entered = axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S, by_increments=by_increments)
     try:
-        async with axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S):
+        async with entered:
             await _forgotten(axis, session)
             inside = True
             yield await axis.position_raw()
@@ -212,7 +222,7 @@ async def _forgotten(axis: Axis, session: CyclicSession) -> None:
     power, station = session.power(), session.station(axis.drive)
     deadline = time.monotonic() + _TAIL_S
     while time.monotonic() < deadline:
-        if power is None or not power.axis_state(station)[2]:
+        if power is None or not power.axis_state(station).halted:
             return
         await asyncio.sleep(_RENEW_S / 2)
 
@@ -226,6 +236,7 @@ async def bus_limits(axis: Axis, envelope: Envelope, start_raw: int) -> bus.Enve
         position_max=start_raw + travel,
         speed_max=units.velocity_raw(envelope.speed_rpm),
         torque_max=units.torque_raw(envelope.torque_percent),
+        feedback=units.feedback,
     )
 
 
@@ -238,14 +249,17 @@ async def play(
     progress: Callable[[float], None],
     *,
     until: Callable[[FloatArray], bool] | None = None,
+    raw: bool = False,
 ) -> Recording:
     """Play one sequence on an enabled axis and return the recording.
+
+    ``raw``: its signals stay in raw units, of an axis whose scales are to be found.
 
     ``until`` is called about 20 times a second with the rows [n, 3] of raw position, velocity and
     torque that came since, and ends the motion early, by braking, when it returns True.
 
     Raises:
-        NotAllowed: the envelope ended the motion; the reason is in words.
+        MotionHalted: the envelope ended the motion; `MotionHalted.halt` is why.
         Interrupted: so did anything else, such as a fault.
         LinkLost: samples did not come.
     """
@@ -279,7 +293,22 @@ async def play(
     table, valid = await asyncio.to_thread(
         aligned, whole, catch.runs(), drive.name, ended_early=ended_early
     )
-    return await _in_si(axis, whole, table, valid, period_s, rated_torque_nm)
+    if limits.feedback is not None:
+        _require_agreement(axis, bridged(table, valid), period_s, limits.feedback)
+    return await _in_si(axis, whole, table, valid, period_s, rated_torque_nm, raw=raw)
+
+
+def _require_agreement(
+    axis: Axis, table: FloatArray, period_s: float, scale: FeedbackScale
+) -> None:
+    """Nothing is computed from a 606Ch that the position contradicts.
+
+    Raises:
+        Interrupted: naming both speeds.
+    """
+    halt = disagreement_of(table[:, 0], table[:, 1], period_s, scale)
+    if halt is not None:
+        raise interrupted_by(axis, halt)
 
 
 async def _drive_through(
@@ -333,14 +362,18 @@ async def _in_si(
     valid: BoolArray,
     period_s: float,
     rated_torque_nm: float,
+    *,
+    raw: bool,
 ) -> Recording:
     units = await axis.units()
+    to_rad = 1.0 if raw else units.position(1.0) * 2 * np.pi
+    to_rad_s = 1.0 if raw else units.velocity(1.0) * 2 * np.pi / 60.0
     count = len(table)
     table = bridged(table, valid)
     return Recording(
         sample_rate_hz=1.0 / period_s,
-        position_rad=table[:, 0] * (units.position(1.0) * 2 * np.pi),
-        velocity_rad_s=table[:, 1] * (units.velocity(1.0) * 2 * np.pi / 60.0),
+        position_rad=table[:, 0] * to_rad,
+        velocity_rad_s=table[:, 1] * to_rad_s,
         torque_nm=table[:, 2] * (units.torque(1.0) / 100.0 * rated_torque_nm),
         sent=whole[:count, 0],
         offset=whole[:count, 1] if whole.shape[1] > 1 else np.zeros(count),

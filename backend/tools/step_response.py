@@ -80,7 +80,7 @@ async def step_response(
         OutOfRange: the step leaves the envelope; nothing has moved.
         NotAllowed: the envelope or a fault ended it.
     """
-    units, rate = await axis.units(), 1.0 / cycle_s(session)
+    units, rate = await axis.require_certain_scales(), 1.0 / cycle_s(session)
     speed = settings.kind == "speed"
     mode = Mode.CSV if speed else Mode.CSP
     require_signals(axis, session, mode, False)

@@ -37,7 +37,8 @@ from backend.tools.sweep_play import MODE_OF, Records, scaled_by_speed
 from backend.tools.sweep_telling import play_telling
 from backend.tools.temporary import stopping_hard, temporary
 from drivers.cia402 import Mode, State
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, exceeded
+from drivers.halt import HaltCause
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
@@ -60,6 +61,7 @@ async def sweep(
         LinkLost: samples were lost; nothing is concluded from the rest.
     """
     check(settings)
+    await axis.require_certain_scales()
     if settings.hold is None and axis.drive.id in session.by_speed:
         # Profile velocity without ramps: what a reference is does not change between two cycles.
         settings = replace(settings, hold="zero")
@@ -88,8 +90,13 @@ async def sweep(
             setup, records = await how.measured(loop, progress)
         except NotAllowed as error:
             # A pull that friction hides shows when the axis turns.
-            ran_away = loop == "none" and settings.loop == "auto" and "position" in error.message
-            if not ran_away or await axis.state() is State.FAULT:
+            ran_away = exceeded(error) is HaltCause.POSITION
+            if (
+                loop != "none"
+                or settings.loop != "auto"
+                or not ran_away
+                or await axis.state() is State.FAULT
+            ):
                 raise
             await go_back(axis, session, home, settings.envelope, facts)
             setup, records = await how.measured("speed", progress)

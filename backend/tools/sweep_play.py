@@ -16,13 +16,13 @@ from backend.cyclic import CyclicSession
 from backend.jobs import Progress
 from backend.tools import excite, speed_injection
 from backend.tools.go_back import go_back
-from backend.tools.interrupted import Interrupted, too_fast
 from backend.tools.recording import Play, Recording, bus_limits, enabled, play, quiet, share
 from backend.tools.repeats import Repeats
 from backend.tools.sweep_evaluation import SweepSettings
 from backend.tools.sweep_plan import Setup, sequences_of
 from drivers.cia402 import Mode
-from drivers.errors import NotAllowed, OutOfRange
+from drivers.errors import NotAllowed, OutOfRange, exceeded
+from drivers.halt import HaltCause
 
 _TURN = 2 * np.pi
 MODE_OF = {"none": Mode.CST, "speed": Mode.CSV, "position": Mode.CSP}
@@ -203,11 +203,8 @@ def _too_much(error: NotAllowed, setup: Setup) -> bool:
     Torque is a loop's own answer; without a loop it is what was asked for. An axis that leaves its
     travel is one that a load pulls, or whose place is too narrow.
     """
-    if isinstance(error, Interrupted):
-        return False
-    if setup.loop != "none":
-        return "torque" in error.message
-    return too_fast(error)
+    mendable = HaltCause.SPEED if setup.loop == "none" else HaltCause.TORQUE
+    return exceeded(error) is mendable
 
 
 def _smaller(

@@ -139,9 +139,10 @@ async def stopping_hard(axis: Axis, speed_rpm: float) -> AsyncIterator[None]:
     """Inside the block a quick stop brakes from this speed as fast as set-points are ramped down.
 
     Raises:
+        ScaleUnknown: what a speed is, is not certain: nothing may move.
         RestoreFailed: on leaving, where the drive's own deceleration could not be put back.
     """
-    drive = axis.drive
+    drive, units = axis.drive, await axis.require_certain_scales()
     async with axis.restoring(*await existing(drive, quick_stop_keys(drive))) as before:
-        await raise_quick_stop_from(drive, await axis.units(), speed_rpm, before)
+        await raise_quick_stop_from(drive, units, speed_rpm, before)
         yield

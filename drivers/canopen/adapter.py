@@ -7,7 +7,7 @@ from pathlib import Path
 
 import can
 
-from drivers.canopen.slcan import BLOCKED, SlcanBus
+from drivers.canopen.slcan import AdapterBlocked, AdapterGone, SlcanBus
 from drivers.canopen.url import CanUrl
 from drivers.errors import LinkLost
 
@@ -60,7 +60,7 @@ def translate(url: CanUrl, error: BaseException) -> LinkLost:
     elif code == errno.ENETDOWN:
         why = "the interface is down"
         remedy = f"sudo ip link set {url.channel} up type can bitrate {url.bitrate}"
-    elif code == errno.ENOBUFS or text == BLOCKED:
+    elif code == errno.ENOBUFS or isinstance(error, AdapterBlocked):
         why = "nobody acknowledges: the send buffer is full"
         remedy = "check wiring, termination and bit rate; at least one other node must be on"
     elif code == errno.EAFNOSUPPORT or "AF_CAN" in text:
@@ -69,7 +69,7 @@ def translate(url: CanUrl, error: BaseException) -> LinkLost:
     elif isinstance(error, (can.CanInterfaceNotImplementedError, ImportError, NameError)):
         why = f"its driver is not installed ({text})"
         remedy = "install the adapter maker's driver, or use socketcan on Linux"
-    elif "adapter is gone" in text:
+    elif isinstance(error, AdapterGone):
         why = text
         remedy = "check its USB cable and plug it in again; it is opened by itself when it is back"
     else:

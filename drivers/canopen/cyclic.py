@@ -24,7 +24,9 @@ from drivers.canopen.trajectory import motion_of
 from drivers.canopen.url import CanUrl
 from drivers.cia402 import Dialect, Mode, State
 from drivers.errors import DriveError, LinkLost, NotAllowed
+from drivers.ethercat.motion import Phase
 from drivers.ethercat.playback import AxisLoop
+from drivers.halt import HaltCause, Halted, LoopState
 from drivers.link import CyclicSignal, LinkEvent, ScopeBlock, Trajectory, Unsubscribe
 from drivers.setpoints import require_fits
 
@@ -233,7 +235,7 @@ class CanopenCyclic:
             LinkLost: nobody receives it. The setpoints end all the same, for when the bus is back.
         """
         if self._loop is not None:
-            self._loop.halt(station, "it was halted")
+            self._loop.halt(station, Halted(HaltCause.COMMANDED))
             if self._loop.bus_lost:
                 raise LinkLost("the CAN bus is lost", remedy="wait until the adapter is back")
 
@@ -281,12 +283,12 @@ class CanopenCyclic:
         self._require_axis(station)
         self._require_running().axis(station, AxisLoop.reset_fault)
 
-    def axis_state(self, station: int) -> tuple[str, str, str]:
+    def axis_state(self, station: int) -> LoopState:
         """Power state, phase of the setpoints, and why the last motion was ended by force."""
         axis = None if self._loop is None else self._loop.images.axes.get(station)
         if axis is None:
-            return "Unknown", "idle", ""
-        return axis.state.value, axis.phase.value, axis.halted
+            return LoopState(State.UNKNOWN.value, Phase.IDLE.value, None)
+        return LoopState(axis.state.value, axis.phase.value, axis.halted)
 
     # For the link
 
@@ -311,11 +313,12 @@ class CanopenCyclic:
         own = self._settings.own_id
         if (event.kind, event.station) == ("boot", own) and self._loop.images.outputs:
             # From now on its heartbeat stands for ours: see `_require_own_number`.
-            self._loop.halt(None, f"node {own}, the number of this computer's heartbeat, started")
+            twice = f"node {own}, the number of this computer's heartbeat, started"
+            self._loop.halt(None, Halted(HaltCause.LOST, note=twice))
         elif event.kind in ("lost", "boot") or (event.kind == "fault" and event.station is None):
-            self._loop.abandon(event.station, event.text)
+            self._loop.abandon(event.station, Halted(HaltCause.LOST, note=event.text))
         elif event.kind == "fault":
-            self._loop.halt(event.station, event.text)
+            self._loop.halt(event.station, Halted(HaltCause.LOST, note=event.text))
 
     def drives(self, station: int, index: int, subindex: int) -> bool:
         """Whether this object is written by our PDOs each cycle."""

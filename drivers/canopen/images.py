@@ -9,6 +9,7 @@ from drivers import cia402
 from drivers.canopen.pdo import PdoPlan
 from drivers.codec import decode, encode, size_of
 from drivers.ethercat.playback import AxisLoop
+from drivers.halt import Halted
 from profiles.schema import INTEGER_RANGE, DataType
 
 Key = tuple[int, int, int]
@@ -144,7 +145,7 @@ class Images:
             slot = self.outputs[station, index, 0]
             self.frames[slot.cob_id][slot.start : slot.start + slot.size] = encode(slot.type, value)
 
-    def neutralise(self, station: int, why: str) -> None:
+    def neutralise(self, station: int, why: Halted) -> None:
         """End everything of this station and make its outputs harmless.
 
         Disabled, no speed, no torque; the position stays, as holding is what a position does. A

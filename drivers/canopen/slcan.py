@@ -15,7 +15,15 @@ import can
 import serial
 from can.interfaces.slcan import slcanBus
 
-BLOCKED = "the adapter takes no more frames"
+
+class AdapterBlocked(can.CanOperationError):
+    """The adapter takes no more frames."""
+
+
+class AdapterGone(can.CanOperationError):
+    """The adapter does not answer the computer any more."""
+
+
 """Said where its own buffer is full: it is there, but what it has cannot be sent."""
 
 _ASK_AGAIN_S = 0.5
@@ -43,7 +51,7 @@ class SlcanBus(slcanBus):
                 line = self._buffered_line()
         except (OSError, serial.SerialException, TypeError) as error:
             # TypeError: pyserial reads a descriptor that another thread has closed.
-            raise can.CanOperationError(f"the adapter is gone: {error}") from error
+            raise AdapterGone(f"the adapter is gone: {error}") from error
         if line == "\a":
             self._ask_for_flags()
         return line
@@ -54,9 +62,9 @@ class SlcanBus(slcanBus):
             while not self._drained():
                 pass
         except serial.SerialTimeoutException as error:
-            raise can.CanOperationError(BLOCKED) from error
+            raise AdapterBlocked("the adapter takes no more frames") from error
         except (OSError, serial.SerialException, termios.error, TypeError) as error:
-            raise can.CanOperationError(f"the adapter is gone: {error}") from error
+            raise AdapterGone(f"the adapter is gone: {error}") from error
 
     def _drained(self) -> bool:
         """Wait until everything is on the line; False where a signal of this process broke it off.

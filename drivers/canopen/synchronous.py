@@ -20,6 +20,7 @@ from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout
 from drivers.ethercat.motion import Motion, Phase
 from drivers.ethercat.playback import AxisLoop
+from drivers.halt import HaltCause, Halted
 from drivers.link import LinkEvent, ScopeBlock
 
 _BLOCK_S = 0.025
@@ -28,6 +29,10 @@ _OPERATIONAL = b"\x05"
 _BRAKE_WHEN_SILENT_S = 0.05
 _GIVE_UP_WHEN_SILENT_S = 0.3
 _LATENESS_KEPT = 4096
+_SILENT = Halted(HaltCause.LOST, note="its cyclic data stopped coming")
+_SILENT_BRAKED = Halted(
+    HaltCause.LOST, note="its cyclic data stopped coming: it is told to brake, heard or not"
+)
 
 
 class LoopClock(Protocol):
@@ -181,14 +186,14 @@ class SyncLoop:
                 self.images.axes[station].play(motion)
             return self._cycle
 
-    def halt(self, station: int | None, why: str) -> None:
+    def halt(self, station: int | None, why: Halted) -> None:
         """Brake one station, or all with None, and leave Operation enabled."""
         with self._lock:
             for axis in self.images.axes.values():
                 if station in (None, axis.station):
                     axis.stop(why, State.READY)
 
-    def abandon(self, station: int | None, why: str) -> None:
+    def abandon(self, station: int | None, why: Halted) -> None:
         """A node or the bus is lost: setpoints end without a ramp, as nobody receives it."""
         with self._lock:
             for node in self.images.stations:
@@ -197,7 +202,7 @@ class SyncLoop:
 
     def halt_and_wait(self) -> None:
         """Stop everything and wait until nothing is enabled, at most 1.5 s. Blocks."""
-        self.halt(None, "the cyclic exchange ends")
+        self.halt(None, Halted(HaltCause.COMMANDED, note="the cyclic exchange ends"))
 
         def still() -> bool:
             return self._bus_lost or all(
@@ -277,7 +282,7 @@ class SyncLoop:
                 lost, self._bus_lost = not self._bus_lost, True
                 self._lock.notify_all()
             if lost:
-                self.abandon(None, error.message)
+                self.abandon(None, Halted(HaltCause.LOST, note=error.message))
                 self._tell(LinkEvent("state", None, f"cyclic exchange interrupted: {error}"))
             return
         self._bus_lost = False
@@ -288,6 +293,8 @@ class SyncLoop:
             self._flush()
             self._dropped += missed
             self._statistics.skipped += missed
+            for axis in self.images.axes.values():
+                axis.skip(missed)
             self._cycle += missed
             self._block_start_s += missed * self.cycle_s
 
@@ -320,9 +327,9 @@ class SyncLoop:
         self._silent_s[station] = now = before + self.cycle_s
         if before < _BRAKE_WHEN_SILENT_S <= now:
             # Where the line is cut it hears nothing of that, and goes on as its watchdog lets it.
-            axis.stop("its cyclic data stopped coming: it is told to brake, heard or not")
+            axis.stop(_SILENT_BRAKED)
         if before < _GIVE_UP_WHEN_SILENT_S <= now:
-            self.images.neutralise(station, "its cyclic data stopped coming")
+            self.images.neutralise(station, _SILENT)
 
     def _flush(self) -> None:
         if not self._rows:

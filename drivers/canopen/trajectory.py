@@ -23,6 +23,7 @@ def motion_of(trajectory: Trajectory, cycle_s: float) -> Motion:
             envelope.speed_max,
             envelope.torque_max,
             envelope.following_error_max,
+            envelope.feedback,
         ),
         renew_cycles=max(1, math.ceil(trajectory.renew_s / cycle_s)),
         longest_step=longest_step(trajectory),

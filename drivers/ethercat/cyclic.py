@@ -20,6 +20,7 @@ from drivers.ethercat.motion import Phase
 from drivers.ethercat.playback import AxisLoop
 from drivers.ethercat.ring import RESYNCED, VALID, Ring, lost_flag
 from drivers.ethercat.segment import Segment
+from drivers.halt import HaltCause, Halted
 
 DISTRUST_S = 0.03
 """Without valid process data for this long no setpoint can be trusted: every axis brakes."""
@@ -164,7 +165,7 @@ class CyclicLoop:
         """Whether any axis plays or brakes."""
         return any(image.axis.phase is not Phase.IDLE for image in self.images)
 
-    def stop_axes(self, why: str, station: int | None = None) -> None:
+    def stop_axes(self, why: Halted, station: int | None = None) -> None:
         """Brake one axis or all."""
         for image in self.images:
             if station in (None, image.station):
@@ -203,6 +204,8 @@ class CyclicLoop:
             self.next_ns += skipped * self.cycle_ns
             self.number += skipped
             self.counters.overruns += skipped
+            for image in self.images:
+                image.axis.skip(skipped)
             self._resynced = RESYNCED
         late_us = late // 1000
         self._late_ns = late
@@ -232,9 +235,8 @@ class CyclicLoop:
             self.counters.wkc_errors += 1
         self._invalid_run += 1
         if self._invalid_run == self._distrust and self.moving():
-            self.stop_axes(
-                f"no valid process data for {self._invalid_run} cycles: the axis is braked"
-            )
+            silent = f"no valid process data for {self._invalid_run} cycles: the axis is braked"
+            self.stop_axes(Halted(HaltCause.LOST, note=silent))
 
     def _decide(self, image: Image, slave: object, *, valid: bool) -> None:
         axis = image.axis
@@ -246,7 +248,7 @@ class CyclicLoop:
             outputs = image.pack(*axis.outputs)
         except struct.error:
             # A setpoint outside its type: the last good one stays while the axis brakes.
-            axis.stop("a setpoint does not fit its object: the axis is braked")
+            axis.stop(Halted(HaltCause.UNFIT))
             return
         if outputs != image.outputs:
             image.outputs = outputs

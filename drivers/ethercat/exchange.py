@@ -12,7 +12,7 @@ from drivers.ethercat import setup as setup_
 from drivers.ethercat.al_status import ERROR_BIT, AlState
 from drivers.ethercat.cyclic import CyclicLoop, Image, layout, percentile_us
 from drivers.ethercat.lanes import Done, Lanes
-from drivers.ethercat.motion import Limits, Motion
+from drivers.ethercat.motion import Motion, limits_of
 from drivers.ethercat.playback import AxisLoop
 from drivers.ethercat.preparation import Preparation, Report
 from drivers.ethercat.protocol import Message
@@ -21,10 +21,13 @@ from drivers.ethercat.segment import Segment
 from drivers.ethercat.setup import Snapshot, StationSetup
 from drivers.ethercat.station import Station, al_status, change_state
 from drivers.ethercat.steps import Pause, Steps
+from drivers.halt import HaltCause, Halted
 
 _NOT_YET, _OP_TRIES, _OP_PAUSE_S = (0x001B, 0x002D), 5, 0.2
 """Process data or SYNC0 stayed away (AL status codes of ETG.1020 table 2)."""
 _LEAVE_S, _SETTLE_DC_S, _SETTLE_S = 0.5, 0.4, 0.02
+_STOPPING = Halted(HaltCause.COMMANDED, note="the cyclic exchange is being stopped")
+_NO_ANSWER = Halted(HaltCause.LOST, note="the drive no longer answers")
 
 
 class Exchange:
@@ -138,7 +141,7 @@ class Exchange:
         if self.loop is None:
             done(None, None)
             return
-        self.loop.stop_axes("the cyclic exchange is being stopped")
+        self.loop.stop_axes(_STOPPING)
         self.operational = False
         self._leaving = (time.monotonic() + _LEAVE_S, done)
 
@@ -189,7 +192,7 @@ class Exchange:
         loop = self.loop
         if loop is None:
             return
-        loop.stop_axes(why)
+        loop.stop_axes(Halted(HaltCause.LOST, note=why))
         deadline = time.monotonic() + _LEAVE_S
         while time.monotonic() < deadline and self._still_enabled():
             loop.cycle()
@@ -202,7 +205,7 @@ class Exchange:
     def station_lost(self, station: int) -> None:
         """A station no longer answers: its axis ends, the others go on without it."""
         if self.loop is not None:
-            self.loop.stop_axes("the drive no longer answers", station)
+            self.loop.stop_axes(_NO_ANSWER, station)
             self.loop.leave_out(station, lost=True)
 
     def healing(self, station: int) -> bool:
@@ -328,7 +331,7 @@ class Exchange:
                 image.station: {
                     "state": image.axis.state.value,
                     "phase": image.axis.phase.value,
-                    "halted": image.axis.halted,
+                    "halted": None if image.axis.halted is None else image.axis.halted.to_wire(),
                 }
                 for image in loop.images
             },
@@ -345,7 +348,7 @@ def _motion(item: Message, cycle_ns: int) -> Motion:
     return Motion(
         target=item["target"],
         values=values,
-        limits=Limits(**item["limits"]),
+        limits=limits_of(item["limits"]),
         renew_cycles=max(round(item["renew_s"] * 1e9 / cycle_ns), 1),
         longest_step=item["longest_step"],
         offset=item.get("offset"),

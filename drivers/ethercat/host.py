@@ -26,11 +26,16 @@ from drivers.ethercat import protocol, realtime
 from drivers.ethercat.operations import Operations
 from drivers.ethercat.protocol import Message
 from drivers.ethercat.ring import Ring
+from drivers.halt import HaltCause, Halted
 
 _LAST_WORDS_S = 5
 _STATUS_S = 0.2
 _PATIENT_FRAME_US = 30_000
 _SERVER_SILENT_S = 3.0
+_SILENT = Halted(
+    HaltCause.LOST,
+    note=f"the server has been silent for {_SERVER_SILENT_S:g} s: the axis is braked",
+)
 
 
 class Host:
@@ -70,7 +75,7 @@ class Host:
             loop.cycle()
             self._commands(0.0)
             if self._server_is_silent():
-                loop.stop_axes("the server has been silent for 3 s: the axis is braked")
+                loop.stop_axes(_SILENT)
             operations.use_spare_time()
         else:
             worked = any(operations.lanes.step() for _ in range(8))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import array
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 from drivers import cia402
 from drivers.errors import NotAllowed
+from drivers.motion.feedback import FeedbackScale
 
 #: The objects of CiA 402-2 that a motion commands and watches.
 CONTROL, MODE, POSITION, VELOCITY, TORQUE = 0x6040, 0x6060, 0x607A, 0x60FF, 0x6071
@@ -36,6 +38,7 @@ class Limits:
     speed_max: float | None = None
     torque_max: float | None = None
     following_error_max: float | None = None
+    feedback: FeedbackScale | None = None
 
     def require_watched(self, inputs: Container[int], where: str) -> None:
         """Every limit has its value among these objects of the cyclic data.
@@ -43,17 +46,27 @@ class Limits:
         Raises:
             NotAllowed: one has not.
         """
+        compared = self.feedback
         for name, index, limit in (
             ("travel", ACTUAL_POSITION, self.position_min),
             ("travel", ACTUAL_POSITION, self.position_max),
             ("speed", ACTUAL_VELOCITY, self.speed_max),
             ("torque", ACTUAL_TORQUE, self.torque_max),
+            ("speed", ACTUAL_POSITION, compared and compared.velocity_per_inc_s),
+            ("speed", ACTUAL_VELOCITY, compared and compared.velocity_per_inc_s),
         ):
             if limit is not None and index not in inputs:
                 raise NotAllowed(
                     f"{where}: the {name} limit cannot be watched, {index:04X}h is not mapped",
                     remedy=f"configure the cyclic data with {index:04X}h",
                 )
+
+
+def limits_of(message: Mapping[str, Any]) -> Limits:
+    """The envelope as it came from the server's process, as plain values."""
+    feedback = message.get("feedback")
+    scale = None if feedback is None else FeedbackScale(**feedback)
+    return Limits(**{**message, "feedback": scale})
 
 
 @dataclass(frozen=True, slots=True)

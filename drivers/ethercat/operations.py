@@ -24,6 +24,7 @@ from drivers.ethercat.roster import Roster, Send
 from drivers.ethercat.segment import Segment, SpoiltMap
 from drivers.ethercat.setup import FoundInPart
 from drivers.ethercat.station import Station
+from drivers.halt import HaltCause, Halted
 
 _CONTROL_WORD = 0x6040
 _MAX_STEPS_PER_CYCLE = 16
@@ -31,6 +32,7 @@ _STARVED_CYCLES = 8
 _NS_PER_BYTE = 80
 """100 Mbit/s: a frame may not become so long that process data wait for it."""
 _FIND_TRIES = 3
+_ENDED = Halted(HaltCause.COMMANDED, note="the motion was ended")
 """A search that lost a frame has not seen everything; one that loses some each time is told."""
 
 
@@ -385,7 +387,7 @@ class Operations:
 
     def _halt(self, message: Message, done: Done) -> None:
         if self.loop is not None:
-            self.loop.stop_axes("the motion was ended", message["station"])
+            self.loop.stop_axes(_ENDED, message["station"])
         done(None, None)
 
     def _drive_to(self, message: Message, done: Done) -> None:

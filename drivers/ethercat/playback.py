@@ -33,6 +33,8 @@ from drivers.ethercat.motion import (
     Motion,
     Phase,
 )
+from drivers.halt import HaltCause, Halted
+from drivers.motion.guard import SpeedGuard
 
 STOP_S = 0.1
 """From any speed to standstill; shorter than the 200 ms in which a lost setpoint must end."""
@@ -41,6 +43,7 @@ _RESTLESS = 2
 """Increments per cycle that encoder noise may make of an axis at rest."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STANDARD = cia402.Dialect()
+_DISABLED = Halted(HaltCause.COMMANDED, note="the axis is being disabled")
 _STALE_CYCLES = 3
 """Samples that may be older than what a mailbox told before an axis was enabled anew."""
 _REST_S, _GIVE_UP = 0.05, 30
@@ -66,8 +69,8 @@ class AxisLoop:
         self.phase = Phase.IDLE
         self.state = State.UNKNOWN
         self.goal: State | None = None
-        self.halted = ""
-        """Why the last motion was ended by force, in words."""
+        self.halted: Halted | None = None
+        """Why the last motion was ended by force."""
         self._in = inputs
         self._out = outputs
         self._report = report
@@ -95,6 +98,9 @@ class AxisLoop:
         self._moved = 0
         """Increments since the cycle before."""
         self._moved_at_stop = 0
+        self._cycle_s = cycle_s
+        self._cycles = 0
+        self._speed_guard = SpeedGuard(None, None)
 
     # Commands ------------------------------------------------------------------------------
 
@@ -117,10 +123,10 @@ class AxisLoop:
                 )
             if self.phase is Phase.BRAKING:
                 raise NotAllowed(
-                    f"station {self.station} is braking: {self.halted}",
+                    f"station {self.station} is braking: {self._why}",
                     remedy="wait until it stands",
                 )
-            self.halted = ""
+            self.halted = None
         if mode is not None and self.phase is not Phase.IDLE:
             raise NotAllowed(
                 f"station {self.station} moves: its mode cannot be changed now",
@@ -135,7 +141,7 @@ class AxisLoop:
         ):
             if self.phase is Phase.BRAKING:
                 self._after_brake = goal
-            self.stop("the axis is being disabled", goal)
+            self.stop(_DISABLED, goal)
             return
         self.goal = goal
 
@@ -143,7 +149,7 @@ class AxisLoop:
         """Reset a fault once; the axis stays disabled."""
         self._reset = True
         self.goal = State.SWITCH_ON_DISABLED
-        self.halted = ""
+        self.halted = None
 
     def play(self, motion: Motion) -> None:
         """Begin with the first value in the next cycle.
@@ -156,14 +162,15 @@ class AxisLoop:
         self._place = 0
         self._life = motion.renew_cycles
         self.phase = Phase.PLAYING
-        self.halted = ""
+        self.halted = None
+        self._speed_guard = SpeedGuard(motion.limits.feedback, motion.limits.speed_max)
 
     def renew(self) -> None:
         """Extend the life of the setpoints."""
         if self._motion is not None:
             self._life = self._motion.renew_cycles
 
-    def stop(self, why: str, goal: State = State.READY) -> None:
+    def stop(self, why: Halted, goal: State = State.READY) -> None:
         """Brake now, then head for ``goal``."""
         if self.phase is Phase.BRAKING:
             return
@@ -171,7 +178,7 @@ class AxisLoop:
             self.goal = goal if self.goal is State.OPERATION_ENABLED else self.goal
             return
         self.halted = why
-        self._report(self.station, why)
+        self._report(self.station, why.words)
         motion, self._motion = self._motion, None
         self._clear_offsets()
         if motion is not None and motion.target == TORQUE:
@@ -193,6 +200,7 @@ class AxisLoop:
 
     def step(self, values: Sequence[int]) -> None:
         """Outputs of the next cycle from the inputs of this one, which must be valid."""
+        self._cycles += 1
         place = self._in.get(MODE_SHOWN)
         if place is not None:
             self._mode = values[place]
@@ -223,6 +231,7 @@ class AxisLoop:
         Once it has braked, the axis is told to quick-stop whether or not it is heard: nobody knows
         whether it stands, and disabled by other words it would coast.
         """
+        self._cycles += 1
         if self.phase is not Phase.IDLE:
             self._advance()
         elif self.goal not in (None, State.OPERATION_ENABLED) and CONTROL in self._out:
@@ -230,12 +239,17 @@ class AxisLoop:
             if word & cia402.ENABLE_OPERATION == cia402.ENABLE_OPERATION:
                 self.outputs[self._out[CONTROL]] = self._dialect.quick_stop
 
+    def skip(self, cycles: int) -> None:
+        """Cycles that the computer was too late for: time passed, and nothing was exchanged."""
+        self._cycles += cycles
+
     def _fell_out(self) -> None:
         if self.goal is State.OPERATION_ENABLED:
             self.goal = State.SWITCH_ON_DISABLED
-            self._report(self.station, f"the drive left Operation enabled: {self.state.value}")
+            fell_out = Halted(HaltCause.LEFT_ENABLED, note=self.state.value)
+            self._report(self.station, fell_out.words)
             if self.phase is not Phase.IDLE:
-                self.halted = f"the drive left Operation enabled: {self.state.value}"
+                self.halted = fell_out
         self.phase = Phase.IDLE
         self._motion = None
         self._clear_offsets()
@@ -245,31 +259,33 @@ class AxisLoop:
         assert self._motion is not None
         self._life -= 1
         if self._life < 0:
-            self.stop("the setpoints were not renewed in time: the axis is braked and disabled")
+            self.stop(Halted(HaltCause.EXPIRED))
             return
         limits = self._motion.limits
         position = self._value(values, ACTUAL_POSITION)
         if position is not None:
             if limits.position_min is not None and position < limits.position_min:
-                self.stop(_beyond("position", position, limits.position_min))
+                self.stop(Halted.beyond("position", position, limits.position_min))
                 return
             if limits.position_max is not None and position > limits.position_max:
-                self.stop(_beyond("position", position, limits.position_max))
+                self.stop(Halted.beyond("position", position, limits.position_max))
                 return
-        for name, index, limit in (
-            ("speed", ACTUAL_VELOCITY, limits.speed_max),
-            ("torque", ACTUAL_TORQUE, limits.torque_max),
-        ):
-            value = self._value(values, index)
-            if limit is not None and value is not None and abs(value) > limit:
-                if name == "torque":
-                    self._no_faster_than_it_turns(values)
-                self.stop(_beyond(name, value, limit))
-                return
+        velocity = self._value(values, ACTUAL_VELOCITY)
+        at_s = self._cycles * self._cycle_s
+        place = None if position is None else round(position)
+        halt = self._speed_guard.look(place, velocity, at_s)
+        if halt is not None:
+            self.stop(halt)
+            return
+        torque, most = self._value(values, ACTUAL_TORQUE), limits.torque_max
+        if most is not None and torque is not None and abs(torque) > most:
+            self._no_faster_than_it_turns(values)
+            self.stop(Halted.beyond("torque", torque, most))
+            return
         if limits.following_error_max is not None:
             error = self._following_error(values)
             if abs(error) > limits.following_error_max:
-                self.stop(_beyond("following error", error, limits.following_error_max))
+                self.stop(Halted.beyond("following error", error, limits.following_error_max))
 
     def _no_faster_than_it_turns(self, values: Sequence[int]) -> None:
         """What does not follow (a blocked axis) is braked from its own speed, not from the told.
@@ -383,6 +399,11 @@ class AxisLoop:
 
     # Parts ---------------------------------------------------------------------------------
 
+    @property
+    def _why(self) -> str:
+        """For messages: why the last motion was ended by force, empty where it was not."""
+        return "" if self.halted is None else self.halted.words
+
     def setpoint_now(self, target: int) -> int | None:
         """The value of a target in the outputs, None where it is not mapped."""
         return self.outputs[self._out[target]] if target in self._out else None
@@ -394,7 +415,7 @@ class AxisLoop:
         if self.state is not State.OPERATION_ENABLED or self.goal is not State.OPERATION_ENABLED:
             raise NotAllowed(
                 f"{where} is in {self.state.value!r}, a motion needs 'Operation enabled'",
-                remedy=self.halted or "enable the axis first",
+                remedy=self._why or "enable the axis first",
             )
         wanted = cia402.Mode(self._dialect.mode(MODE_OF[motion.target]))
         if self._mode is not None and self._mode != wanted:
@@ -405,7 +426,7 @@ class AxisLoop:
             )
         motion.limits.require_watched(self._in, where)
         if self.phase is Phase.BRAKING:
-            raise NotAllowed(f"{where} is braking: {self.halted}", remedy="wait until it stands")
+            raise NotAllowed(f"{where} is braking: {self._why}", remedy="wait until it stands")
         if not len(motion.values):
             raise NotAllowed(f"{where}: a trajectory without values")
         if motion.target == POSITION:
@@ -426,7 +447,3 @@ class AxisLoop:
     def _clear_offsets(self) -> None:
         for index in OFFSETS:
             self._set(index, 0)
-
-
-def _beyond(name: str, value: float, limit: float) -> str:
-    return f"{name} {value:g} is beyond the limit of {limit:g}: the axis is braked and disabled"

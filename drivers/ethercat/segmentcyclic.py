@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.cia402 import State
-from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
+from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, motion_halted
 from drivers.ethercat.hostprocess import HostProcess
 from drivers.ethercat.mapping import Pdo, StationPlan, plan_station
 from drivers.ethercat.motion import Phase
@@ -21,6 +21,7 @@ from drivers.ethercat.recovery import Recovery
 from drivers.ethercat.ring import VALID, RingReader, lost_flag
 from drivers.ethercat.samples import contiguous, fields_of
 from drivers.ethercat.trajectory import message_of
+from drivers.halt import Halted, LoopState
 from drivers.link import CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
 from profiles.schema import Profile
 
@@ -215,16 +216,20 @@ class EthercatCyclic:
             {"op": "drive_to", "station": station, "goal": "fault_reset", "mode": None}, _ANSWER_S
         )
 
-    def axis_state(self, station: int) -> tuple[str, str, str]:
+    def axis_state(self, station: int) -> LoopState:
         """Power state, phase of the setpoints, and why the last motion was ended by force."""
         told = self._status.get("axes", {}).get(station)
-        return (told["state"], told["phase"], told["halted"]) if told else ("Unknown", "idle", "")
+        if not told:
+            return LoopState(State.UNKNOWN.value, Phase.IDLE.value, None)
+        halt = None if told["halted"] is None else Halted.from_wire(told["halted"])
+        return LoopState(told["state"], told["phase"], halt)
 
     async def run(self, trajectories: Sequence[Trajectory]) -> int:
         """Play and renew until all values are out; cancelling brakes the axes.
 
         Raises:
-            NotAllowed: as `play`; or the loop ended the motion, with the reason.
+            NotAllowed: as `play`.
+            MotionHalted: the loop ended the motion; `MotionHalted.halt` is why.
         """
         number = await self.play(trajectories)
         stations = {trajectory.station for trajectory in trajectories}
@@ -330,11 +335,11 @@ class EthercatCyclic:
 
     def _playing(self, stations: Iterable[int]) -> bool:
         """Whether values are still to come: a busy computer plays them later."""
-        return any(self.axis_state(n)[1] == Phase.PLAYING.value for n in stations)
+        return any(self.axis_state(n).phase == Phase.PLAYING.value for n in stations)
 
     def _raise_if_halted(self, station: int) -> None:
-        if reason := self.axis_state(station)[2]:
-            raise NotAllowed(f"station {station}: {reason}")
+        if (halt := self.axis_state(station).halted) is not None:
+            raise motion_halted(f"station {station}", halt)
 
     def _check_names(self, signals: Sequence[CyclicSignal]) -> None:
         names = [signal.channel for signal in signals]

@@ -32,8 +32,9 @@ class HoldingBrake:
 
     @property
     def moving(self) -> bool:
-        """Opening or closing."""
-        return self._timer is not None
+        """Opening or closing, and commands wait for it."""
+        late = self._axis.spec.rough_feedback.brake_opens_s is not None
+        return self._timer is not None and not late
 
     @property
     def released(self) -> bool:
@@ -66,6 +67,12 @@ class HoldingBrake:
         """Hold the axis while it opens; False where there is none to wait for."""
         if self._bus is not None:
             return False
+        late_s = self._axis.spec.rough_feedback.brake_opens_s
+        if late_s is not None and self._axis.spec.motor.brake:
+            # Commands are taken at once, against a brake that still grips.
+            self._axis.close_brake(True)
+            self._timer = self._core.schedule.after(late_s, self._opened)
+            return False
         times = self.times()
         if times is None:
             self._axis.close_brake(False)
@@ -84,6 +91,10 @@ class HoldingBrake:
 
         self._timer = self._core.schedule.after(times.release_s, released)
         return True
+
+    def _opened(self) -> None:
+        self._timer = None
+        self._axis.close_brake(False)
 
     def close(self, enabled_again: Callable[[], bool]) -> bool:
         """Close it and keep the power for its time; False where there is none."""

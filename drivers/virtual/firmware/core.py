@@ -8,6 +8,7 @@ from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.families.base import RPM, Family, Units
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.rough_feedback import rough_units
 from drivers.virtual.firmware.schedule import Schedule
 from profiles.schema import Profile
 
@@ -33,7 +34,7 @@ class Core:
         self.zero_rad = 0.0
         self.torque_cap_nm = math.inf
         self.homed = False
-        self.units: Units = family.units(od, axis.motor)
+        self.units: Units = rough_units(family.units(od, axis.motor), axis.spec.rough_feedback)
         self.schedule = Schedule(axis)
         self._limits = od.cell("607D:01", _INT32[0]), od.cell("607D:02", _INT32[1])
         self._modulo = od.cell("607B:01"), od.cell("607B:02")
@@ -148,7 +149,7 @@ class Core:
     def apply_settings(self) -> None:
         """Parameters that act through the loops came into use."""
         od, motor = self.od, self.motor
-        self.units = self.family.units(od, motor)
+        self.units = rough_units(self.family.units(od, motor), self.axis.spec.rough_feedback)
         self.axis.apply_loops(self.family.loops(od, self.profile, motor, self.units))
         self.axis.apply_protections(self.family.protections(od, motor, self.units))
         wiring = self.family.wiring(od)

@@ -11,6 +11,7 @@ from drivers.virtual.firmware.families.cia402 import Cia402
 from drivers.virtual.firmware.families.mms7 import Mms7
 from drivers.virtual.firmware.families.power import SUPPLY_V
 from drivers.virtual.firmware.families.traits import TRAITS
+from drivers.virtual.firmware.rough_feedback import without_lacking
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import MechanicsSpec, standard_mechanics
 from profiles.loader import load_profile
@@ -48,6 +49,7 @@ def make_device(
         mechanics = standard_mechanics()
     elif not isinstance(mechanics, MechanicsSpec):
         mechanics = MechanicsSpec.model_validate(dict(mechanics))
+    profile = without_lacking(profile, mechanics.rough_feedback)
     if profile.drive in SUPPLY_V and "supply" not in mechanics.model_fields_set:
         supply = mechanics.supply.model_copy(update={"voltage_v": SUPPLY_V[profile.drive]})
         mechanics = mechanics.model_copy(update={"supply": supply})

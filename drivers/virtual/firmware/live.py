@@ -10,6 +10,7 @@ from drivers.virtual.firmware.dictionary import Number
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.monitors import monitors
 from drivers.virtual.firmware.panel import Panel
+from drivers.virtual.firmware.rough_feedback import position_value, speed_value
 from drivers.virtual.firmware.states import State
 from drivers.virtual.firmware.terminals import Terminals
 
@@ -68,13 +69,13 @@ def live_values(
         "6061:00": lambda: control.modes.mode,
         "6062:00": demand,
         "6063:00": lambda: round((item(k.S_THETA) - core.zero_rad) * inc_per_rad),
-        "6064:00": position,
+        "6064:00": position_value(core, position),
         "606B:00": lambda: (
             round(item(k.S_SPEED_REFERENCE) * core.speed_raw_per_rad_s("606B:00"))
             if control.state is State.OPERATION_ENABLED
             else 0
         ),
-        "606C:00": velocity,
+        "606C:00": speed_value(core, velocity),
         "6074:00": lambda: round(item(k.S_TORQUE_COMMAND) * core.units.torque_per_nm),
         "6077:00": torque,
         "6078:00": torque,

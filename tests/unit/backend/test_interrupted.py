@@ -17,17 +17,20 @@ from backend.jobs import Progress
 from backend.tools import tune_apply, tune_notches, tune_present
 from backend.tools.interrupted import Interrupted, raise_if_ended
 from drivers.cia402 import State
-from drivers.errors import DriveError, LinkLost, NotAllowed
+from drivers.errors import DriveError, LinkLost, MotionHalted, NotAllowed, motion_halted
+from drivers.halt import HaltCause, Halted, LoopState
 from tests.unit.backend.test_tune_hum import GOALS, design
 
 STOPPED = Interrupted("station 1: the drive left Operation enabled: Quick stop active")
 LOST = LinkLost("only 12 of 800 samples came back from the bus")
-TOO_FAR = NotAllowed("station 1: position 9000 is beyond the limit 8000")
+TOO_FAR = motion_halted("station 1", Halted.beyond("position", 9000, 8000))
 HELD, MEANT = {"2005:03": 700}, {"2005:03": 200}
 
 
 class Axis:
     """Holds one gain; disabled, without a fault, whenever it is asked."""
+
+    known_units = None
 
     def __init__(self) -> None:
         self.held = dict(HELD)
@@ -158,22 +161,36 @@ async def test_tuning_goes_on_without_notches_only_where_the_axis_kept_them_back
     assert not gone
 
 
-@pytest.mark.parametrize(
-    ("reason", "by_others"),
-    [
-        ("torque 310 is beyond the limit 300", False),
-        ("the setpoints were not renewed in time: the axis is braked and disabled", False),
-        ("the drive left Operation enabled: Switch on disabled", True),
-        ("it was halted", True),
-        ("the node answers no more", True),
-    ],
-)
+CAUSES = [
+    (HaltCause.POSITION, False),
+    (HaltCause.SPEED, False),
+    (HaltCause.TORQUE, False),
+    (HaltCause.FOLLOWING, False),
+    (HaltCause.EXPIRED, False),
+    (HaltCause.LEFT_ENABLED, True),
+    (HaltCause.COMMANDED, True),
+    (HaltCause.LOST, True),
+    (HaltCause.UNFIT, True),
+    (HaltCause.CONTRADICTION, True),
+]
+
+
+@pytest.mark.parametrize(("cause", "by_others"), CAUSES)
 def test_only_what_was_asked_of_the_axis_may_be_asked_in_another_way(
-    reason: str, by_others: bool
+    cause: HaltCause, by_others: bool
 ) -> None:
-    power = SimpleNamespace(axis_state=lambda _station: ("", "idle", reason))
+    # Its note holds the words of another cause: nothing may read them.
+    halt = Halted(cause, note="torque 310 is beyond the limit of 300")
+    power = SimpleNamespace(axis_state=lambda _station: LoopState("", "idle", halt))
     session: Any = SimpleNamespace(power=lambda: power, running=True, station=lambda _drive: 1)
     axis: Any = Axis()
     with pytest.raises(NotAllowed) as told:
         raise_if_ended(axis, session)
     assert isinstance(told.value, Interrupted) is by_others
+    assert isinstance(told.value, Interrupted | MotionHalted)
+    assert told.value.halt is halt
+
+
+def test_every_cause_is_judged() -> None:
+    judged = {cause for cause, _ in CAUSES}
+    assert judged == set(HaltCause)

@@ -38,6 +38,8 @@ class Plain(Servo):
             (0x6091, 1): 1, (0x6091, 2): 1, (0x6092, 1): 10000, (0x6092, 2): 1, RATED_TORQUE: 1270,
             MAX_TORQUE: 3000, POSITIVE: 2000, NEGATIVE: 2000, (0x6081, 0): 10000,
             ACCELERATION: 50000, DECELERATION: 50000, QUICK_STOP: 50000,
+            # Increments, increments per second and per square second (CiA 303-2).
+            (0x60A8, 0): 0x00B50000, (0x60A9, 0): 0x00B50300, (0x60AA, 0): 0x00B55700,
         }  # fmt: skip
         for place, value in told.items():
             self.set(place, value)

@@ -11,10 +11,12 @@ import pytest
 from backend.axis import Envelope
 from backend.tools import excite
 from backend.tools.axis_facts import AxisFacts
+from backend.tools.interrupted import Interrupted
 from backend.tools.sweep_evaluation import SweepSettings
 from backend.tools.sweep_plan import Setup, sequences_of
 from backend.tools.sweep_play import _smaller, _too_much
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, motion_halted
+from drivers.halt import HaltCause, Halted, Quantity
 
 RATED_NM, COULOMB_NM = 1.27, 0.08
 SETTINGS = SweepSettings(Envelope(4.0, 1500.0, 100.0, 60.0), realisations=1)
@@ -48,17 +50,28 @@ def test_where_no_speed_is_left_for_a_base_motion_nothing_is_played() -> None:
 
 
 @pytest.mark.parametrize(
-    ("loop", "reason", "again"),
+    ("loop", "quantity", "again"),
     [
-        ("none", "speed 1600 is beyond the limit of 1500: the axis is braked and disabled", True),
-        ("none", "torque 1010 is beyond the limit of 1000: the axis is braked", False),
-        ("none", "position 9 is beyond the limit of 8: the axis is braked and disabled", False),
-        ("none", "Fault (overspeed)", False),
-        ("speed", "torque 1010 is beyond the limit of 1000: the axis is braked", True),
-        ("speed", "position 9 is beyond the limit of 8: the axis is braked and disabled", False),
+        ("none", "speed", True),
+        ("none", "torque", False),
+        ("none", "position", False),
+        ("speed", "torque", True),
+        ("speed", "speed", False),
+        ("speed", "position", False),
+        ("position", "torque", True),
     ],
 )
 def test_what_less_excitation_may_mend(
-    loop: Literal["none", "speed"], reason: str, again: bool
+    loop: Literal["none", "speed", "position"], quantity: Quantity, again: bool
 ) -> None:
-    assert _too_much(NotAllowed(f"station 1: {reason}"), replace(FREE, loop=loop)) is again
+    error = motion_halted("station 1", Halted.beyond(quantity, 1600, 1500))
+    assert _too_much(error, replace(FREE, loop=loop)) is again
+
+
+def test_nothing_is_played_again_for_the_words_of_an_error() -> None:
+    """Only what the loop ended is: not what another error happens to be worded like."""
+    words = "station 1: torque and speed 1600 is beyond the limit of 1500"
+    fault = motion_halted("station 1", Halted(HaltCause.LEFT_ENABLED, note=words))
+    for error in (NotAllowed(words), Interrupted(words), fault):
+        for loop in ("none", "speed"):
+            assert not _too_much(error, replace(FREE, loop=loop))

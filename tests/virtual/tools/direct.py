@@ -30,9 +30,10 @@ from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat.cyclic import layout, places
 from drivers.ethercat.mapping import Pdo, plan_station
-from drivers.ethercat.motion import Limits, Motion
+from drivers.ethercat.motion import Motion, limits_of
 from drivers.ethercat.playback import AxisLoop
 from drivers.ethercat.setup import interpolation_period
+from drivers.halt import HaltCause, Halted, LoopState
 from drivers.link import (
     Address,
     CyclicSignal,
@@ -345,7 +346,7 @@ class DirectLink:
             self._loop.play(
                 Motion(
                     t.target.index or 0, array.array("q", t.values.tolist()),
-                    Limits(**asdict(t.envelope)), _PATIENCE * 1000, step,
+                    limits_of(asdict(t.envelope)), _PATIENCE * 1000, step,
                     None if t.offset_target is None else t.offset_target.index,
                     None if offset is None else array.array("q", offset.tolist()),
                 )
@@ -360,7 +361,7 @@ class DirectLink:
     async def halt(self, station: int | None = None) -> None:
         del station
         assert self._loop is not None
-        self._loop.stop("halted")
+        self._loop.stop(Halted(HaltCause.COMMANDED))
 
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
         self._consumers.append(consumer)
@@ -378,10 +379,10 @@ class DirectLink:
         assert self._loop is not None
         self._loop.reset_fault()
 
-    def axis_state(self, station: int) -> tuple[str, str, str]:
+    def axis_state(self, station: int) -> LoopState:
         del station
         assert self._loop is not None
-        return self._loop.state.value, self._loop.phase.value, self._loop.halted
+        return LoopState(self._loop.state.value, self._loop.phase.value, self._loop.halted)
 
 
 def _columns(pdo: Pdo, names: Mapping[tuple[int | None, int], str]) -> list[tuple[int, str]]:

@@ -19,13 +19,14 @@ from backend.tools.go_back import go_back
 from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import SweepSettings, completed
 from drivers.cia402 import State
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, motion_halted
+from drivers.halt import Halted
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, mechanics, silent
 from tests.virtual.tools.test_measured_again import SWINGING
 
 ONE = mechanics((1e-4, 60.0, 0.006))
-TOO_FAST = "X: speed 9 is beyond the limit of 8: the axis is braked and disabled"
+TOO_FAST = Halted.beyond("speed", 9, 8)
 
 
 class Ended(Exception):
@@ -35,8 +36,8 @@ class Ended(Exception):
 class Away:
     """A part of a tuning that is ended a turn from where it began, and the next one."""
 
-    def __init__(self, b: DirectBench, message: str = TOO_FAST) -> None:
-        self._b, self._message = b, message
+    def __init__(self, b: DirectBench, halt: Halted = TOO_FAST) -> None:
+        self._b, self._halt = b, halt
         self.begun_rev: list[float] = []
 
     async def part(self, *_: object, **__: object) -> Any:
@@ -47,7 +48,7 @@ class Away:
             raise Ended
         there = await axis.position_raw() + units.position_raw(1.0)
         await go_back(axis, self._b.session, there, WIDE, await read_facts(axis))
-        raise NotAllowed(self._message)
+        raise motion_halted("X", self._halt)
 
 
 async def test_after_a_notch_that_could_not_be_learned(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,7 +96,7 @@ async def test_after_a_design_that_was_stopped(monkeypatch: pytest.MonkeyPatch) 
 
 async def test_after_gains_that_took_all_the_torque(monkeypatch: pytest.MonkeyPatch) -> None:
     async with direct(ONE, drive="r6l") as b:
-        away = Away(b, "X: torque 9 is beyond the limit of 8: the axis is braked and disabled")
+        away = Away(b, Halted.beyond("torque", 9, 8))
         monkeypatch.setattr(tuning.inertia_tool, "inertia", away.part)
         settings = AutotuneSettings(WIDE, motor_inertia_kgm2=5e-5)
         with pytest.raises(Ended):

@@ -16,6 +16,7 @@ from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import SweepSettings
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
+from drivers.halt import HaltCause, Halted
 from drivers.link import Address, Trajectory
 from drivers.link import Envelope as Limits
 from tests.virtual.tools.can_rig import CanBench, can_bench, incremental
@@ -138,7 +139,7 @@ async def test_without_renewal_the_speed_ends_by_itself() -> None:
         power = bench.session.power()
         assert power is not None
         await until(lambda: power.axis_state(3)[0] != State.OPERATION_ENABLED.value)
-        assert "not renewed" in power.axis_state(3)[2]
+        assert power.axis_state(3).halted == Halted(HaltCause.EXPIRED)
         assert await bench.axis.state() is not State.OPERATION_ENABLED
         assert await bench.axis.standstill(1.0)
 

@@ -14,6 +14,7 @@ from drivers.dialect import dialect_of
 from drivers.errors import NotAllowed
 from drivers.ethercat.motion import Limits, Motion, Phase
 from drivers.ethercat.playback import AxisLoop
+from drivers.halt import HaltCause, Halted
 from profiles.loader import load_profile
 
 IN = {0x6041: 0, 0x6064: 1, 0x606C: 2, 0x6077: 3, 0x6061: 4}
@@ -80,7 +81,7 @@ def test_an_axis_that_goes_on_gets_the_printed_emergency_stop_until_it_rests() -
     bench.play([100] * 500)
     bench.moving = 50
     bench.step(10)
-    bench.axis.stop("halted")
+    bench.axis.stop(Halted(HaltCause.COMMANDED))
     bench.step(150)
     # 11 is the only stop that is printed (003:296); any other word would cut the power in motion.
     assert bench.axis.outputs[0] == 11
@@ -98,7 +99,7 @@ def test_a_silent_host_ramps_the_speed_to_zero_and_disables() -> None:
     assert bench.axis.outputs[1] == 100
     bench.step(200)
     assert bench.axis.phase is Phase.IDLE
-    assert "renewed" in bench.axis.halted
+    assert bench.axis.halted == Halted(HaltCause.EXPIRED)
     assert bench.axis.outputs[1] == 0
     assert bench.axis.outputs[0] == 6
 

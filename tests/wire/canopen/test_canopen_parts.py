@@ -23,6 +23,7 @@ from drivers.canopen.pdo import PdoPlan, plan, plan_within_load, set_up
 from drivers.canopen.scanning import readable
 from drivers.canopen.url import INTERFACES, parse_canopen_url
 from drivers.errors import LinkLost, NotAllowed, OutOfRange, Rejected
+from drivers.halt import HaltCause, Halted
 from drivers.link import Address, CyclicSignal
 from drivers.virtual.wires.can_wire import CanWire
 from drivers.virtual.wires.slcan import SlcanSide
@@ -298,10 +299,10 @@ def test_a_lost_station_is_made_harmless() -> None:
     images.set_output((3, 0x6040, 0), b"\x0f\0")
     images.set_output((3, 0x607A, 0), b"\x39\x30\0\0")
     images.set_output((3, 0x60FF, 0), b"\x39\x30\0\0")
-    images.neutralise(3, "lost")
+    images.neutralise(3, Halted(HaltCause.LOST))
     images.pack_axis(3)
     assert [bytes(f).hex() for f in images.frames.values()] == ["060039300000", "00000000"]
-    assert images.axes[3].halted == "lost"
+    assert images.axes[3].halted == Halted(HaltCause.LOST)
 
 
 def test_padding_is_cut_and_other_bytes_are_kept() -> None:
@@ -325,7 +326,7 @@ class LoopOnADeadBus:
     def __init__(self) -> None:
         self.halted: list[int | None] = []
 
-    def halt(self, station: int | None, _why: str) -> None:
+    def halt(self, station: int | None, _why: Halted) -> None:
         self.halted.append(station)
 
 

@@ -17,7 +17,8 @@ import numpy.typing as npt
 import pytest
 
 from drivers.cia402 import Mode, State
-from drivers.errors import Busy, NotAllowed, OutOfRange
+from drivers.errors import Busy, EnvelopeExceeded, NotAllowed, OutOfRange
+from drivers.halt import HaltCause, Halted
 from drivers.link import Address, CyclicSignal, Envelope, ScopeBlock, Trajectory
 from profiles.schema import DataType
 from tests.support.station import HANG_S
@@ -176,14 +177,21 @@ async def test_velocity_and_torque_modes(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize(
-    ("what", "value", "envelope", "words"),
+    ("what", "envelope", "halt", "words"),
     [
-        ("torque", 900, Envelope(torque_max=500), "torque 900 is beyond the limit of 500"),
-        ("following", -40, Envelope(following_error_max=30), "following error -40 is beyond"),
+        (
+            "torque", Envelope(torque_max=500), Halted(HaltCause.TORQUE, "torque", 900, 500),
+            "torque 900 is beyond the limit of 500",
+        ),
+        (
+            "following", Envelope(following_error_max=30),
+            Halted(HaltCause.FOLLOWING, "following error", -40, 30),
+            "following error -40 is beyond",
+        ),
     ],
-)
+)  # fmt: skip
 async def test_the_envelope_stops_one_axis_and_not_the_other(
-    rig: Rig, what: str, value: int, envelope: Envelope, words: str
+    rig: Rig, what: str, envelope: Envelope, halt: Halted, words: str
 ) -> None:
     async with running(rig) as bus:
         await enable(bus, 1)
@@ -193,11 +201,12 @@ async def test_the_envelope_stops_one_axis_and_not_the_other(
         )
         moving = asyncio.create_task(play)
         await asyncio.sleep(0.1)
-        rig.do("inject", slave=0, what=what, value=value)
+        rig.do("inject", slave=0, what=what, value=halt.value)
         await bus.told(words)
         await until(lambda: in_state(bus, 1) != "Operation enabled", HANG_S)
-        with pytest.raises(NotAllowed, match=words):
+        with pytest.raises(EnvelopeExceeded, match=words) as ended:
             await moving
+        assert ended.value.halt == halt, "the same value, from the loop's process to the caller"
         rig.do("inject", slave=0, what=what, value=0)
         assert not [t for t in bus.texts if "beyond" in t and words not in t]
 

@@ -11,11 +11,13 @@ from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from drivers.ethercat.motion import Limits, Motion, Phase
 from drivers.ethercat.playback import STOP_S, AxisLoop
+from drivers.halt import HaltCause, Halted
 
 IN = {0x6041: 0, 0x6064: 1, 0x606C: 2, 0x6077: 3, 0x6061: 4}
 OUT = {0x6040: 0, 0x607A: 1, 0x60FF: 2, 0x6071: 3, 0x60B2: 4, 0x6060: 5}
 DISABLED, READY, ON, ENABLED, FAULT = 0x0250, 0x0231, 0x0233, 0x0237, 0x0218
 CYCLE_S = 0.001
+RELEASED = Halted(HaltCause.COMMANDED)
 
 
 class Bench:
@@ -123,7 +125,7 @@ def test_without_renewal_it_brakes_and_leaves_operation_enabled() -> None:
     assert speeds[-1] == 0
     bench.obey(3)
     assert bench.axis.state is not State.OPERATION_ENABLED
-    assert "not renewed" in bench.axis.halted
+    assert bench.axis.halted == Halted(HaltCause.EXPIRED)
 
 
 def test_renewal_keeps_it_going() -> None:
@@ -137,25 +139,36 @@ def test_renewal_keeps_it_going() -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "limits", "value", "word"),
+    ("limits", "halt", "word"),
     [
-        ("position", Limits(position_max=1000), 1001, "position 1001 is beyond the limit of 1000"),
-        ("position", Limits(position_min=400), 399, "position 399 is beyond the limit of 400"),
-        ("speed", Limits(speed_max=100), -101, "speed -101 is beyond"),
-        ("torque", Limits(torque_max=300), 301, "torque 301 is beyond"),
+        (
+            Limits(position_max=1000), Halted(HaltCause.POSITION, "position", 1001, 1000),
+            "position 1001 is beyond the limit of 1000",
+        ),
+        (
+            Limits(position_min=400), Halted(HaltCause.POSITION, "position", 399, 400),
+            "position 399 is beyond the limit of 400",
+        ),
+        (
+            Limits(speed_max=100), Halted(HaltCause.SPEED, "speed", -101, 100),
+            "speed -101 is beyond",
+        ),
+        (
+            Limits(torque_max=300), Halted(HaltCause.TORQUE, "torque", 301, 300),
+            "torque 301 is beyond",
+        ),
     ],
-)
-def test_the_envelope_stops_in_the_very_cycle(
-    field: str, limits: Limits, value: int, word: str
-) -> None:
+)  # fmt: skip
+def test_the_envelope_stops_in_the_very_cycle(limits: Limits, halt: Halted, word: str) -> None:
     bench = Bench().enabled()
     bench.play([500] * 400, limits=limits)
     bench.step(3)
     assert bench.axis.phase is Phase.PLAYING
-    setattr(bench, field, value)
+    assert halt.quantity is not None
+    setattr(bench, halt.quantity, halt.value)
     bench.step()
     assert bench.axis.phase is Phase.BRAKING
-    assert word in bench.axis.halted
+    assert bench.axis.halted == halt
     assert bench.told
     assert bench.told[0].startswith(word)
 
@@ -166,7 +179,9 @@ def test_following_error_is_computed_where_the_drive_does_not_tell_it() -> None:
     bench.step(51)
     assert bench.axis.phase is Phase.PLAYING
     bench.step(2)
-    assert "following error" in bench.axis.halted
+    assert bench.axis.halted is not None
+    assert bench.axis.halted.cause is HaltCause.FOLLOWING
+    assert bench.axis.halted.limit == 50
 
 
 def test_a_limit_that_cannot_be_watched_is_refused() -> None:
@@ -223,7 +238,7 @@ def test_an_axis_that_takes_too_much_torque_is_braked_from_its_own_speed(
     assert bench.axis.outputs[2] == 1000
     bench.torque = 301
     bench.step()
-    assert "torque 301 is beyond the limit of 300" in bench.axis.halted
+    assert bench.axis.halted == Halted(HaltCause.TORQUE, "torque", 301, 300)
     assert bench.axis.phase is Phase.BRAKING
     cycles = round(STOP_S / CYCLE_S)
     # The first step of the ramp that ends at standstill.
@@ -236,7 +251,7 @@ def test_torque_ends_with_a_quick_stop_because_no_torque_does_not_stop_an_axis()
     bench = Bench().enabled(mode=10)
     bench.play([100] * 1000, target=0x6071)
     bench.step(5)
-    bench.axis.stop("test")
+    bench.axis.stop(RELEASED)
     bench.step()
     assert bench.axis.outputs[3] == 0
     assert bench.axis.outputs[0] == 0x02
@@ -248,7 +263,7 @@ def test_an_axis_that_cannot_follow_the_brake_ramp_is_not_left_to_coast() -> Non
     for _ in range(50):
         bench.step()
         bench.position = bench.axis.outputs[1]
-    bench.axis.stop("released")
+    bench.axis.stop(RELEASED)
     for _ in range(round(STOP_S / CYCLE_S) + 2):
         bench.position += 80  # too much inertia for its torque
         bench.step()
@@ -265,7 +280,7 @@ def test_an_axis_that_followed_the_brake_ramp_is_shut_down() -> None:
     for _ in range(50 + 1):
         bench.step()
         bench.position = bench.axis.outputs[1]
-    bench.axis.stop("released")
+    bench.axis.stop(RELEASED)
     for _ in range(round(STOP_S / CYCLE_S) + 1):
         bench.step()
         bench.position = bench.axis.outputs[1]
@@ -312,7 +327,7 @@ def test_an_axis_that_braked_without_trusted_inputs_is_told_to_quick_stop() -> N
     bench = Bench().enabled()
     bench.play(list(range(500, 5000, 10)))
     bench.step(10)
-    bench.axis.stop("no valid process data")
+    bench.axis.stop(Halted(HaltCause.LOST))
     for _ in range(round(STOP_S / CYCLE_S)):
         bench.axis.blind()
     assert bench.axis.phase is Phase.IDLE
@@ -347,8 +362,8 @@ def test_play_while_braking_is_refused() -> None:
     bench = Bench().enabled()
     bench.play(list(range(500, 5000, 10)))
     bench.step(5)
-    bench.axis.stop("stopped by the user")
-    with pytest.raises(NotAllowed, match="braking: stopped by the user"):
+    bench.axis.stop(Halted(HaltCause.COMMANDED))
+    with pytest.raises(NotAllowed, match="braking: it was halted"):
         bench.play([550])
 
 
@@ -356,7 +371,7 @@ def test_a_goal_given_while_braking_is_kept() -> None:
     bench = Bench().enabled()
     bench.play([500 + 5 * n for n in range(200)])
     bench.step(50)
-    bench.axis.stop("released")
+    bench.axis.stop(RELEASED)
     bench.step(5)
     assert bench.axis.phase is Phase.BRAKING
     bench.axis.drive_to(State.SWITCH_ON_DISABLED, None)

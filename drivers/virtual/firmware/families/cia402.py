@@ -31,6 +31,7 @@ from drivers.virtual.firmware.families.loops import UNIT_GAIN, LoopReader
 from drivers.virtual.firmware.families.reports import faults_of
 from drivers.virtual.firmware.families.terminals import TABLES, TerminalTable
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.rough_feedback import unit_values
 from drivers.virtual.firmware.settings import LoopSettings, MotorData, ProtectionSettings
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
@@ -72,7 +73,7 @@ class Cia402:
         resolution = self._profile.by_key.get("608F:01")
         if resolution is not None and resolution.default_raw is None:
             values[resolution.key] = spec.encoder.counts_per_rev  # what the drive reads from it
-        return values
+        return values | unit_values(self._profile, spec.rough_feedback)
 
     def fallback_values(self, motor: MotorData) -> dict[str, Raw]:
         """A moderate axis: 10 rev/s, 50 rev/s², windows of 1/360 revolution."""
@@ -91,7 +92,7 @@ class Cia402:
             "6085:00": round(ramp), "609A:00": round(ramp), "6087:00": 3000,
             "6099:01": round(2 * speed), "6099:02": max(1, round(speed / 4)),
             "6091:01": 1, "6091:02": 1, "6092:01": round(turn), "6092:02": 1,
-            "60C2:01": 1, "60C2:02": -3, "605A:00": 2, "605D:00": 1, "605E:00": 2, "6007:00": 1,
+            "608F:02": 1, "60C2:01": 1, "60C2:02": -3, "605A:00": 2, "605D:00": 1, "605E:00": 2, "6007:00": 1,
             "6502:00": sum(1 << (mode - 1) for mode in self._profile.supported_modes if mode > 0),
         }  # fmt: skip
         if self.name == "ds_c":
@@ -148,6 +149,9 @@ class Cia402:
         spec = self._profile.units
         factor = self._ratio(od, spec.gear_denominator, spec.gear_numerator)
         factor *= self._ratio(od, spec.feed, spec.feed_revolutions)
+        if spec.feed is not None and spec.feed not in self._profile.by_key:
+            # Without a feed constant an increment is one of the encoder (CiA 402-2 clause 7).
+            factor *= od.number("608F:01", self._default_turn()) / self._default_turn()
         polarity = int(od.number("607E:00"))
         return self._units(
             factor, motor, -1.0 if polarity & 0x80 else 1.0, -1.0 if polarity & 0x40 else 1.0

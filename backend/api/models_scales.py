@@ -1,0 +1,77 @@
+"""Messages about scales: what a raw position, speed or acceleration of an axis means."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from backend.api.models import Message
+from backend.scales.scale import Doubt, Origin, Quantity
+
+
+class ScaleInfo(Message):
+    """One scale with its origin."""
+
+    quantity: Quantity
+    unit: str = Field(description="rev, rpm or rpm/s")
+    raw_unit: str = Field(description="what one raw step is called; empty where unknown")
+    raw_per_unit: float | None = Field(description="null where the scale is not certain")
+    is_time: bool = Field(description="a ramp given as a time in ms, which no factor converts")
+    origin: Origin
+    source: str = Field(description="objects, file or the manual's place")
+    doubt: Doubt | None = Field(description="why it is not certain")
+    why: str = Field(description="the same in words, or empty")
+    remedy: str = Field(description="how it becomes certain, or empty")
+
+
+class SmallMovesInfo(Message):
+    """Small moves by increments since this axis is connected."""
+
+    moved: int = Field(description="increments of the last one")
+    raw_per_inc_s: float | None = Field(
+        description="what 606Ch told in it, per increment per second; null where not found"
+    )
+    next_most: int = Field(description="increments that the next one may have")
+
+
+class ScalesInfo(Message):
+    """The scales of an axis."""
+
+    certain: bool = Field(description="position and speed are: the axis may be moved by unit")
+    scales: list[ScaleInfo]
+    taught: bool = Field(description="a person has said something of them, and it holds now")
+    kept: bool = Field(description="a person has said something of them, whether it holds or not")
+    cyclic: bool = Field(description="a small move by increments is possible on this bus")
+    small_moves: SmallMovesInfo | None
+
+
+class ScalesUpdate(Message):
+    """Scales from a data sheet; what is left out stays as it was taught before."""
+
+    counts_per_rev: float | None = Field(default=None, gt=0, le=1e12)
+    raw_per_rpm: float | None = Field(default=None, gt=0, le=1e12)
+    raw_per_rpm_s: float | None = Field(default=None, gt=0, le=1e12)
+
+
+class TurnedUpdate(Message):
+    """How far the shaft turned in the last small move, as a person saw it."""
+
+    turned_rev: float = Field(ge=-1e6, le=1e6)
+
+
+class SmallMoveRequest(Message):
+    """A small move by increments; the axis moves."""
+
+    increments: int = Field(ge=-(2**30), le=2**30)
+    torque_limit: float = Field(default=20.0, ge=1, le=50, description="% of rated")
+    cycle_ms: float = Field(default=1.0, ge=0.25, le=20)
+
+
+class SmallMoveResult(Message):
+    """What a small move told."""
+
+    kind: Literal["small_move"] = "small_move"
+    moved_increments: int
+    raw_per_inc_s: float | None
+    next_most: int

@@ -1,0 +1,142 @@
+"""Routes of the scales of one axis: what they are, where from, and how a person teaches them."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter
+
+from backend.api import convert
+from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.models import JobInfo
+from backend.api.models_scales import (
+    ScaleInfo,
+    ScalesInfo,
+    ScalesUpdate,
+    SmallMoveRequest,
+    SmallMovesInfo,
+    TurnedUpdate,
+)
+from backend.audit.asked import note_before
+from backend.bench import Bench
+from backend.jobs import JobResult, Progress
+from backend.measuring import EXCHANGE_ENDS_S, exchange_for
+from backend.member import Member
+from backend.restoring import shielded
+from backend.scales import teaching
+from backend.scales.scale import Scale, what_to_do
+from backend.scales.taught import Taught
+from backend.tools.small_move import SmallMoveSettings, longest_allowed, small_move
+from backend.units import AxisUnits
+from drivers.errors import DriveError
+
+router = APIRouter(prefix="/drives/{drive_id}")
+_UNITS = {"position": "rev", "velocity": "rpm", "acceleration": "rpm/s"}
+
+
+@router.get("/scales")
+async def read_scales(member: TheMember) -> ScalesInfo:
+    """The scales, read from the drive now."""
+    member.axis.forget_scales()
+    return _info(member, await member.axis.units())
+
+
+@router.put("/scales")
+async def state_scales(bench: TheBench, member: Controlled, request: ScalesUpdate) -> ScalesInfo:
+    """Scales from a data sheet, stated by a person. Nothing is written to the drive."""
+    taught = await teaching.stated(
+        member.axis, request.counts_per_rev, request.raw_per_rpm, request.raw_per_rpm_s
+    )
+    return await _keep(bench, member, taught)
+
+
+@router.post("/scales/confirm")
+async def confirm_scales(bench: TheBench, member: Controlled, request: TurnedUpdate) -> ScalesInfo:
+    """How far the shaft turned in the last small move: the resolution, and the unit of 606Ch."""
+    return await _keep(bench, member, await teaching.confirmed(member.axis, request.turned_rev))
+
+
+@router.delete("/scales")
+async def forget_taught(bench: TheBench, member: Controlled) -> ScalesInfo:
+    """Forget what a person has said; the drive, its file and its manual count again."""
+    return await _keep(bench, member, None)
+
+
+@router.post("/jobs/small_move", status_code=202)
+async def start_small_move(
+    bench: TheBench, member: Controlled, request: SmallMoveRequest
+) -> JobInfo:
+    """Move by some increments, slowly and with little torque, to see how far the shaft turns."""
+    exchange = await exchange_for(bench, member, request.cycle_ms / 1e3)
+    session = exchange.session
+    settings = SmallMoveSettings(request.increments, request.torque_limit)
+
+    async def work(progress: Progress) -> JobResult:
+        exchange.taken = True
+        try:
+            return await small_move(member.axis, session, settings, progress)
+        finally:
+            await shielded(exchange.end, EXCHANGE_ENDS_S, member.drive.name)
+
+    try:
+        job = bench.jobs.start(
+            "small_move", f"Small move by {request.increments} increments: {member.drive.name}",
+            work, drive=member.drive.id, motion=True,
+        )  # fmt: skip
+    except DriveError:
+        await exchange.end()
+        raise
+    exchange.ends_with(job)
+    text = f"{member.drive.name}: small move by {request.increments} increments"
+    bench.journal.add(text, drive=member.drive.id)
+    return convert.job(job)
+
+
+async def _keep(bench: Bench, member: Member, taught: Taught | None) -> ScalesInfo:
+    drive, store = member.drive, bench.axis_records
+    old = store.get(drive.id)
+    note_before(scales=None if old.scales is None else old.scales.model_dump())
+    with bench.motion.keeping_still(member):
+        store.put(drive.id, old.model_copy(update={"scales": taught}))
+        member.axis.teach(taught)
+        units = await member.axis.units()
+    said = "; ".join(_said(scale) for scale in units.scales.all)
+    bench.journal.add(f"{drive.name}: scales: {said}", drive=drive.id)
+    bench.drives_changed()
+    return _info(member, units)
+
+
+def _said(scale: Scale) -> str:
+    factor = "not certain" if scale.raw_per_unit is None else f"{scale.raw_per_unit:.6g} raw"
+    return f"{scale.quantity.value} {factor} per {_UNITS[scale.quantity]} ({scale.origin.value})"
+
+
+def _info(member: Member, units: AxisUnits) -> ScalesInfo:
+    axis, scales = member.axis, units.scales
+    moves = axis.small_moves
+    return ScalesInfo(
+        certain=scales.position.certain and scales.velocity.certain,
+        scales=[_one(scale, units) for scale in scales.all],
+        taught=any(scale.origin in ("user", "measured") for scale in scales.all),
+        kept=axis.taught is not None,
+        cyclic=any(port.link.cyclic is not None for port in member.drive.ports),
+        small_moves=None
+        if moves is None
+        else SmallMovesInfo(
+            moved=moves.moved, raw_per_inc_s=moves.raw_per_inc_s, next_most=longest_allowed(axis)
+        ),
+    )
+
+
+def _one(scale: Scale, units: AxisUnits) -> ScaleInfo:
+    is_time = scale.quantity.value == "acceleration" and units.ramps_are_times
+    return ScaleInfo(
+        quantity=scale.quantity,
+        unit=_UNITS[scale.quantity],
+        raw_unit=scale.raw_unit,
+        raw_per_unit=None if is_time else scale.raw_per_unit,
+        is_time=is_time,
+        origin=scale.origin,
+        source=scale.source,
+        doubt=scale.doubt,
+        why=scale.why,
+        remedy="" if scale.certain else what_to_do(scale),
+    )

@@ -1,0 +1,241 @@
+"""``servodeck scales``: what a raw position and speed of a drive mean, and how a person says it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from pydantic import ValidationError
+
+from backend.api.models_scales import ScalesInfo
+from backend.axis import Axis
+from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
+from backend.commands.remote_params import remote_drive
+from backend.commands.session import drive_at, progress, run, run_in_order
+from backend.commands.state import state_folder
+from backend.drive import Drive
+from backend.drive_identity import read_serial
+from backend.files import write_atomically
+from backend.scales import teaching
+from backend.scales.scale import Scale, what_to_do
+from backend.scales.taught import Taught
+
+app = typer.Typer(help="What a raw position and speed of a drive mean.", no_args_is_help=True)
+
+State = Annotated[Path | None, typer.Option(help="folder of what is kept of axes")]
+_UNITS = {"position": "rev", "velocity": "rpm", "acceleration": "rpm/s"}
+
+
+async def taught_file(drive: Drive, state: Path | None = None) -> Path:
+    """Where what is said of the drive at this place is kept, for commands without a server.
+
+    By bus, station and serial number, so that another drive at the place has none of it.
+    """
+    port = drive.ports[0]
+    serial = await read_serial(drive)
+    name = re.sub(r"[^a-z0-9]+", "_", f"{port.link.url}_{port.station}_{serial or 0}".lower())
+    return state_folder(state) / "scales" / f"{name}.json"
+
+
+async def take_taught(axis: Axis, state: Path | None = None) -> None:
+    """Let the axis know what was said of it."""
+    path = await taught_file(axis.drive, state)
+    try:
+        axis.teach(Taught.model_validate_json(path.read_text("utf-8")))
+    except (OSError, ValidationError):
+        # Nothing (readable) is kept: the drive, its file and its manual count.
+        axis.teach(None)
+
+
+async def _keep(axis: Axis, taught: Taught | None, state: Path | None) -> None:
+    path = await taught_file(axis.drive, state)
+    axis.teach(taught)
+    if taught is None:
+        path.unlink(missing_ok=True)
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, taught.model_dump_json(indent=1).encode())
+
+
+@asynccontextmanager
+async def _axis_at(where: Place, state: Path | None) -> AsyncIterator[Axis]:
+    async with drive_at(where.url, where.station, where.profile) as drive:
+        axis = Axis(drive)
+        await take_taught(axis, state)
+        yield axis
+
+
+@app.command()
+def show(
+    url: Url, station: Station = 1, profile: Profile = None, as_json: Json = False,
+    server: Server = None, state: State = None,
+) -> None:  # fmt: skip
+    """Show the scales with their origins. Nothing moves."""
+
+    async def work() -> None:
+        where = place(url, station, profile, server)
+        if where.server is not None:
+            async with remote_drive(where) as (at, drive):
+                _print_info(
+                    await at.ask("GET", f"/drives/{drive.id}/scales", ScalesInfo), as_json=as_json
+                )
+            return
+        async with _axis_at(where, state) as axis:
+            _print((await axis.units()).scales.all, as_json=as_json)
+
+    run(work)
+
+
+@app.command("set")
+def state_scales(
+    url: Url, station: Station = 1, profile: Profile = None,
+    counts_per_rev: Annotated[float | None, typer.Option(help="increments of a turn")] = None,
+    raw_per_rpm: Annotated[float | None, typer.Option(help="raw speed of one rpm")] = None,
+    raw_per_rpm_s: Annotated[float | None, typer.Option(help="raw ramp of one rpm/s")] = None,
+    server: Server = None, state: State = None,
+) -> None:  # fmt: skip
+    """State scales from a data sheet. Nothing is written to the drive, and nothing moves."""
+
+    async def work() -> None:
+        where = place(url, station, profile, server)
+        if where.server is not None:
+            body = {
+                "counts_per_rev": counts_per_rev, "raw_per_rpm": raw_per_rpm,
+                "raw_per_rpm_s": raw_per_rpm_s,
+            }  # fmt: skip
+            async with remote_drive(where) as (at, drive):
+                path = f"/drives/{drive.id}/scales"
+                _print_info(await at.ask("PUT", path, ScalesInfo, body=body))
+            return
+        async with _axis_at(where, state) as axis:
+            said = await teaching.stated(axis, counts_per_rev, raw_per_rpm, raw_per_rpm_s)
+            await _keep(axis, said, state)
+            _print((await axis.units()).scales.all)
+
+    run(work)
+
+
+@app.command()
+def forget(
+    url: Url, station: Station = 1, profile: Profile = None, server: Server = None,
+    state: State = None,
+) -> None:  # fmt: skip
+    """Forget what was said; the drive, its file and its manual count again."""
+
+    async def work() -> None:
+        where = place(url, station, profile, server)
+        if where.server is not None:
+            async with remote_drive(where) as (at, drive):
+                _print_info(await at.ask("DELETE", f"/drives/{drive.id}/scales", ScalesInfo))
+            return
+        async with _axis_at(where, state) as axis:
+            await _keep(axis, None, state)
+            _print((await axis.units()).scales.all)
+
+    run(work)
+
+
+@app.command()
+def teach(
+    url: Url, station: Station = 1, profile: Profile = None,
+    increments: Annotated[int, typer.Option(help="of the first small move")] = 500,
+    torque_percent: Annotated[float, typer.Option(help="% of rated, at most")] = 20.0,
+    cycle_ms: Annotated[float, typer.Option(help="cycle time in ms")] = 1.0,
+    server: Server = None, state: State = None,
+) -> None:  # fmt: skip
+    """Teach the scales by small moves: look how far the shaft turns. The axis moves."""
+
+    async def work() -> None:
+        where = place(url, station, profile, server)
+        if where.server is not None:
+            await _teach_there(where, increments, torque_percent, cycle_ms)
+            return
+        await _teach_here(where, increments, torque_percent, cycle_ms, state)
+
+    run_in_order(work)
+
+
+async def _teach_there(where: Place, increments: int, torque: float, cycle_ms: float) -> None:
+    async with remote_drive(where) as (at, drive):
+        path, ask = f"/drives/{drive.id}", increments
+        while True:
+            body = {"increments": ask, "torque_limit": torque, "cycle_ms": cycle_ms}
+            await at.result(f"{path}/jobs/small_move", body)
+            if (turned := _turned(ask)) is not None:
+                break
+            ask *= 10
+        said = {"turned_rev": turned}
+        _print_info(await at.ask("POST", f"{path}/scales/confirm", ScalesInfo, body=said))
+
+
+async def _teach_here(
+    where: Place, increments: int, torque: float, cycle_ms: float, state: Path | None
+) -> None:
+    from backend.cyclic import CyclicSession
+    from backend.tools.small_move import SmallMoveSettings, small_move
+
+    async with _axis_at(where, state) as axis:
+        session = CyclicSession(axis.drive.ports[0].link, [axis.drive])
+        await session.start(cycle_ms / 1e3)
+        axis.session = session
+        ask = increments
+        try:
+            while True:
+                await small_move(axis, session, SmallMoveSettings(ask, torque), progress())
+                if (turned := _turned(ask)) is not None:
+                    break
+                ask *= 10
+        finally:
+            axis.session = None
+            await session.stop()
+        await _keep(axis, await teaching.confirmed(axis, turned), state)
+        _print((await axis.units()).scales.all)
+
+
+def _turned(increments: int) -> float | None:
+    """How far the shaft turned as a person saw it; None: too little to tell, move further."""
+    answer = str(
+        typer.prompt(
+            f"moved {increments} increments. How far did the shaft turn, in revolutions? "
+            "(empty: not visible, move ten times as far)",
+            default="", show_default=False,
+        )  # fmt: skip
+    )
+    return float(answer.replace(",", ".")) if answer.strip() else None
+
+
+def _print(scales: tuple[Scale, ...], *, as_json: bool = False) -> None:
+    if as_json:
+        rows = [
+            {
+                "quantity": scale.quantity.value, "raw_per_unit": scale.raw_per_unit,
+                "raw_unit": scale.raw_unit, "origin": scale.origin.value,
+                "source": scale.source, "doubt": scale.doubt and scale.doubt.value,
+            }
+            for scale in scales
+        ]  # fmt: skip
+        print(json.dumps(rows, indent=1))
+        return
+    for scale in scales:
+        unit, source = _UNITS[scale.quantity], f"  {scale.source}" if scale.source else ""
+        if scale.raw_per_unit is None:
+            print(f"{scale.quantity.value:12} NOT CERTAIN: {scale.why}{source}")
+            print(f"{'':12} {what_to_do(scale)}")
+        else:
+            print(
+                f"{scale.quantity.value:12} {scale.raw_per_unit:.9g} per {unit}"
+                f"  ({scale.origin.value}){source}"
+            )
+
+
+def _print_info(info: ScalesInfo, *, as_json: bool = False) -> None:
+    scales = tuple(
+        Scale(s.quantity, s.raw_per_unit, s.raw_unit, s.origin, s.source, s.doubt)
+        for s in info.scales
+    )
+    _print(scales, as_json=as_json)

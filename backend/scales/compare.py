@@ -1,0 +1,88 @@
+"""Whether 606Ch and 6064h of a whole recording tell of the same motion.
+
+The loop watches them while the axis moves (`drivers.motion.feedback`) and must decide at once. A
+recording shows more: also at low speeds and to and fro, and before anything is computed from 606Ch.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from drivers.halt import HaltCause, Halted
+from drivers.motion.feedback import FeedbackScale, disagreement
+
+FloatArray = npt.NDArray[np.float64]
+
+_WINDOW_S = 0.04
+"""Means over this long; a 606Ch that lags some cycles differs little then."""
+_RELATIVE = 0.25
+"""Share by which the scale may seem other than stated: lag, means and rounding do that."""
+_COUNTS = 2.0
+_IGNORED_SHARE = 1 / 6
+"""Of what the loop ignores: 5 of 30 rpm. 606Ch that is coarser widens it by its own step."""
+_MOST_STEPS = 3.0
+
+
+def disagreement_of(
+    position: FloatArray, velocity: FloatArray, cycle_s: float, scale: FeedbackScale
+) -> Halted | None:
+    """What a recording of raw 6064h and 606Ch [n] contradicts itself by; None where it agrees.
+
+    ``value`` and ``limit`` of the answer are root mean squares of both speeds, raw 606Ch, with the
+    sign in which they go together.
+    """
+    length = max(round(_WINDOW_S / cycle_s), 2)
+    count = (len(position) - 1) // length
+    if count < 2:
+        return None
+    edges = np.arange(count + 1) * length
+    means = 0.5 * (velocity[1:] + velocity[:-1])[: count * length]
+    told = means.reshape(count, length).mean(axis=1)
+    seen = _moved(position[edges]) / (length * cycle_s) * scale.velocity_per_inc_s
+    power = float(np.mean(seen**2))
+    rms_told, rms_seen = float(np.sqrt(np.mean(told**2))), float(np.sqrt(power))
+    steps = np.abs(np.diff(velocity))
+    finest = float(np.min(steps[steps > 0], initial=np.inf))
+    ignored = max(
+        scale.ignored * _IGNORED_SHARE,
+        min(finest, _MOST_STEPS * scale.ignored) if np.isfinite(finest) else 0.0,
+        _COUNTS / (length * cycle_s) * abs(scale.velocity_per_inc_s),
+    )
+    if float(np.sqrt(np.mean((told - seen) ** 2))) <= ignored:
+        return None
+    factor = float(np.mean(told * seen)) / power if power else np.inf
+    if abs(factor - 1.0) <= _RELATIVE:
+        return None
+    sign = -1.0 if factor < 0 else 1.0
+    kind = disagreement(sign * rms_told, rms_seen)
+    return Halted(HaltCause.CONTRADICTION, "speed", sign * rms_told, rms_seen, kind.value)
+
+
+def measured_scale(position: FloatArray, velocity: FloatArray, cycle_s: float) -> float | None:
+    """Raw 606Ch per increment per second of a recording, by least squares over means.
+
+    None where the axis hardly moved or the two do not go together.
+    """
+    length = max(round(_WINDOW_S / cycle_s), 2)
+    count = (len(position) - 1) // length
+    if count < 3:
+        return None
+    edges = np.arange(count + 1) * length
+    means = 0.5 * (velocity[1:] + velocity[:-1])[: count * length]
+    told = means.reshape(count, length).mean(axis=1)
+    seen = _moved(position[edges]) / (length * cycle_s)
+    power, other = float(np.sum(seen**2)), float(np.sum(told**2))
+    if not power or not other:
+        return None
+    together = float(np.sum(told * seen))
+    return together / power if together**2 > _TOGETHER * power * other else None
+
+
+def _moved(places: FloatArray) -> FloatArray:
+    """Differences of positions of 32 bits, over their end too."""
+    return np.asarray((np.diff(places) + 2.0**31) % 2.0**32 - 2.0**31)
+
+
+_TOGETHER = 0.95
+"""Squared correlation from which on two speeds are one quantity in two units."""

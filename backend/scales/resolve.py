@@ -1,0 +1,255 @@
+"""The scales of one axis: who states them, and whether they are certain.
+
+What a person has taught comes first, while the drive is as it was then; then what the drive says
+(60A8h to 60AAh with 608Fh, 6091h and 6092h; CiA 402-2 clause 7), then the maker's file and the
+manual. The defaults of the standard alone are nobody's word: makers use others.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from backend.drive import Drive
+from backend.optional import existing
+from backend.scales.scale import Doubt, Origin, Quantity, Scale, Scales
+from backend.scales.taught import Taught
+from profiles.schema import UnitSpec
+from profiles.si_unit import SiUnit, decode_si_unit
+
+#: Objects of the standard that state units and resolution; read where the profile has them.
+SI_POSITION, SI_VELOCITY, SI_ACCELERATION = "60A8:00", "60A9:00", "60AA:00"
+_RESOLUTION, _RESOLUTION_REVS = "608F:01", "608F:02"
+_ORIGINS = {"manual": Origin.MANUAL, "makers_file": Origin.MAKERS_FILE, "standard": Origin.UNKNOWN}
+#: Beyond this difference two statements of one resolution are two.
+_SAME = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """Raw values of the drive by key, of the objects that scales rest on; absent ones are not in.
+
+    ``encoder`` is the resolution by the family's own parameter, where it has one.
+    """
+
+    raws: Mapping[str, int]
+    encoder: float | None = None
+
+    def get(self, key: str | None) -> int | None:
+        """The raw value, where the drive has the object and it is above 0."""
+        raw = self.raws.get(key or "")
+        return raw if raw is not None and raw > 0 else None
+
+
+def stating_keys(drive: Drive) -> tuple[str, ...]:
+    """Keys of everything that the scales of this drive rest on."""
+    spec, known = drive.profile.units, drive.profile.by_key
+    keys = [spec.gear_numerator, spec.gear_denominator, spec.feed, spec.feed_revolutions]
+    keys += [_RESOLUTION, _RESOLUTION_REVS, SI_POSITION, SI_VELOCITY, SI_ACCELERATION]
+    return tuple(
+        dict.fromkeys(
+            key
+            for key in keys
+            if key is not None and key in known and not drive.unreachable_why(known[key])
+        )
+    )
+
+
+async def read_told(drive: Drive) -> Told:
+    """What the drive says of its scales, read now.
+
+    Raises:
+        DriveError: an object that it has cannot be read.
+    """
+    raws = {
+        key: int(reading.raw)
+        for key, reading in (await existing(drive, stating_keys(drive))).items()
+        if isinstance(reading.raw, (int, float))
+    }
+    return Told(raws)
+
+
+def scales_of(spec: UnitSpec, told: Told, taught: Taught | None) -> Scales:
+    """The scales of a drive with these units in its profile that says this of itself."""
+    said = taught if taught is not None and taught.holds(told.raws) else None
+    position = _position(spec, told, said)
+    return Scales(
+        position,
+        _rate(spec, told, said, position.raw_per_unit, Quantity.VELOCITY),
+        _rate(spec, told, said, position.raw_per_unit, Quantity.ACCELERATION),
+    )
+
+
+def origin_of(spec: UnitSpec, quantity: Quantity) -> Origin:
+    """Who states the unit of this quantity in the profile.
+
+    A profile without a statement has it from its manual, unless its source is the standard: those
+    were imported before the origin was kept.
+    """
+    stated = spec.origins.get(quantity.value)
+    if stated is None:
+        stated = "standard" if spec.source.startswith("CiA:") else "manual"
+    return _ORIGINS[stated]
+
+
+# Position ---------------------------------------------------------------------------------------
+
+
+def _position(spec: UnitSpec, told: Told, said: Taught | None) -> Scale:
+    code = told.get(SI_POSITION)
+    unit = None if code is None else decode_si_unit(code)
+    name = spec.position if unit is None else unit.name
+    if said is not None and said.counts_per_rev is not None:
+        return Scale(Quantity.POSITION, said.counts_per_rev, name, Origin.USER)
+    if code is not None and unit is None and code != 0:
+        return _doubtful(Quantity.POSITION, Doubt.UNREADABLE, source=f"60A8h = {code:08X}h")
+    ratio = _ratio(spec, told)
+    feed, resolution = _feed(spec, told), _resolution(told)
+    trusted = origin_of(spec, Quantity.POSITION) is not Origin.UNKNOWN
+    if not trusted and feed == 1.0 and (resolution or 1.0) > 1.0:
+        return _doubtful(Quantity.POSITION, Doubt.FEED_OF_ONE, name, "6092h, 608Fh")
+    if unit is not None and not unit.counts:
+        return _by_unit(unit, name, feed, ratio)
+    gear = _names(told, spec.gear_numerator, spec.gear_denominator)
+    if spec.feed is not None and spec.feed in told.raws:
+        if feed is None:
+            return _doubtful(Quantity.POSITION, Doubt.NO_RESOLUTION, name, _shown(spec.feed))
+        source = _joined(_names(told, spec.feed, spec.feed_revolutions), gear)
+        return Scale(Quantity.POSITION, feed / ratio, name, Origin.DRIVE, source)
+    counts = told.encoder or resolution
+    if counts:
+        source = _joined([_shown(_RESOLUTION)] if resolution else ["encoder"], gear)
+        return Scale(Quantity.POSITION, counts / ratio, name, Origin.DRIVE, source)
+    if spec.counts_per_rev is None:
+        return _doubtful(Quantity.POSITION, Doubt.NO_RESOLUTION, name)
+    origin = origin_of(spec, Quantity.POSITION)
+    return Scale(Quantity.POSITION, spec.counts_per_rev / ratio, name, origin, spec.source)
+
+
+def _by_unit(unit: SiUnit, name: str, feed: float | None, ratio: float) -> Scale:
+    """60A8h is an angle or a length."""
+    turns = unit.turns
+    if turns is None:
+        if feed is None:
+            return _doubtful(Quantity.POSITION, Doubt.LINEAR, name, "60A8h")
+        return Scale(Quantity.POSITION, feed / ratio, name, Origin.DRIVE, "60A8h, 6092h")
+    per_turn = 1.0 / (turns * unit.factor)
+    if feed is not None and feed != 1.0 and abs(feed - per_turn) > _SAME * per_turn:
+        return _doubtful(Quantity.POSITION, Doubt.UNIT_AND_FEED, name, "60A8h, 6092h")
+    return Scale(Quantity.POSITION, per_turn / ratio, name, Origin.DRIVE, "60A8h")
+
+
+def _ratio(spec: UnitSpec, told: Told) -> float:
+    """Motor revolutions of one revolution of the shaft behind the gear."""
+    return float(told.get(spec.gear_numerator) or 1) / float(told.get(spec.gear_denominator) or 1)
+
+
+def _feed(spec: UnitSpec, told: Told) -> float | None:
+    """Position units of one revolution of the shaft, where a feed constant is set."""
+    feed = told.get(spec.feed)
+    return None if feed is None else feed / (told.get(spec.feed_revolutions) or 1)
+
+
+def _resolution(told: Told) -> float | None:
+    counts = told.get(_RESOLUTION)
+    return None if counts is None else counts / (told.get(_RESOLUTION_REVS) or 1)
+
+
+# Speed and acceleration -------------------------------------------------------------------------
+
+
+def _rate(
+    spec: UnitSpec, told: Told, said: Taught | None, per_rev: float | None, quantity: Quantity
+) -> Scale:
+    fast = quantity is Quantity.VELOCITY
+    key = SI_VELOCITY if fast else SI_ACCELERATION
+    code = told.get(key)
+    unit = None if code is None else decode_si_unit(code)
+    text = spec.velocity if fast else spec.acceleration
+    taught = None if said is None else said.raw_per_rpm if fast else said.raw_per_rpm_s
+    if said is not None and taught is not None:
+        origin = Origin.MEASURED if fast and said.velocity_origin == "measured" else Origin.USER
+        return Scale(quantity, taught, unit.name if unit else "", origin)
+    if code is not None:
+        source = f"{_shown(key)} = {code:08X}h"
+        if unit is None:
+            return _doubtful(quantity, Doubt.UNREADABLE, source=source)
+        return _by_rate_unit(quantity, unit, per_rev, _ratio(spec, told), source)
+    origin = origin_of(spec, quantity)
+    if origin is Origin.UNKNOWN:
+        return _doubtful(quantity, Doubt.NOT_STATED)
+    return by_text(quantity, text, per_rev, origin, spec)
+
+
+def _by_rate_unit(
+    quantity: Quantity, unit: SiUnit, per_rev: float | None, ratio: float, source: str
+) -> Scale:
+    seconds = _seconds_of(quantity, unit)
+    if seconds is None or not (unit.counts or unit.turns):
+        return _doubtful(quantity, Doubt.UNREADABLE, unit.name, source)
+    if unit.counts:
+        if per_rev is None:
+            return _doubtful(quantity, Doubt.NEEDS_RESOLUTION, unit.name, source)
+        steps = per_rev
+    else:
+        if abs(ratio - 1.0) > _SAME:
+            return _doubtful(quantity, Doubt.BEHIND_GEAR, unit.name, f"{source}, 6091h")
+        steps = 1.0 / (unit.turns or 1.0)
+    # One rpm is 1/60 rev/s; one rpm/s is 1/60 rev/s².
+    return Scale(
+        quantity, steps * seconds / 60.0 / unit.factor, unit.name, Origin.DRIVE, source
+    )
+
+
+def _seconds_of(quantity: Quantity, unit: SiUnit) -> float | None:
+    """Seconds, or square seconds, in the denominator."""
+    if quantity is Quantity.VELOCITY:
+        return unit.seconds
+    return unit.square_seconds
+
+
+_MULTIPLE = re.compile(r"(?:(0?\.\d+|1|10|100)\s*)?(rpm|r/min|rpm/s|inc/s|inc/s²|pulse/s|pulse/s²)")
+
+
+def by_text(
+    quantity: Quantity, text: str, per_rev: float | None, origin: Origin, spec: UnitSpec
+) -> Scale:
+    """A unit as a profile prints it: ``inc/s``, ``rpm``, ``0.1 rpm``, ``rpm/s``, ``ms``."""
+    text = text.strip()
+    if quantity is Quantity.ACCELERATION and text.startswith("ms"):
+        # A time to a speed: `AxisUnits` converts it, as it is no factor.
+        known = spec.ramp_reference_rpm is not None
+        return Scale(
+            quantity, 1.0 if known else None, text, origin, spec.source,
+            None if known else Doubt.NOT_STATED,
+        )  # fmt: skip
+    found = _MULTIPLE.fullmatch(text)
+    if found is None:
+        return _doubtful(quantity, Doubt.UNREADABLE, text, spec.source)
+    step, bare = float(found[1] or 1.0), found[2]
+    if bare.startswith(("inc", "pulse")):
+        if per_rev is None:
+            return _doubtful(quantity, Doubt.NEEDS_RESOLUTION, text, spec.source)
+        return Scale(quantity, per_rev / 60.0 / step, text, origin, spec.source)
+    return Scale(quantity, 1.0 / step, text, origin, spec.source)
+
+
+# Parts ------------------------------------------------------------------------------------------
+
+
+def _doubtful(quantity: Quantity, doubt: Doubt, name: str = "", source: str = "") -> Scale:
+    return Scale(quantity, None, name, Origin.UNKNOWN, source, doubt)
+
+
+def _names(told: Told, *keys: str | None) -> list[str]:
+    found = [_shown(key) for key in keys if key is not None and key in told.raws]
+    return list(dict.fromkeys(found))
+
+
+def _shown(key: str) -> str:
+    return f"{key.split(':', maxsplit=1)[0]}h"
+
+
+def _joined(*parts: list[str]) -> str:
+    return ", ".join(dict.fromkeys(name for part in parts for name in part))

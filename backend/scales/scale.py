@@ -1,0 +1,131 @@
+"""A scale with its origin. Words for it are made by `what_to_do` and `why`, once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivers.errors import NotAllowed
+
+
+class Quantity(StrEnum):
+    """What is scaled."""
+
+    POSITION = "position"
+    VELOCITY = "velocity"
+    ACCELERATION = "acceleration"
+
+
+class Origin(StrEnum):
+    """How a scale is known."""
+
+    MANUAL = "manual"
+    """The profile of this family, with the manual's line."""
+    MAKERS_FILE = "makers_file"
+    """The maker's ESI or EDS file that the profile was imported from."""
+    DRIVE = "drive"
+    """Read from the drive: 60A8h to 60AAh, 608Fh, 6091h, 6092h or the family's own objects."""
+    USER = "user"
+    """Stated or confirmed by a person for this axis."""
+    MEASURED = "measured"
+    """Found by comparing 606Ch with 6064h in a small motion."""
+    UNKNOWN = "unknown"
+
+
+class Doubt(StrEnum):
+    """Why a scale is not certain."""
+
+    NO_RESOLUTION = "no_resolution"
+    """Neither 608Fh nor 6092h nor the profile tells the increments of a revolution."""
+    FEED_OF_ONE = "feed_of_one"
+    """6092h is 1 beside an encoder of many increments in 608Fh: it was never set."""
+    UNIT_AND_FEED = "unit_and_feed"
+    """60A8h and 6092h give different numbers of units for a revolution."""
+    LINEAR = "linear"
+    """The unit is a length, and nothing tells how far a revolution goes."""
+    NOT_STATED = "not_stated"
+    """Neither the drive (60A9h, 60AAh) nor a file nor a manual states the unit."""
+    UNREADABLE = "unreadable"
+    """The unit that is stated is none of a position, speed or acceleration."""
+    BEHIND_GEAR = "behind_gear"
+    """The unit counts turns, and 6091h holds a gear: of which shaft is not said."""
+    NEEDS_RESOLUTION = "needs_resolution"
+    """The unit counts increments, of which it is not known how many make a revolution."""
+
+
+_WHY: Mapping[Doubt, str] = {
+    Doubt.NO_RESOLUTION: "increments per revolution are unknown",
+    Doubt.FEED_OF_ONE: "6092h says one unit per revolution beside the encoder of 608Fh, as a drive "
+    "does whose feed constant was never set",
+    Doubt.UNIT_AND_FEED: "60A8h and 6092h give different numbers of units for a revolution",
+    Doubt.LINEAR: "its unit is a length, and how far a revolution goes is unknown",
+    Doubt.NOT_STATED: "neither the drive nor its description says in which unit it is",
+    Doubt.UNREADABLE: "the unit that the drive or its description states is not known here",
+    Doubt.BEHIND_GEAR: "it counts turns, and 6091h holds a gear: of which shaft is not said",
+    Doubt.NEEDS_RESOLUTION: "it counts increments, and increments per revolution are unknown",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """``raw_per_unit``: increments per revolution, or raw per rpm or rpm/s; None where not certain.
+
+    ``raw_unit`` names one raw step ("inc", "0.1 rpm"), empty where unknown. ``source`` names
+    objects, a file or the manual's place.
+    """
+
+    quantity: Quantity
+    raw_per_unit: float | None
+    raw_unit: str
+    origin: Origin
+    source: str = ""
+    doubt: Doubt | None = None
+
+    @property
+    def certain(self) -> bool:
+        """Whether values may be converted by it."""
+        return self.raw_per_unit is not None
+
+    @property
+    def why(self) -> str:
+        """Why it is not certain, as a part of a sentence; empty where it is."""
+        return "" if self.doubt is None else _WHY[self.doubt]
+
+
+@dataclass(frozen=True, slots=True)
+class Scales:
+    """The three of one axis."""
+
+    position: Scale
+    velocity: Scale
+    acceleration: Scale
+
+    @property
+    def all(self) -> tuple[Scale, Scale, Scale]:
+        """In the order in which they are shown."""
+        return self.position, self.velocity, self.acceleration
+
+
+class ScaleUnknown(NotAllowed):
+    """A value in engineering units that cannot be converted, because its scale is not certain."""
+
+    kind = "scale-unknown"
+
+    def __init__(self, drive: str, scale: Scale) -> None:
+        self.scale = scale
+        super().__init__(
+            f"{drive}: the scale of its {scale.quantity.value} is not certain: {scale.why}. "
+            "Nothing is moved by unit",
+            drive=drive,
+            limit="a certain scale",
+            remedy=what_to_do(scale),
+        )
+
+
+def what_to_do(scale: Scale) -> str:
+    """How a scale that is not certain becomes so."""
+    teach = "teach it under “Scales” on the Overview page, or by “servodeck scales teach”"
+    if scale.doubt in (Doubt.NO_RESOLUTION, Doubt.FEED_OF_ONE, Doubt.UNIT_AND_FEED):
+        return f"set feed constant and gear ratio on the Parameters page, or {teach}"
+    return f"{teach}, or import the drive's own description"

@@ -1,0 +1,84 @@
+"""Taking over what a person says of an axis' scales: by a small move, or from a data sheet."""
+
+from __future__ import annotations
+
+from backend.axis import Axis
+from backend.scales.resolve import read_told
+from backend.scales.taught import Taught
+from backend.scales.units_found import nearest_unit
+from drivers.errors import NotAllowed, OutOfRange
+
+#: Revolutions that an eye can tell; fewer are a guess.
+_LEAST_REV = 0.05
+_MOST_REV = 1e6
+
+
+async def confirmed(axis: Axis, turned_rev: float) -> Taught:
+    """The scales after the last small move, of which a person says how far the shaft turned.
+
+    The speed's scale is what 606Ch told meanwhile; where it told nothing, it stays unknown.
+
+    Raises:
+        NotAllowed: no small move was made, or 606Ch has the other sign.
+        OutOfRange: too little for an eye, or too much.
+    """
+    drive, last = axis.drive, axis.small_moves
+    if last is None:
+        raise NotAllowed(
+            f"{drive.name}: no small move was made whose way could be confirmed",
+            drive=drive.name, remedy="make a small move by increments first",
+        )  # fmt: skip
+    if not _LEAST_REV <= abs(turned_rev) <= _MOST_REV:
+        raise OutOfRange(
+            f"{drive.name}: {turned_rev:g} rev cannot be told by eye", drive=drive.name,
+            value=turned_rev, limit=f"at least {_LEAST_REV:g} rev",
+            remedy="make a longer small move, until the shaft turns visibly",
+        )  # fmt: skip
+    if last.raw_per_inc_s is not None and last.raw_per_inc_s < 0:
+        raise NotAllowed(
+            f"{drive.name}: 606Ch and 6064h have opposite signs", drive=drive.name,
+            parameter="606C:00",
+            remedy="look at the polarity 607Eh: its bits 6 and 7 belong together; then move again",
+        )  # fmt: skip
+    counts = abs(last.moved / turned_rev)
+    before = axis.taught
+    per_rpm = before.raw_per_rpm if before is not None else None
+    if last.raw_per_inc_s is not None:
+        per_rpm = nearest_unit(last.raw_per_inc_s, counts)[0]
+    return Taught(
+        counts_per_rev=counts,
+        raw_per_rpm=per_rpm,
+        raw_per_rpm_s=before.raw_per_rpm_s if before is not None else None,
+        velocity_origin="user" if last.raw_per_inc_s is None else "measured",
+        bound_to=dict((await read_told(drive)).raws),
+    )
+
+
+async def stated(
+    axis: Axis,
+    counts_per_rev: float | None,
+    raw_per_rpm: float | None,
+    raw_per_rpm_s: float | None,
+) -> Taught:
+    """Scales from a data sheet; what is None stays as it was taught before.
+
+    Raises:
+        OutOfRange: one is no positive number. DriveError: the drive cannot be asked.
+    """
+    before = axis.taught or Taught()
+    for name, value in (
+        ("counts_per_rev", counts_per_rev), ("raw_per_rpm", raw_per_rpm),
+        ("raw_per_rpm_s", raw_per_rpm_s),
+    ):  # fmt: skip
+        if value is not None and not 0 < value < 1e12:
+            raise OutOfRange(
+                f"{axis.drive.name}: {name} is {value:g}", drive=axis.drive.name, value=value,
+                limit="above 0", remedy="give the number of the drive's data sheet",
+            )  # fmt: skip
+    return Taught(
+        counts_per_rev=counts_per_rev or before.counts_per_rev,
+        raw_per_rpm=raw_per_rpm or before.raw_per_rpm,
+        raw_per_rpm_s=raw_per_rpm_s or before.raw_per_rpm_s,
+        velocity_origin="user" if raw_per_rpm is not None else before.velocity_origin,
+        bound_to=dict((await read_told(axis.drive)).raws),
+    )

@@ -1,0 +1,120 @@
+"""A small move by increments, which needs no scale and teaches one.
+
+The axis follows a smooth path of so many increments in CSP, slowly and with little torque; a person
+looks how far its shaft turns. Nobody knows beforehand how far that is: the first move is short, and
+each may be ten times as long as the longest before it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.axis import Axis
+from backend.cyclic import CyclicSession
+from backend.cyclic_mode import keeping_mode
+from backend.jobs import JobResult, Progress
+from backend.optional import torque_limits
+from backend.scales.compare import measured_scale
+from backend.tools.recording import Play, cycle_s, enabled, play, quiet, require_signals, share
+from drivers import link as bus
+from drivers.cia402 import Mode
+from drivers.errors import NotAllowed, OutOfRange
+
+#: Increments of the first move at most, and by how much the next may be longer.
+FIRST_INCREMENTS, LONGER = 1_000, 10
+_MOST_INCREMENTS = 2**30
+_MOVE_S, _REST_S = 2.0, 0.25
+_TORQUE_PERCENT = (1.0, 50.0)
+_MARGIN, _MARGIN_INCREMENTS = 0.25, 50
+_ARRIVED = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class SmallMoveSettings:
+    """``increments`` with their sign; ``torque_percent`` of rated, above which the axis stops."""
+
+    increments: int
+    torque_percent: float = 20.0
+
+
+def longest_allowed(axis: Axis) -> int:
+    """Increments that the next move of this axis may have."""
+    known = axis.small_moves
+    return FIRST_INCREMENTS if known is None else min(LONGER * known.longest, _MOST_INCREMENTS)
+
+
+async def small_move(
+    axis: Axis, session: CyclicSession, settings: SmallMoveSettings, progress: Progress
+) -> JobResult:
+    """Move, and note what 606Ch said meanwhile; the axis stays where it arrived, disabled.
+
+    Raises:
+        OutOfRange: no increments, more than may be moved now, or a torque outside its bounds.
+        NotAllowed: no CSP in this exchange, or the axis did not follow.
+    """
+    drive = axis.drive
+    _check(axis, settings)
+    require_signals(axis, session, Mode.CSP, False)
+    cycle = cycle_s(session)
+    path = _path(settings.increments, cycle)
+    limits = await torque_limits(drive)
+    progress(0.0, "enabling")
+    async with axis.restoring(*limits), keeping_mode(axis, session):
+        await axis.limit_torque(limits, settings.torque_percent)
+        async with enabled(axis, session, Mode.CSP, by_increments=True) as start:
+            await quiet(axis)
+            recording = await play(
+                axis, session, Play(Mode.CSP, start + path),
+                await _envelope(axis, settings, start), 1.0,
+                share(progress, 0.1, 0.95, "moving"), raw=True,
+            )  # fmt: skip
+            await quiet(axis)
+            moved = await axis.position_raw() - start
+    if abs(moved - settings.increments) > _ARRIVED * abs(settings.increments) + 2:
+        raise NotAllowed(
+            f"{drive.name} moved {moved} of {settings.increments} increments",
+            drive=drive.name, value=moved, limit=str(settings.increments),
+            remedy="look for a closed brake or a blocked axis, or permit a little more torque",
+        )  # fmt: skip
+    scale = measured_scale(recording.position_rad, recording.velocity_rad_s, cycle)
+    axis.moved_small(moved, scale)
+    return {
+        "moved_increments": moved, "raw_per_inc_s": scale, "next_most": longest_allowed(axis),
+    }  # fmt: skip
+
+
+def _check(axis: Axis, settings: SmallMoveSettings) -> None:
+    most = longest_allowed(axis)
+    if not 0 < abs(settings.increments) <= most:
+        raise OutOfRange(
+            f"{axis.drive.name}: {settings.increments} increments: a small move may have 1 to "
+            f"{most} now", drive=axis.drive.name, value=settings.increments, limit=f"1…{most}",
+            remedy="begin small: each move may be ten times as long as the one before",
+        )  # fmt: skip
+    low, high = _TORQUE_PERCENT
+    if not low <= settings.torque_percent <= high:
+        raise OutOfRange(
+            f"{axis.drive.name}: a small move takes {low:g} to {high:g} % of rated torque at most",
+            drive=axis.drive.name, value=settings.torque_percent, limit=f"{low:g}…{high:g} %",
+        )  # fmt: skip
+
+
+def _path(increments: int, cycle: float) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """A raised cosine from 0 to the end, with a rest before and behind."""
+    count, rest = round(_MOVE_S / cycle), round(_REST_S / cycle)
+    way = 0.5 * increments * (1.0 - np.cos(np.pi * np.arange(count + 1) / count))
+    ends = np.zeros(rest), np.full(rest, float(increments))
+    return np.round(np.concatenate([ends[0], way, ends[1]])).astype(np.int64)
+
+
+async def _envelope(axis: Axis, settings: SmallMoveSettings, start: int) -> bus.Envelope:
+    """By position and torque alone: what a speed means is what is to be found out."""
+    margin = round(_MARGIN * abs(settings.increments)) + _MARGIN_INCREMENTS
+    low, high = sorted((start, start + settings.increments))
+    torque = (await axis.units()).torque_raw(settings.torque_percent)
+    return bus.Envelope(
+        position_min=low - margin, position_max=high + margin, torque_max=torque,
+        following_error_max=margin,
+    )  # fmt: skip

@@ -1,0 +1,136 @@
+"""Why a cyclic loop ended a motion by force: a value from the loop up to the error of a tool.
+
+Words are made here once, by `Halted.words`, for people. Nothing decides by them: what may be tried
+after a halt depends on `Halted.cause` alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Literal, NamedTuple
+
+Quantity = Literal["position", "speed", "torque", "following error"]
+
+
+class HaltCause(Enum):
+    """What ended the motion."""
+
+    POSITION = "position"
+    """The position left the envelope."""
+    SPEED = "speed"
+    """The speed was above the envelope's limit."""
+    TORQUE = "torque"
+    """The torque was above the envelope's limit."""
+    FOLLOWING = "following"
+    """The following error was above the envelope's limit."""
+    EXPIRED = "expired"
+    """The setpoints were not renewed in time."""
+    LEFT_ENABLED = "left_enabled"
+    """The drive left Operation enabled by itself: a fault, an emergency stop, STO, supply."""
+    COMMANDED = "commanded"
+    """Somebody or something in servodeck commanded the end: STOP, release, end of the exchange."""
+    LOST = "lost"
+    """The process data, the node, the bus or the server's signs of life did not come any more."""
+    UNFIT = "unfit"
+    """A setpoint does not fit its object, so it could not be sent."""
+    CONTRADICTION = "contradiction"
+    """Two measured quantities contradict each other, such as 606Ch and differences of 6064h."""
+
+
+#: Causes that are a limit of the envelope.
+ENVELOPE_CAUSES = frozenset(
+    {HaltCause.POSITION, HaltCause.SPEED, HaltCause.TORQUE, HaltCause.FOLLOWING}
+)
+_CAUSE_OF: Mapping[Quantity, HaltCause] = {
+    "position": HaltCause.POSITION,
+    "speed": HaltCause.SPEED,
+    "torque": HaltCause.TORQUE,
+    "following error": HaltCause.FOLLOWING,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Halted:
+    """The end of a motion by force.
+
+    ``quantity`` is what was watched, ``value`` and ``limit`` are in raw drive units; all three are
+    None where the cause is no limit. Of a contradiction, ``value`` is what 606Ch says and ``limit``
+    what the position says, both in raw units of 606Ch. ``note`` holds what else is known, for
+    people only.
+    """
+
+    cause: HaltCause
+    quantity: Quantity | None = None
+    value: float | None = None
+    limit: float | None = None
+    note: str = ""
+
+    @classmethod
+    def beyond(cls, quantity: Quantity, value: float, limit: float) -> Halted:
+        """A limit of the envelope was passed."""
+        return cls(_CAUSE_OF[quantity], quantity, value, limit)
+
+    @property
+    def words(self) -> str:
+        """For people: the page, the log and messages."""
+        if self.cause in ENVELOPE_CAUSES and self.value is not None and self.limit is not None:
+            return (
+                f"{self.quantity} {self.value:g} is beyond the limit of {self.limit:g}: "
+                "the axis is braked and disabled"
+            )
+        if self.cause is HaltCause.EXPIRED:
+            return "the setpoints were not renewed in time: the axis is braked and disabled"
+        if self.cause is HaltCause.LEFT_ENABLED:
+            return f"the drive left Operation enabled: {self.note}"
+        if self.cause is HaltCause.CONTRADICTION and self.value is not None:
+            return (
+                f"606Ch says {self.value:.6g}, the position says {self.limit or 0.0:.6g} (raw units "
+                f"of 606Ch; {self.note}): the axis is braked and disabled"
+            )
+        return self.note or _WORDS[self.cause]
+
+    def to_wire(self) -> dict[str, Any]:
+        """As a map of plain values, for a message to another process."""
+        return {
+            "cause": self.cause.value,
+            "quantity": self.quantity,
+            "value": self.value,
+            "limit": self.limit,
+            "note": self.note,
+        }
+
+    @classmethod
+    def from_wire(cls, wire: Mapping[str, Any]) -> Halted:
+        """The same value again.
+
+        Raises:
+            ValueError, KeyError: the map is none that `to_wire` made.
+        """
+        return cls(
+            HaltCause(wire["cause"]), wire["quantity"], wire["value"], wire["limit"], wire["note"]
+        )
+
+
+_WORDS: Mapping[HaltCause, str] = {
+    HaltCause.POSITION: "the position is beyond its limit",
+    HaltCause.SPEED: "the speed is beyond its limit",
+    HaltCause.TORQUE: "the torque is beyond its limit",
+    HaltCause.FOLLOWING: "the following error is beyond its limit",
+    HaltCause.COMMANDED: "it was halted",
+    HaltCause.LOST: "the cyclic data stopped coming",
+    HaltCause.UNFIT: "a setpoint does not fit its object: the axis is braked",
+    HaltCause.CONTRADICTION: "measured position and speed contradict each other",
+}
+
+
+class LoopState(NamedTuple):
+    """What a loop knows of one axis."""
+
+    state: str
+    """CiA 402 power state, a value of `drivers.cia402.State`."""
+    phase: str
+    """What the setpoints do, a value of `drivers.ethercat.motion.Phase`."""
+    halted: Halted | None
+    """Why the last motion was ended by force; None while none was."""

@@ -1,0 +1,1 @@
+"""What the cyclic buses share of moving an axis."""

@@ -1,0 +1,203 @@
+"""Whether 606Ch and the differences of 6064h tell of the same motion.
+
+Both are compared over windows of time, so that a 606Ch that lags, is a mean over some cycles or is
+coarsely rounded agrees, while one in another unit, of another sign, or that stands still does not.
+Pure: `FeedbackWatch.take` gets samples with their times and never raises.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from enum import StrEnum
+
+_PARTS = 5
+"""Parts of a window; each is closed with its own sums, and the window slides by one part."""
+_RELATIVE = 0.25
+"""Share of the greater speed that the two may differ by."""
+_LAG = 0.25
+"""Share of a window that 606Ch may lag: 10 ms of 40 ms."""
+_COUNTS = 2.0
+"""Increments that a difference of positions may be wrong by."""
+_MOST_IGNORED = 3.0
+"""Rounding of 606Ch that is found while it runs may widen what is ignored by this factor."""
+_VOTES = 2 * _PARTS
+"""Windows in a row, each a part later, that must disagree."""
+_APART = 3.0
+"""Factor between the two beyond which a speed limit was met by a wrong value, not by a speed."""
+_INSTANT = 4
+"""Samples over which a speed beyond its limit is compared with the position, there and then."""
+_WRAP = 2**32
+
+WINDOW_S = 0.04
+"""Of a cyclic exchange. Polled signals need longer ones."""
+LIMIT_MARGIN = 1.15
+"""A speed by position is a mean over cycles that are not quite equally long."""
+
+
+class Disagreement(StrEnum):
+    """How 606Ch and the position disagree."""
+
+    SCALE = "scale"
+    SIGN = "sign"
+    SPEED_STANDS = "speed stands still"
+    POSITION_STANDS = "position stands still"
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackScale:
+    """How the two hang together.
+
+    ``velocity_per_inc_s`` is raw 606Ch per increment per second of 6064h; differences below
+    ``ignored`` [raw 606Ch] are none.
+    """
+
+    velocity_per_inc_s: float
+    ignored: float
+
+
+@dataclass(frozen=True, slots=True)
+class Contradiction:
+    """What each tells, in raw units of 606Ch: ``told`` by 606Ch, ``seen`` by the position."""
+
+    kind: Disagreement
+    told: float
+    seen: float
+
+
+@dataclass(slots=True)
+class _Part:
+    moved: int = 0
+    told: float = 0.0
+    time_s: float = 0.0
+    peak_told: float = 0.0
+
+
+class FeedbackWatch:
+    """One motion of one axis. ``window_s`` is the length over which the two are compared."""
+
+    def __init__(self, scale: FeedbackScale, window_s: float = WINDOW_S) -> None:
+        self._scale = scale
+        self._part_s = window_s / _PARTS
+        self._parts: deque[_Part] = deque(maxlen=_PARTS)
+        self._open = _Part()
+        self._last: tuple[int, float, float] | None = None
+        self._newest: deque[tuple[int, float, float]] = deque(maxlen=_INSTANT)
+        self._samples = 0
+        self._votes = 0
+        self._finest = 0.0
+        """Smallest step of 606Ch: its rounding cannot be coarser."""
+
+    def take(self, position: int, velocity: float, at_s: float) -> Contradiction | None:
+        """One sample: raw 6064h and 606Ch at a time [s]; what contradicts, once it is certain."""
+        last, self._last = self._last, (position, velocity, at_s)
+        self._newest.append(self._last)
+        if last is None or at_s <= last[2]:
+            return None
+        step = abs(velocity - last[1])
+        if step and (not self._finest or step < self._finest):
+            self._finest = step
+        part = self._open
+        elapsed = at_s - last[2]
+        part.moved += _difference(position, last[0])
+        part.told += 0.5 * (velocity + last[1]) * elapsed
+        part.time_s += elapsed
+        part.peak_told = max(part.peak_told, abs(velocity))
+        self._samples += 1
+        if part.time_s < self._part_s or self._samples < 2:
+            return None
+        self._parts.append(part)
+        self._open, self._samples = _Part(), 0
+        return self._judge() if len(self._parts) == _PARTS else None
+
+    def interrupt(self) -> None:
+        """The position was set anew (homing), or samples are missing: begin a new window."""
+        self._parts.clear()
+        self._newest.clear()
+        self._open, self._samples, self._votes, self._last = _Part(), 0, 0, None
+
+    def too_fast(self, limit: float) -> float | None:
+        """The speed by position [raw 606Ch] where it is certainly beyond this limit."""
+        if len(self._parts) < 2:
+            return None
+        recent = list(self._parts)[-2:]
+        moved, time_s = sum(p.moved for p in recent), sum(p.time_s for p in recent)
+        per = abs(self._scale.velocity_per_inc_s)
+        least = (abs(moved) - _COUNTS) / time_s * per
+        return moved / time_s * self._scale.velocity_per_inc_s if least > limit else None
+
+    def denied(self) -> Contradiction | None:
+        """Whether the position denies the speed that 606Ch has told over the newest samples."""
+        newest = list(self._newest)
+        time_s = newest[-1][2] - newest[0][2]
+        if time_s <= 0:
+            return None
+        told = sum(
+            0.5 * (new[1] + old[1]) * (new[2] - old[2])
+            for old, new in zip(newest, newest[1:], strict=False)
+        ) / time_s  # fmt: skip
+        moved = _difference(newest[-1][0], newest[0][0])
+        per = self._scale.velocity_per_inc_s
+        most = (abs(moved) + _COUNTS) / time_s * abs(per)
+        return self._of(told, moved, time_s) if self._apart(most, abs(told)) else None
+
+    def unnoticed(self, seen: float) -> Contradiction | None:
+        """Whether 606Ch denies this speed of the position: it never told of one like it lately."""
+        recent = self._recent()
+        if not self._apart(max(part.peak_told for part in recent), abs(seen)):
+            return None
+        time_s = sum(part.time_s for part in recent)
+        moved = sum(part.moved for part in recent)
+        return self._of(sum(part.told for part in recent) / time_s, moved, time_s)
+
+    def _apart(self, low: float, high: float) -> bool:
+        return low * _APART < high and high - low > self._ignored
+
+    def _of(self, told: float, moved: int, time_s: float) -> Contradiction:
+        within = abs(moved) <= _COUNTS
+        seen = 0.0 if within else moved / time_s * self._scale.velocity_per_inc_s
+        return Contradiction(disagreement(told, seen), told, seen)
+
+    def _recent(self) -> list[_Part]:
+        return [*list(self._parts)[-2:], self._open]
+
+    @property
+    def _ignored(self) -> float:
+        base = self._scale.ignored
+        return max(base, min(1.5 * self._finest, _MOST_IGNORED * base))
+
+    def _judge(self) -> Contradiction | None:
+        per = self._scale.velocity_per_inc_s
+        time_s = sum(part.time_s for part in self._parts)
+        told = sum(part.told for part in self._parts) / time_s
+        seen = sum(part.moved for part in self._parts) / time_s * per
+        speeds = [part.moved / part.time_s * per for part in self._parts]
+        allowed = (
+            _RELATIVE * max(abs(told), abs(seen))
+            + _LAG * (max(speeds) - min(speeds))
+            + _COUNTS / time_s * abs(per)
+            + self._ignored
+        )
+        if abs(told - seen) <= allowed:
+            self._votes = 0
+            return None
+        self._votes += 1
+        if self._votes < _VOTES:
+            return None
+        return self._of(told, sum(part.moved for part in self._parts), time_s)
+
+
+def _difference(new: int, old: int) -> int:
+    """Of two positions of 32 bits, over their end too."""
+    return (new - old + _WRAP // 2) % _WRAP - _WRAP // 2
+
+
+def disagreement(told: float, seen: float) -> Disagreement:
+    """How a speed by 606Ch and one by the position disagree, both in raw units of 606Ch."""
+    if abs(told) < 1.0:
+        return Disagreement.SPEED_STANDS
+    if seen == 0.0:
+        return Disagreement.POSITION_STANDS
+    if told * seen < 0 and 0.5 < abs(told / seen) < 2:
+        return Disagreement.SIGN
+    return Disagreement.SCALE

@@ -1,0 +1,53 @@
+"""The speed of one motion, watched by 606Ch and by the position: each must agree with the other."""
+
+from __future__ import annotations
+
+from drivers.halt import HaltCause, Halted
+from drivers.motion.feedback import LIMIT_MARGIN, WINDOW_S, Contradiction, FeedbackScale, FeedbackWatch
+
+
+class SpeedGuard:
+    """For one motion. ``limit`` is the speed limit in raw 606Ch, None where there is none.
+
+    By the position the axis is too fast beyond ``margin`` times the limit: samples are not quite
+    equally far apart.
+    """
+
+    def __init__(
+        self,
+        scale: FeedbackScale | None,
+        limit: float | None,
+        window_s: float = WINDOW_S,
+        margin: float = LIMIT_MARGIN,
+    ) -> None:
+        self._watch = None if scale is None else FeedbackWatch(scale, window_s)
+        self._limit = limit
+        self._margin = margin
+
+    def look(self, position: int | None, velocity: float | None, at_s: float) -> Halted | None:
+        """Why one sample of raw 6064h and 606Ch at a time [s] ends the motion; None: it goes on."""
+        watch, limit = self._watch, self._limit
+        certain = None
+        if watch is not None and position is not None and velocity is not None:
+            certain = watch.take(position, velocity, at_s)
+        if velocity is not None and limit is not None and abs(velocity) > limit:
+            denied = None if watch is None else watch.denied()
+            return Halted.beyond("speed", velocity, limit) if denied is None else _of(denied)
+        if certain is not None:
+            return _of(certain)
+        if watch is None or limit is None or (seen := watch.too_fast(limit * self._margin)) is None:
+            return None
+        denied = watch.unnoticed(seen)
+        return Halted.beyond("speed", seen, limit) if denied is None else _of(denied)
+
+    def interrupt(self) -> None:
+        """The position was set anew, or samples are missing: nothing is compared across that."""
+        if self._watch is not None:
+            self._watch.interrupt()
+
+
+def _of(contradiction: Contradiction) -> Halted:
+    kind = contradiction.kind
+    return Halted(
+        HaltCause.CONTRADICTION, "speed", contradiction.told, contradiction.seen, kind.value
+    )
