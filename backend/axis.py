@@ -1,8 +1,7 @@
 """One axis: its units, and the two context managers that carry safety.
 
-`Axis.restoring` puts parameters back and `Axis.enabled` leaves Operation enabled, on every
-way out. Their cleanup is shielded from cancellation, has a deadline of its own, and reports
-what it could not restore.
+`Axis.restoring` puts parameters back and `Axis.enabled` leaves Operation enabled, on every way
+out. Their cleanup is shielded from cancellation, has a deadline, and reports what it left.
 """
 
 from __future__ import annotations
@@ -57,9 +56,8 @@ class Axis(PowerState):
         super().__init__(drive)
         self._units: AxisUnits | None = None
         self._unit_raws: dict[str, Raw | None] = {}
-        #: A person enabled it by a transition, and nobody took that back here.
         self._left_enabled = False
-        #: The page by which that was done; None where it was no page.
+        #: The page by which it was left enabled; None where it was no page.
         self.enabled_by: str | None = None
         drive.listeners.add(self._units_may_have_changed)
 
@@ -73,6 +71,11 @@ class Axis(PowerState):
             }
             self._units = units
         return self._units
+
+    @property
+    def left_enabled(self) -> bool:
+        """A person enabled it by a transition, and nobody took that back."""
+        return self._left_enabled and not self.stopped
 
     @property
     def known_units(self) -> AxisUnits | None:

@@ -16,6 +16,8 @@ from backend.faults import active_faults, fault_keys, integer
 from backend.journal import Journal, Level
 from backend.people.identity import by_itself
 from backend.readings import Reading
+from backend.stopping.settings import settings_keys
+from backend.stopping.turning import Turning, TurnWatch, told
 from backend.units import AxisUnits
 from drivers import cia402
 from drivers.cia402 import State
@@ -83,6 +85,8 @@ class Snapshot:
     units: dict[str, str] = field(default_factory=dict)
     faults: tuple[Fault, ...] = ()
     blocked_by: tuple[str, ...] = ()
+    turning: Turning | None = None
+    """It turns although nobody may move it."""
 
 
 class Monitor:
@@ -94,6 +98,7 @@ class Monitor:
         journal: Journal,
         changed: Callable[[Snapshot], None],
         returned: Callable[[], None],
+        may_turn: Callable[[], bool] = lambda: True,
     ) -> None:
         self.axis = axis
         self.snapshot = Snapshot(time.time(), fresh=False, problem="not read yet")
@@ -102,6 +107,8 @@ class Monitor:
         self._journal = journal
         self._changed = changed
         self._returned = returned
+        self._turns = TurnWatch(may_turn)
+        self._stop_asked_s = -math.inf
         self._task: asyncio.Task[None] | None = None
         self._wake = asyncio.Event()
         self._last: dict[str, Reading] = {}
@@ -163,7 +170,9 @@ class Monitor:
             snapshot = await read()
         except DriveError as error:
             self._asked_s = -math.inf
-            snapshot = replace(before, time=time.time(), fresh=False, problem=error.message)
+            snapshot = replace(
+                before, time=time.time(), fresh=False, problem=error.message, turning=None
+            )
         self.snapshot = snapshot
         self._record(before, snapshot)
         self._changed(snapshot)
@@ -176,6 +185,10 @@ class Monitor:
         wanted = [drive.require("status_word")]
         wanted += [key for role in _SHOWN_ROLES if (key := drive.key(role))]
         wanted += fault_keys(drive)
+        if began_s - self._stop_asked_s >= ASKED_S and self._was_enabled():
+            # STOP has no time to ask how the drive brakes.
+            wanted += settings_keys(drive)
+            self._stop_asked_s = began_s
         if drive.modes_key is not None and drive.modes_key not in drive.readings:
             wanted.append(drive.modes_key)
         self._last = await drive.read_many(dict.fromkeys(wanted))
@@ -206,6 +219,9 @@ class Monitor:
             self._last = self._last | await drive.read_many(asked)
         return await self._snapshot()
 
+    def _was_enabled(self) -> bool:
+        return self.snapshot.state in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
+
     def _tells_other(self, newest: Mapping[str, Reading], telling: Sequence[str]) -> bool:
         """Whether state, warning or error code are not what they were, or are not known."""
         drive = self.axis.drive
@@ -231,6 +247,11 @@ class Monitor:
         word = integer(readings[drive.require("status_word")]) or 0
         mode = integer(readings.get(drive.key("mode_display") or ""))
         names = _MODE_BITS.get(mode or 0, ("", ""))
+        position, velocity = (
+            integer(readings.get(drive.key(role) or ""))
+            for role in ("position_actual", "velocity_actual")
+        )
+        turning = self._turns.take(units, state, position, velocity)
         return Snapshot(
             time=time.time(),
             fresh=True,
@@ -249,6 +270,7 @@ class Monitor:
             units=units.names,
             faults=tuple(active_faults(drive, readings)),
             blocked_by=tuple(self._last_causes),
+            turning=turning,
         )
 
     def _record(self, before: Snapshot, now: Snapshot) -> None:
@@ -261,6 +283,8 @@ class Monitor:
                 self._returned()
         if not now.fresh:
             return
+        if now.turning is not None and before.turning is None:
+            self._journal.add(told(drive.name, now.turning), level="error", drive=drive.id)
         old = {fault.code for fault in before.faults}
         for fault in now.faults:
             if fault.code not in old:

@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 
 from profiles.functions import Functions, referenced_keys
 from profiles.record import Frozen
+from profiles.stopping import StopClear
 
 DataType = Literal[
     "BOOL", "INT8", "UINT8", "INT16", "UINT16", "INT32", "UINT32",
@@ -494,6 +495,9 @@ class Profile(Frozen):
     gains: GainSpec | None = None
     quirks: tuple[Quirk, ...] = ()
     functions: Functions = Functions()
+    stop_clears: tuple[StopClear, ...] = Field(
+        default=(), description="what STOP writes to a drive that turns without being enabled"
+    )
     conflicts: tuple[Conflict, ...] = ()
     manual_chapters: tuple[Chapter, ...] = Field(
         default=(), description="the whole manual, chapter behind chapter, without a gap"
@@ -580,4 +584,5 @@ def _referenced_keys(profile: Profile) -> list[str]:
     for pdo_set in profile.pdo.sets if profile.pdo else ():
         found.extend(pdo_set.entries)
     found.extend(referenced_keys(profile.functions))
+    found.extend(each.key for each in profile.stop_clears)
     return found
