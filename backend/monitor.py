@@ -16,7 +16,6 @@ from backend.faults import active_faults, fault_keys, integer
 from backend.journal import Journal, Level
 from backend.people.identity import by_itself
 from backend.readings import Reading
-from backend.stopping.settings import settings_keys
 from backend.stopping.turning import Turning, TurnWatch, told
 from backend.units import AxisUnits
 from drivers import cia402
@@ -31,6 +30,8 @@ WATCHED_S = 0.1
 IDLE_S = 1.0
 #: Beside an exchange that brings state and values, everything else is asked for so often.
 ASKED_S = 1.0
+#: Option codes and ramps of STOP are asked for so often, while the axis is enabled.
+STOP_ASKED_S = 0.9
 #: Process data older than this say nothing of the present.
 NEWEST_S = 0.05
 #: What changes slowly enough to be asked for with everything else only.
@@ -185,14 +186,12 @@ class Monitor:
         wanted = [drive.require("status_word")]
         wanted += [key for role in _SHOWN_ROLES if (key := drive.key(role))]
         wanted += fault_keys(drive)
-        if began_s - self._stop_asked_s >= ASKED_S and self._was_enabled():
-            # STOP has no time to ask how the drive brakes.
-            wanted += settings_keys(drive)
-            self._stop_asked_s = began_s
         if drive.modes_key is not None and drive.modes_key not in drive.readings:
             wanted.append(drive.modes_key)
         self._last = await drive.read_many(dict.fromkeys(wanted))
         self._last_causes, self._waiting = [], list(drive.pending)
+        if self._state() in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
+            await self._know_stop(began_s)
         if self._state() is not State.OPERATION_ENABLED:
             self._last_causes = await self.axis.blocked_by()
         self._asked_s = began_s
@@ -219,8 +218,11 @@ class Monitor:
             self._last = self._last | await drive.read_many(asked)
         return await self._snapshot()
 
-    def _was_enabled(self) -> bool:
-        return self.snapshot.state in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
+    async def _know_stop(self, now_s: float) -> None:
+        """STOP has no time to ask how the drive brakes, and anybody may change it."""
+        if now_s - self._stop_asked_s >= STOP_ASKED_S:
+            self._stop_asked_s = now_s
+            await self.axis.know_stop()
 
     def _tells_other(self, newest: Mapping[str, Reading], telling: Sequence[str]) -> bool:
         """Whether state, warning or error code are not what they were, or are not known."""

@@ -12,9 +12,9 @@ from backend.drive import Drive
 from backend.faults import read_active_faults
 from backend.ports import address_of
 from backend.restoring import shielded
-from backend.stopping.braking import brake_then_quick_stop
+from backend.stopping.braking import brake_then_quick_stop, quick_stop_coasts
 from backend.stopping.facts import StepCode, StopStep
-from backend.stopping.settings import known_settings, settings_keys
+from backend.stopping.settings import settings_keys
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.codec import encode
@@ -306,7 +306,7 @@ class PowerState:
             if self.session is not None and self.cyclic_power() is not None:
                 await self.session.cyclic.halt(self.session.station(self.drive))
                 self.stop_step(StepCode.HALT)
-            elif known_settings(self.drive).coasts:
+            elif quick_stop_coasts(self.drive):
                 await brake_then_quick_stop(self)
             else:
                 await self.send_quick_stop()

@@ -446,7 +446,7 @@ class Quirk(Frozen):
         "error_code_low_byte", "warning_bit_7", "home_found_bit_15", "save_readback_ambiguous",
         "sdo_pause_on_save", "gear_on_init", "brake_by_pdo", "unit_switch", "write_protect",
         "partial_manual", "types_unreliable", "no_watchdog", "positive_limit_first",
-        "quick_stop_word",
+        "quick_stop_word", "torque_stop_by_slope",
     ]  # fmt: skip
     key: str | None = None
     raw: int | None = None

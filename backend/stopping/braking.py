@@ -1,4 +1,8 @@
-"""STOP of a drive whose quick stop takes the power off (605Ah = 0) instead of braking."""
+"""STOP of a drive whose quick stop would not brake.
+
+Either it takes the power off (605Ah = 0), or the family takes only the torque back in its torque
+modes (M6-L 000:3019): another mode brakes then.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,7 @@ from backend.drive import Drive
 from backend.stopping.facts import StepCode
 from backend.stopping.settings import OPTION, braking_option, known_settings
 from drivers import cia402
-from drivers.cia402 import State
+from drivers.cia402 import Mode, State
 from drivers.errors import DriveError
 
 if TYPE_CHECKING:
@@ -28,7 +32,13 @@ async def brake_then_quick_stop(power: PowerState) -> None:
         DriveError: no word reaches the drive.
     """
     drive, halted = power.drive, False
-    if known_settings(drive).halt_brakes and _seen_enabled(drive):
+    if torque_coasts(drive):
+        halted = await _take_speed_control(power)
+        if not known_settings(drive).coasts:
+            await power.send_quick_stop()
+            power.stop_step(StepCode.QUICK_STOP)
+            return
+    elif known_settings(drive).halt_brakes and _seen_enabled(drive):
         # Over an axis that is not enabled this word would enable it.
         halt = cia402.ENABLE_OPERATION | cia402.HALT
         await drive.command(drive.require("control_word"), halt)
@@ -38,6 +48,36 @@ async def brake_then_quick_stop(power: PowerState) -> None:
     if brakes or not halted:
         await power.send_quick_stop()
         power.stop_step(StepCode.QUICK_STOP)
+
+
+def quick_stop_coasts(drive: Drive) -> bool:
+    """By what was read last, a quick stop would not brake and something else would."""
+    return known_settings(drive).coasts or torque_coasts(drive)
+
+
+def torque_coasts(drive: Drive) -> bool:
+    """It is enabled in a torque mode, where this family's quick stop lets it coast."""
+    profile = drive.profile
+    if profile.quirk("torque_stop_by_slope") is None or Mode.PV not in drive.modes:
+        return False
+    if profile.quirk("mode_change_at_standstill") is not None:
+        return False
+    shown = _seen(drive, drive.key("mode_display"))
+    return shown in (Mode.PT, Mode.CST) and _seen_enabled(drive)
+
+
+async def _take_speed_control(power: PowerState) -> bool:
+    """Profile velocity with the target 0: the drive brakes by 6084h."""
+    drive, problem = power.drive, ""
+    try:
+        await drive.command(drive.require("velocity_target"), 0)
+        await drive.command(drive.require("mode"), int(Mode.PV))
+        if await drive.raw(drive.require("mode_display")) != Mode.PV:
+            problem = "the drive does not change its mode"
+    except DriveError as error:
+        problem = error.message
+    power.stop_step(StepCode.SPEED_CONTROL, problem, drive.key("mode"), {"raw": float(Mode.PV)})
+    return not problem
 
 
 async def _let_quick_stop_brake(power: PowerState) -> bool:
@@ -60,8 +100,13 @@ async def _let_quick_stop_brake(power: PowerState) -> bool:
 
 def _seen_enabled(drive: Drive) -> bool:
     """The status word that was read last, a moment ago, said so."""
-    reading = drive.readings.get(drive.require("status_word"))
+    word = _seen(drive, drive.key("status_word"))
+    return word is not None and drive.decode_state(word) is State.OPERATION_ENABLED
+
+
+def _seen(drive: Drive, key: str | None) -> int | None:
+    """What was read of this a moment ago."""
+    reading = drive.readings.get(key or "")
     if reading is None or not isinstance(reading.raw, int) or reading.time is None:
-        return False
-    recent = time.time() - reading.time < _SEEN_S
-    return recent and drive.decode_state(reading.raw) is State.OPERATION_ENABLED
+        return None
+    return reading.raw if time.time() - reading.time < _SEEN_S else None

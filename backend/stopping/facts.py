@@ -24,6 +24,8 @@ class StepCode(StrEnum):
 
     QUICK_STOP = "quick_stop"
     HALT = "halt"
+    SPEED_CONTROL = "speed_control_taken"
+    """Out of a torque mode, in which this family's quick stop brakes nothing."""
     OPTION_SET = "quick_stop_option_set"
     OPTION_RESTORED = "quick_stop_option_restored"
     TRIGGER_CLEARED = "trigger_cleared"

@@ -106,6 +106,11 @@ class SpeedWatch:
         elif self._still_since is None:
             self._still_since = sample.at_s
 
+    @property
+    def turns(self) -> bool:
+        """The last look showed motion, or nothing certain."""
+        return self._still_since is None
+
     def stands(self, dwell_s: float = DWELL_S) -> bool:
         """Both have said so for this long."""
         now = self.newest

@@ -24,7 +24,7 @@ from backend.stopping.settings import (
 from backend.stopping.speed import LOOK_S, Sample, SpeedWatch, units_of
 from drivers import cia402
 from drivers.cia402 import State
-from drivers.errors import DriveError, LinkTimeout
+from drivers.errors import DriveError, LinkLost, LinkTimeout
 from profiles.stopping import StopClear
 
 #: The ramp's own time gets this much more, and is at least and at most so long.
@@ -151,7 +151,7 @@ class StopWatch:
     async def _without_power(self, sample: Sample) -> None:
         """An axis that turns although it is not enabled: what the drive does by itself is ended."""
         now = time.monotonic()
-        if sample.state in _POWERED:
+        if sample.state in (*_POWERED, State.FAULT) or not self._watch.turns:
             self._unpowered_since = None
             return
         if self._unpowered_since is None:
@@ -168,13 +168,13 @@ class StopWatch:
         if slows and sample.state in _POWERED and now - self._began_s < _PATIENCE_S:
             self._until_s = now + _STEP_S / 2
             return True
-        if slows and self._cleared:
+        if slows and (self._cleared or sample.state is State.FAULT):
             return False  # it coasts, or ends by its own ramp: nothing brakes it more
         if not self._disabled and sample.state in _POWERED:
             self._disabled = True
             await self._clear("brake")
             await self._disable_voltage()
-        elif not self._cleared:
+        elif not self._cleared and sample.state is not State.FAULT:
             self._cleared = True
             await self._clear()
         elif not self._ended:
@@ -218,28 +218,30 @@ class StopWatch:
     async def _clear(self, kind: str | None = None) -> None:
         """Write the neutral values of what the drive moves by itself."""
         for entry in self._axis.drive.profile.stop_clears:
-            if kind is None or entry.kind == kind:
-                await self._clear_one(entry)
+            if (kind is None or entry.kind == kind) and not await self._clear_one(entry):
+                return
 
-    async def _clear_one(self, entry: StopClear) -> None:
-        axis, drive, problem = self._axis, self._axis.drive, ""
+    async def _clear_one(self, entry: StopClear) -> bool:
+        """Whether the drive answers."""
+        axis, drive, problem, answers = self._axis, self._axis.drive, "", True
         if drive.unreachable_why(drive.parameter(entry.key)):
-            return
+            return True
         figures: dict[str, float] = {}
         try:
             async with asyncio.timeout(LOOK_S):
                 before = await drive.raw(entry.key)
                 wanted = entry.neutral(before)
                 if wanted is None:
-                    return
+                    return True
                 figures = {"before": float(before), "after": float(wanted)}
                 await drive.command(entry.key, wanted)
+        except (LinkLost, LinkTimeout, TimeoutError):
+            answers, problem = False, "no answer"
         except DriveError as error:
             problem = error.message
-        except TimeoutError:
-            problem = LinkTimeout("no answer in time").message
         code = StepCode.BRAKE_APPLIED if entry.kind == "brake" else StepCode.TRIGGER_CLEARED
         axis.stop_step(code, problem, entry.key, figures)
+        return answers
 
     async def _settle(self, sample: Sample) -> None:
         """It stands: 605Ah as it was, and no power where it was only halted."""
