@@ -106,7 +106,8 @@ class StopStepInfo(Message):
     """One thing that STOP did, or tried in vain."""
 
     code: Literal[
-        "quick_stop", "halt", "speed_control_taken", "quick_stop_option_set", "quick_stop_option_restored",
+        "quick_stop", "halt", "speed_control_taken", "quick_stop_option_set",
+        "quick_stop_option_restored",
         "trigger_cleared", "brake_applied", "voltage_disabled", "process_data_ended",
     ]  # fmt: skip
     at_s: float = Field(description="seconds since STOP")

@@ -38,6 +38,8 @@ _OWN_RAMP_S = 1.0
 _LOOK_EVERY_S = 0.02
 #: Turning without being enabled for this long is not the end of a quick stop.
 _UNPOWERED_S = 0.1
+#: Slower than this part of the speed within that time: it comes to rest. Faster: it falls.
+_RUNS_OUT, _FALLS = 0.95, 1.05
 #: A drive that tells nothing for this long is not reached.
 _SILENT_S = 1.5
 #: A position that was read in this time before tells whether the axis stood.
@@ -58,6 +60,7 @@ class StopWatch:
         self._permits = axis.permits
         self._cleared = self._disabled = self._ended = False
         self._unpowered_since: float | None = None
+        self._unpowered_speed = 0.0
         self._until_s = 0.0
 
     async def run(self, problem: str = "") -> AxisStop:
@@ -134,7 +137,8 @@ class StopWatch:
                 ramp_known = True
                 self._until_s = max(self._until_s, self._began_s + allowed)
             await self._without_power(sample)
-            if time.monotonic() >= self._until_s and not await self._next(sample):
+            over = time.monotonic() >= self._until_s and watch.turns
+            if over and not await self._next(sample):
                 return self._moving(sample, problem)
 
     def _allowed_s(self) -> float | None:
@@ -150,16 +154,18 @@ class StopWatch:
 
     async def _without_power(self, sample: Sample) -> None:
         """An axis that turns although it is not enabled: what the drive does by itself is ended."""
-        now = time.monotonic()
+        now, speed = time.monotonic(), self._watch.speed() or 0.0
         if sample.state in (*_POWERED, State.FAULT) or not self._watch.turns:
             self._unpowered_since = None
             return
-        if self._unpowered_since is None:
-            self._unpowered_since = now
+        if self._unpowered_since is None or speed < self._unpowered_speed * _RUNS_OUT:
+            # The rest of a ramp, or a load that swings: what moves by itself keeps its speed.
+            self._unpowered_since, self._unpowered_speed = now, speed
         if self._cleared or now - self._unpowered_since < _UNPOWERED_S:
             return
         self._cleared = True
-        await self._clear()
+        # A holding brake is no stopping device: it is for an axis that falls, not one that coasts.
+        await self._clear(brake=speed > self._unpowered_speed * _FALLS)
         self._until_s = max(self._until_s, time.monotonic() + _OWN_RAMP_S)
 
     async def _next(self, sample: Sample) -> bool:
@@ -172,11 +178,11 @@ class StopWatch:
             return False  # it coasts, or ends by its own ramp: nothing brakes it more
         if not self._disabled and sample.state in _POWERED:
             self._disabled = True
-            await self._clear("brake")
+            await self._clear(triggers=False)
             await self._disable_voltage()
         elif not self._cleared and sample.state is not State.FAULT:
             self._cleared = True
-            await self._clear()
+            await self._clear(brake=False)
         elif not self._ended:
             self._ended = True
             if not await self._trip_watchdog():
@@ -215,10 +221,11 @@ class StopWatch:
         self._axis.stop_step(StepCode.PROCESS_DATA_ENDED, problem)
         return True
 
-    async def _clear(self, kind: str | None = None) -> None:
-        """Write the neutral values of what the drive moves by itself."""
+    async def _clear(self, *, brake: bool = True, triggers: bool = True) -> None:
+        """Write the neutral values of what the drive moves by itself, and apply the brake."""
         for entry in self._axis.drive.profile.stop_clears:
-            if (kind is None or entry.kind == kind) and not await self._clear_one(entry):
+            wanted = brake if entry.kind == "brake" else triggers
+            if wanted and not await self._clear_one(entry):
                 return
 
     async def _clear_one(self, entry: StopClear) -> bool:

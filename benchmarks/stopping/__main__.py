@@ -68,7 +68,9 @@ def _cell(o: Outcome | None) -> str:
         return "–"
     if o.stood_s is None:
         return f"**{o.verdict}**"
-    return f"{o.stood_s:.2f} s, {o.degrees:.0f}°" + ("" if o.verdict == "stopped" else f" ({o.verdict})")
+    return f"{o.stood_s:.2f} s, {o.degrees:.0f}°" + (
+        "" if o.verdict == "stopped" else f" ({o.verdict})"
+    )
 
 
 if __name__ == "__main__":

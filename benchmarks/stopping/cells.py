@@ -65,7 +65,9 @@ def cells(families: tuple[str, ...] = FAMILIES) -> list[tuple[str, str, str]]:
         for motion, (_, having) in MOTIONS.items():
             if family not in having:
                 continue
-            found += [(family, motion, trouble) for trouble in TROUBLES if _has(family, motion, trouble)]
+            found += [
+                (family, motion, trouble) for trouble in TROUBLES if _has(family, motion, trouble)
+            ]
     return found
 
 

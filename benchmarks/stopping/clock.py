@@ -44,7 +44,9 @@ class SimulatedLoop(asyncio.SelectorEventLoop):
         """Simulated seconds."""
         return self._waits.now_s
 
-    def run_in_executor(self, executor: Any, func: Callable[..., Any], *args: Any) -> Any:
+    def run_in_executor(  # type: ignore[override]
+        self, executor: Any, func: Callable[..., Any], *args: Any
+    ) -> Any:
         """As asyncio's; simulated time stands meanwhile."""
         self._waits.threads += 1
         future = super().run_in_executor(executor, func, *args)

@@ -1,4 +1,4 @@
-"""One virtual drive on a bench of the product, in simulated time, with nothing between but bytes."""
+"""One virtual drive on a bench of the product, in simulated time, without a wire."""
 
 from __future__ import annotations
 
@@ -165,9 +165,7 @@ class Rig:
 def free_axis(*, brake: bool = False, gravity_nm: float = 0.0) -> MechanicsSpec:
     """A motor with little friction: what coasts does so for seconds."""
     return MechanicsSpec(
-        motor=MotorSpec(
-            inertia_kgm2=2e-4, rated_torque_nm=1.27, rated_speed_rpm=3000, brake=brake
-        ),
+        motor=MotorSpec(inertia_kgm2=2e-4, rated_torque_nm=1.27, rated_speed_rpm=3000, brake=brake),
         friction=FrictionSpec(viscous_nms=2e-5, coulomb_nm=0.002, gravity_nm=gravity_nm),
     )
 
