@@ -59,7 +59,7 @@ class AxisState(Message):
     blocked_by: list[str] = Field(description="causes that keep the axis from being enabled")
     moving_job: str | None
     turning: TurningInfo | None = Field(
-        default=None, description="it turns although nobody may move it; None where it does not"
+        description="it turns although nobody may move it; None where it does not"
     )
 
 
@@ -139,4 +139,4 @@ class StopResult(Message):
     failed: dict[str, str] = Field(
         description="all others: not reached, coasting or still moving, and what to do"
     )
-    axes: list[AxisStopInfo] = Field(default_factory=list, description="each axis' verdict")
+    axes: list[AxisStopInfo] = Field(description="each axis' verdict")
