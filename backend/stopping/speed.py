@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections import deque
 from dataclasses import dataclass
@@ -130,14 +131,25 @@ class SpeedWatch:
 
     def slows(self, over_s: float = 0.25) -> bool:
         """Whether it is slower now than it was then, by more than its noise."""
+        pair = self._then_and_now(over_s)
+        return pair is not None and pair[1] < pair[0] * 0.995 - 0.2
+
+    def stands_in_s(self, over_s: float = 0.25) -> float:
+        """Time to rest, should it go on to slow down as it does; infinite where it does not."""
+        pair = self._then_and_now(over_s)
+        if pair is None or not self.slows(over_s):
+            return math.inf
+        return pair[1] / (pair[0] - pair[1]) * over_s
+
+    def _then_and_now(self, over_s: float) -> tuple[float, float] | None:
         now = self.newest
         if now is None:
-            return False
+            return None
         then = next((s for s in reversed(self._samples) if now.at_s - s.at_s >= over_s), None)
         if then is None:
-            return False
+            return None
         before, after = self._best(then), self._best(now)
-        return before is not None and after is not None and after < before * 0.995 - 0.2
+        return None if before is None or after is None else (before, after)
 
     def _best(self, sample: Sample) -> float | None:
         by_position = self._by_position(sample)

@@ -31,6 +31,8 @@ from profiles.stopping import StopClear
 _MORE, _LAG_S, SHORTEST_S, LONGEST_S = 1.3, 0.25, 0.4, 3.0
 #: An axis that still slows down is waited for until then.
 _PATIENCE_S = 8.0
+#: An axis without power that will stand so soon is waited for, too.
+_SOON_S = 1.0
 #: How long a further step has to act.
 _STEP_S = 0.5
 #: What the drive moves by itself ends by the drive's own ramp.
@@ -171,7 +173,8 @@ class StopWatch:
     async def _next(self, sample: Sample) -> bool:
         """The time is over: wait on, or do the next thing. False where nothing is left."""
         now, slows = time.monotonic(), self._watch.slows()
-        if slows and sample.state in _POWERED and now - self._began_s < _PATIENCE_S:
+        soon = self._watch.stands_in_s() < _SOON_S
+        if slows and (sample.state in _POWERED or soon) and now - self._began_s < _PATIENCE_S:
             self._until_s = now + _STEP_S / 2
             return True
         if slows and (self._cleared or sample.state is State.FAULT):
