@@ -1,8 +1,7 @@
 """One axis: its units, and the two context managers that carry safety.
 
-`Axis.restoring` puts parameters back and `Axis.enabled` leaves Operation enabled, on every
-way out. Their cleanup is shielded from cancellation, has a deadline of its own, and reports
-what it could not restore.
+`Axis.restoring` puts parameters back and `Axis.enabled` leaves Operation enabled, on every way
+out. Their cleanup is shielded from cancellation, has a deadline, and reports what it left.
 """
 
 from __future__ import annotations
@@ -39,11 +38,16 @@ class Axis(ScaledAxis):
         super().__init__(drive)
         #: A person enabled it by a transition, and nobody took that back here.
         self._left_enabled = False
-        #: The page by which that was done; None where it was no page.
+        #: The page by which it was left enabled; None where it was no page.
         self.enabled_by: str | None = None
         self._standing: Grant | None = None
         #: Told why, when nobody may leave the axis enabled any longer; power is to be taken off.
         self.unattended: Callable[[str], None] = lambda _why: None
+
+    @property
+    def left_enabled(self) -> bool:
+        """A person enabled it by a transition, and nobody took that back."""
+        return self._left_enabled and not self.stopped
 
     def forget(self) -> None:
         """The drive restarted or its gearing changed."""

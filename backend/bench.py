@@ -220,6 +220,7 @@ class Bench:
             self.journal,
             lambda snapshot: self._snapshot(drive_id, snapshot),
             lambda: self.returning.returned(drive_id),
+            lambda: self._may_turn(drive_id),
         )
         member = Member(drive, axis, monitor)
         self.members[drive_id] = member
@@ -235,6 +236,14 @@ class Bench:
         self.drives_changed()
         return member
 
+    def _may_turn(self, drive_id: str) -> bool:
+        """Whether something has been allowed to turn this axis, or it is being stopped."""
+        member = self.members.get(drive_id)
+        if member is None:
+            return True
+        moved = self.jobs.moving(drive_id) is not None or self.motion.stopping(drive_id)
+        return moved or member.axis.left_enabled
+
     async def remove(self, drive_id: str) -> None:
         """Take a drive off the bench.
 
@@ -246,6 +255,7 @@ class Bench:
         self.motion.require_idle(member)
         self.exchanges.require_idle_but(member)
         with self.motion.parting(member):
+            await self.motion.end_watches(drive_id)
             await self.motion.let_go_of(member)
             for url, session in list(self.sessions.items()):
                 if member.drive in session.drives:
@@ -389,6 +399,7 @@ class Bench:
             then.push_async_callback(self.scope.close)
             then.push_async_callback(self.exchanges.close)
             then.push_async_callback(self.motion.let_go_of_all)
+            then.push_async_callback(self.motion.end_watches)
             await self.jobs.close()
 
     async def _close_buses(self) -> None:

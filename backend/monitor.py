@@ -16,6 +16,7 @@ from backend.faults import active_faults, fault_keys, integer
 from backend.journal import Journal, Level
 from backend.people.identity import by_itself
 from backend.readings import Reading
+from backend.stopping.turning import Turning, TurnWatch, told
 from backend.units import AxisUnits
 from drivers import cia402
 from drivers.cia402 import State
@@ -29,6 +30,8 @@ WATCHED_S = 0.1
 IDLE_S = 1.0
 #: Beside an exchange that brings state and values, everything else is asked for so often.
 ASKED_S = 1.0
+#: Option codes and ramps of STOP are asked for so often, while the axis is enabled.
+STOP_ASKED_S = 0.9
 #: Process data older than this say nothing of the present.
 NEWEST_S = 0.05
 #: What changes slowly enough to be asked for with everything else only.
@@ -83,6 +86,8 @@ class Snapshot:
     units: dict[str, str] = field(default_factory=dict)
     faults: tuple[Fault, ...] = ()
     blocked_by: tuple[str, ...] = ()
+    turning: Turning | None = None
+    """It turns although nobody may move it."""
 
 
 class Monitor:
@@ -94,6 +99,7 @@ class Monitor:
         journal: Journal,
         changed: Callable[[Snapshot], None],
         returned: Callable[[], None],
+        may_turn: Callable[[], bool] = lambda: True,
     ) -> None:
         self.axis = axis
         self.snapshot = Snapshot(time.time(), fresh=False, problem="not read yet")
@@ -102,6 +108,8 @@ class Monitor:
         self._journal = journal
         self._changed = changed
         self._returned = returned
+        self._turns = TurnWatch(may_turn)
+        self._stop_asked_s = -math.inf
         self._task: asyncio.Task[None] | None = None
         self._wake = asyncio.Event()
         self._last: dict[str, Reading] = {}
@@ -163,7 +171,9 @@ class Monitor:
             snapshot = await read()
         except DriveError as error:
             self._asked_s = -math.inf
-            snapshot = replace(before, time=time.time(), fresh=False, problem=error.message)
+            snapshot = replace(
+                before, time=time.time(), fresh=False, problem=error.message, turning=None
+            )
         self.snapshot = snapshot
         self._record(before, snapshot)
         self._changed(snapshot)
@@ -180,6 +190,8 @@ class Monitor:
             wanted.append(drive.modes_key)
         self._last = await drive.read_many(dict.fromkeys(wanted))
         self._last_causes, self._waiting = [], list(drive.pending)
+        if self._state() in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
+            await self._know_stop(began_s)
         if self._state() is not State.OPERATION_ENABLED:
             self._last_causes = await self.axis.blocked_by()
         self._asked_s = began_s
@@ -206,6 +218,12 @@ class Monitor:
             self._last = self._last | await drive.read_many(asked)
         return await self._snapshot()
 
+    async def _know_stop(self, now_s: float) -> None:
+        """STOP has no time to ask how the drive brakes, and anybody may change it."""
+        if now_s - self._stop_asked_s >= STOP_ASKED_S:
+            self._stop_asked_s = now_s
+            await self.axis.know_stop()
+
     def _tells_other(self, newest: Mapping[str, Reading], telling: Sequence[str]) -> bool:
         """Whether state, warning or error code are not what they were, or are not known."""
         drive = self.axis.drive
@@ -231,6 +249,11 @@ class Monitor:
         word = integer(readings[drive.require("status_word")]) or 0
         mode = integer(readings.get(drive.key("mode_display") or ""))
         names = _MODE_BITS.get(mode or 0, ("", ""))
+        position, velocity = (
+            integer(readings.get(drive.key(role) or ""))
+            for role in ("position_actual", "velocity_actual")
+        )
+        turning = self._turns.take(units, state, position, velocity)
         return Snapshot(
             time=time.time(),
             fresh=True,
@@ -249,6 +272,7 @@ class Monitor:
             units=units.names,
             faults=tuple(active_faults(drive, readings)),
             blocked_by=tuple(self._last_causes),
+            turning=turning,
         )
 
     def _record(self, before: Snapshot, now: Snapshot) -> None:
@@ -261,6 +285,8 @@ class Monitor:
                 self._returned()
         if not now.fresh:
             return
+        if now.turning is not None and before.turning is None:
+            self._journal.add(told(drive.name, now.turning), level="error", drive=drive.id)
         old = {fault.code for fault in before.faults}
         for fault in now.faults:
             if fault.code not in old:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
 from contextlib import AbstractContextManager
 from functools import partial
@@ -18,6 +19,9 @@ from backend.motion.grant import Grant
 from backend.motion.stopping import stops
 from backend.ports import address_of
 from backend.restoring import shielded
+from backend.stopping.braking import brake_then_quick_stop, quick_stop_coasts
+from backend.stopping.facts import StepCode, StopStep
+from backend.stopping.settings import settings_keys
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.codec import encode
@@ -46,8 +50,15 @@ class PowerState:
         self.session: CyclicSession | None = None
         #: STOP was pressed: no word that enables may be sent until a new command is given.
         self.stopped = False
+        #: How many commands of people have permitted motion so far.
+        self.permits = 0
         #: A stop did not reach the drive; `repeat_stop` sends it again once the drive answers.
         self.owes_stop = False
+        #: What STOP has done since it was pressed, and when that was (monotonic).
+        self.stop_steps: list[StopStep] = []
+        self._stop_began_s = time.monotonic()
+        #: 605Ah as it was before STOP had to change it; None where it has not.
+        self.option_before: int | None = None
 
     def permit(self) -> None:
         """A person gave a new command: enabling is allowed again, until the next STOP.
@@ -55,6 +66,7 @@ class PowerState:
         Never called by work in progress, so that nothing enables again what was stopped.
         """
         self.stopped = False
+        self.permits += 1
 
     async def status_word(self) -> int:
         """6041h, read now."""
@@ -150,6 +162,7 @@ class PowerState:
             return
         if goal is State.OPERATION_ENABLED:
             await self.require_stop_delivered()
+            await self.know_stop()
         if self.stopped and goal is State.OPERATION_ENABLED:
             raise NotAllowed(
                 f"{self.drive.name}: STOP was pressed",
@@ -195,6 +208,8 @@ class PowerState:
         if self.session is not None and self.cyclic_power() is not None:
             await self.go_to_cyclic(self.session, goal, None, timeout_s)
             return goal
+        if goal is State.OPERATION_ENABLED:
+            await self.know_stop()
         deadline = time.monotonic() + timeout_s
         state = await self.state()
         while (word := cia402.next_control_word(state, goal, self.control_word)) is not None or (
@@ -314,18 +329,35 @@ class PowerState:
     async def stop(self) -> None:
         """STOP by a person: quick stop, and nothing in progress may enable the axis again."""
         self.stopped = True
+        self.stop_steps, self._stop_began_s = [], time.monotonic()
         await self.quick_stop()
+
+    def stop_step(
+        self,
+        code: StepCode,
+        problem: str = "",
+        parameter: str | None = None,
+        figures: dict[str, float] | None = None,
+    ) -> None:
+        """Note a step of STOP; with a problem it was tried in vain."""
+        at_s = time.monotonic() - self._stop_began_s
+        self.stop_steps.append(StopStep(code, at_s, not problem, parameter, figures or {}, problem))
 
     async def quick_stop(self) -> None:
         """Stop now, by one write; harmless when nothing moves.
 
+        Where 605Ah is known to coast, the axis is braked by halt, and by a quick stop that brakes.
         Where it does not reach the drive, `owes_stop` is set.
         """
         try:
             if self.session is not None and self.cyclic_power() is not None:
                 await self.session.cyclic.halt(self.session.station(self.drive))
+                self.stop_step(StepCode.HALT)
+            elif quick_stop_coasts(self.drive):
+                await brake_then_quick_stop(self)
             else:
-                await self._quick_stop_by_any_port()
+                await self.send_quick_stop()
+                self.stop_step(StepCode.QUICK_STOP)
         except BaseException:
             # Whatever kept it: also an exchange that just ended, a drive that refused the word
             # while it was busy, and a caller that did not wait.
@@ -333,8 +365,17 @@ class PowerState:
             raise
         self.owes_stop = False
 
-    async def _quick_stop_by_any_port(self) -> None:
-        """The first port's error is raised when no port takes the word."""
+    async def know_stop(self) -> None:
+        """Read how the drive brakes on STOP, so that STOP itself need not ask; never raises."""
+        with contextlib.suppress(DriveError):
+            await self.drive.read_many(settings_keys(self.drive))
+
+    async def send_quick_stop(self) -> None:
+        """One quick-stop word, by the first port that takes it.
+
+        Raises:
+            DriveError: that of the first port, when none takes it.
+        """
         drive = self.drive
         key = drive.require("control_word")
         try:

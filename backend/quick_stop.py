@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 from backend.drive import Drive
 from backend.optional import existing
+from backend.stopping.settings import COAST, OPTION, braking_option
 from backend.units import AxisUnits
 from profiles.schema import Parameter, Raw
 
@@ -18,16 +19,24 @@ STOP_S = 0.1
 
 
 def quick_stop_keys(drive: Drive) -> tuple[str, ...]:
-    """Key of the quick-stop deceleration, where it can be compared with the profile's."""
+    """Keys that `raise_quick_stop` may change: the option code, and the deceleration of quick stop
+    where it can be compared with the profile's.
+    """
     pair = _pair(drive)
-    return () if pair is None else (pair[0].key,)
+    option = drive.profile.by_key.get(OPTION)
+    keys = () if pair is None else (pair[0].key,)
+    if option is None or option.access != "rw" or drive.unreachable_why(option):
+        return keys
+    return (*keys, OPTION)
 
 
 async def raise_quick_stop(drive: Drive, before: Mapping[str, Raw]) -> None:
     """Let STOP brake at least as hard as the motion that is about to begin; lower nothing.
 
-    The caller puts back what `quick_stop_keys` names, to the values in ``before``.
+    An option code by which a quick stop coasts is changed to one that brakes. The caller puts back
+    what `quick_stop_keys` names, to the values in ``before``.
     """
+    await _let_it_brake(drive, before)
     pair = _pair(drive)
     if pair is None:
         return
@@ -48,6 +57,7 @@ async def raise_quick_stop_from(
     go on for 25 s and 310 revolutions with the 60 rpm/s that an R6L is shipped with.
     The caller puts back what `quick_stop_keys` names, to the values in ``before``.
     """
+    await _let_it_brake(drive, before)
     pair = _pair(drive)
     if pair is None or pair[0].unit != units.spec.acceleration:
         return
@@ -57,6 +67,13 @@ async def raise_quick_stop_from(
     quick, needed = before.get(pair[0].key), units.acceleration_raw(speed_rpm / STOP_S)
     if isinstance(quick, int) and quick < needed:
         await _write(drive, pair[0], needed)
+
+
+async def _let_it_brake(drive: Drive, before: Mapping[str, Raw]) -> None:
+    """605Ah = 0 takes the power off; the length of a motion it is another."""
+    option = braking_option(drive)
+    if before.get(OPTION) == COAST and option is not None:
+        await drive.write(OPTION, option)
 
 
 async def _write(drive: Drive, quick: Parameter, raw: int) -> None:

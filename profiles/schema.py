@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 from profiles.functions import Functions, referenced_keys
 from profiles.motion.rule import Motion, MotionOrigin, MotionRule
 from profiles.record import Frozen
+from profiles.stopping import StopClear
 
 DataType = Literal[
     "BOOL", "INT8", "UINT8", "INT16", "UINT16", "INT32", "UINT32",
@@ -470,7 +471,7 @@ class Quirk(Frozen):
         "error_code_low_byte", "warning_bit_7", "home_found_bit_15", "save_readback_ambiguous",
         "sdo_pause_on_save", "gear_on_init", "brake_by_pdo", "unit_switch", "write_protect",
         "partial_manual", "types_unreliable", "no_watchdog", "positive_limit_first",
-        "quick_stop_word",
+        "quick_stop_word", "torque_stop_by_slope",
     ]  # fmt: skip
     key: str | None = None
     raw: int | None = None
@@ -521,6 +522,9 @@ class Profile(Frozen):
     functions: Functions = Functions()
     motion_rules: tuple[MotionRule, ...] = Field(
         default=(), description="motion classes of the maker's objects; the first that fits counts"
+    )
+    stop_clears: tuple[StopClear, ...] = Field(
+        default=(), description="what STOP writes to a drive that turns without being enabled"
     )
     conflicts: tuple[Conflict, ...] = ()
     manual_chapters: tuple[Chapter, ...] = Field(
@@ -614,4 +618,5 @@ def _referenced_keys(profile: Profile) -> list[str]:
     for pdo_set in profile.pdo.sets if profile.pdo else ():
         found.extend(pdo_set.entries)
     found.extend(referenced_keys(profile.functions))
+    found.extend(each.key for each in profile.stop_clears)
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 
 from backend.api import models, models_axis, models_bench, models_parameters, models_sets
+from backend.api.convert_stop import turning
 from backend.api.errors import problem_of
 from backend.bench import Bench
 from backend.drive import Drive
@@ -174,6 +175,7 @@ def axis_state(bench: Bench, member: Member, now: Snapshot) -> models_axis.AxisS
         faults=[fault(known) for known in now.faults],
         blocked_by=list(now.blocked_by),
         moving_job=job.id if job else None,
+        turning=turning(now.turning),
     )
 
 

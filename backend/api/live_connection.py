@@ -19,6 +19,7 @@ from starlette.websockets import WebSocketState
 
 import backend
 from backend.api import live_news
+from backend.api.convert_stop import stop_result
 from backend.api.errors import problem_of
 from backend.api.live_jog import Jogs
 from backend.api.live_messages import (
@@ -34,6 +35,8 @@ from backend.api.live_messages import (
     ScopeStart,
     ScopeStop,
     StopAll,
+    StopReached,
+    StopTaken,
     WatchState,
     WatchValues,
     from_page,
@@ -83,6 +86,7 @@ class Connection:
         self.jogs = Jogs(bench, name, self.send)
         self.scopes = ScopeStreams(bench, name, self.send, socket.send_bytes)
         self._polls: dict[str, asyncio.Task[None]] = {}
+        self._stops: set[asyncio.Task[None]] = set()
         self._overflow = False
 
     async def run(self) -> None:
@@ -118,7 +122,7 @@ class Connection:
             if (member := self._bench.members.get(drive)) is not None:
                 member.monitor.watchers.discard(self.id)
         self.watched = set()
-        for task in self._polls.values():
+        for task in (*self._polls.values(), *self._stops):
             task.cancel()
         await self.scopes.close()
 
@@ -238,14 +242,23 @@ class Connection:
         known = [drive for drive in drives if drive in self._bench.members]
         problems = await self._bench.motion.stop(known)
         self._bench.journal.add("STOP", level="warning", drive=request.drive)
-        for drive, text in problems.items():
-            if text:
-                failure = DriveError(
-                    f"STOP did not reach it: {text}",
-                    drive=drive,
-                    remedy="use the hardware stop, then look at its supply and cable",
-                )
-                self.send(Refused(request="stop", problem=problem_of(failure)))
+        failed = {drive: text for drive, text in problems.items() if text}
+        self.send(StopTaken(drives=known, problems=failed))
+        for drive, text in failed.items():
+            failure = DriveError(
+                f"STOP did not reach it: {text}",
+                drive=drive,
+                remedy="use the hardware stop, then look at its supply and cable",
+            )
+            self.send(Refused(request="stop", problem=problem_of(failure)))
+        # The connection goes on meanwhile: STOP may be pressed again.
+        task = asyncio.create_task(self._stopped(drives, known), name=f"stop-answer-{self.id}")
+        self._stops.add(task)
+        task.add_done_callback(self._stops.discard)
+
+    async def _stopped(self, drives: list[str], known: list[str]) -> None:
+        found = await self._bench.motion.standstill(known)
+        self.send(StopReached(result=stop_result(self._bench, drives, found)))
 
     def _lease(self, request: LeaseTake) -> None:
         self._bench.member(request.drive)

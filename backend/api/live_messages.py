@@ -23,7 +23,7 @@ from pydantic import Field, TypeAdapter
 
 from backend.api.live_people_messages import PeopleRequest
 from backend.api.models import JobInfo, LogEntry, Message, Positive, Problem
-from backend.api.models_axis import AxisState
+from backend.api.models_axis import AxisState, StopResult
 from backend.api.models_bench import DriveSummary
 from backend.api.models_parameters import ParameterValue
 
@@ -225,6 +225,21 @@ class Refused(Message):
     type: Literal["refused"] = "refused"
     request: str
     problem: Problem
+
+
+class StopTaken(Message):
+    """STOP has sent its quick stop; what it reached follows as ``stop_result``."""
+
+    type: Literal["stop_taken"] = "stop_taken"
+    drives: list[str]
+    problems: dict[str, str] = Field(description="drives that did not take it yet, and why")
+
+
+class StopReached(Message):
+    """Verdicts of this connection's STOP."""
+
+    type: Literal["stop_result"] = "stop_result"
+    result: StopResult
 
 
 class Pong(Message):

@@ -22,6 +22,16 @@ class ActiveFault(Message):
     source: str
 
 
+class TurningInfo(Message):
+    """An axis that turns although nobody may move it."""
+
+    kind: Literal["disabled", "without_grant"] = Field(
+        description="without power: by hand or by gravity, or the drive's own jog; or enabled"
+    )
+    speed: float
+    unit: str
+
+
 class AxisState(Message):
     """State of an axis, in engineering units where units are named."""
 
@@ -48,6 +58,9 @@ class AxisState(Message):
     faults: list[ActiveFault]
     blocked_by: list[str] = Field(description="causes that keep the axis from being enabled")
     moving_job: str | None
+    turning: TurningInfo | None = Field(
+        description="it turns although nobody may move it; None where it does not"
+    )
 
 
 class TransitionRequest(Message):
@@ -89,8 +102,41 @@ class StopRequest(Message):
     drive: str | None = None
 
 
+class StopStepInfo(Message):
+    """One thing that STOP did, or tried in vain."""
+
+    code: Literal[
+        "quick_stop", "halt", "speed_control_taken", "quick_stop_option_set",
+        "quick_stop_option_restored",
+        "trigger_cleared", "brake_applied", "voltage_disabled", "process_data_ended",
+    ]  # fmt: skip
+    at_s: float = Field(description="seconds since STOP")
+    done: bool
+    parameter: str | None
+    figures: dict[str, float]
+    problem: str
+
+
+class AxisStopInfo(Message):
+    """What STOP reached at one axis, by its measured motion."""
+
+    drive: str
+    verdict: Literal["stopped", "coasting", "still_moving", "unreachable"]
+    took_s: float = Field(description="seconds from STOP to the verdict")
+    speed: float | None = Field(description="measured last, magnitude")
+    speed_unit: str
+    travelled: float | None = Field(description="since STOP, magnitude")
+    travel_unit: str
+    steps: list[StopStepInfo]
+    problem: str
+    superseded: bool = Field(description="a new motion began before the verdict")
+
+
 class StopResult(Message):
     """What STOP reached."""
 
-    stopped: list[str]
-    failed: dict[str, str] = Field(description="drives that could not be told, and why")
+    stopped: list[str] = Field(description="drives whose axis stands by what it measures")
+    failed: dict[str, str] = Field(
+        description="all others: not reached, coasting or still moving, and what to do"
+    )
+    axes: list[AxisStopInfo] = Field(description="each axis' verdict")

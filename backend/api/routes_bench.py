@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Response
 import backend
 from backend.api import convert
 from backend.api.context import Connection, Controlled, Me, TheBench, TheMember, ThePeople
+from backend.api.convert_stop import stop_result
 from backend.api.errors import NotFound
 from backend.api.interfaces import list_interfaces
 from backend.api.models import JobInfo, LogEntry
@@ -240,15 +241,17 @@ async def cancel_job(
 
 @router.post("/stop")
 async def stop(bench: TheBench, request: StopRequest | None = None) -> StopResult:
-    """STOP: always allowed, for everyone; without a body, of every axis."""
+    """STOP: always allowed, for everyone; without a body, of every axis.
+
+    The quick stop goes out at once; the answer comes when the axes stand, or after the time that
+    their ramps allow and what is done then.
+    """
     request = request or StopRequest()
     wanted = [request.drive] if request.drive is not None else list(bench.members)
     known = [drive_id for drive_id in wanted if drive_id in bench.members]
-    problems = await bench.motion.stop(known)
+    await bench.motion.stop(known)
     bench.journal.add("STOP", level="warning", drive=request.drive)
-    failed = {drive_id: text for drive_id, text in problems.items() if text}
-    failed |= {drive_id: "not on this bench" for drive_id in wanted if drive_id not in known}
-    return StopResult(stopped=[d for d in known if d not in failed], failed=failed)
+    return stop_result(bench, wanted, await bench.motion.standstill(known))
 
 
 @router.get("/log")

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from backend.member import Member
+from backend.stopping.facts import AxisStop, Verdict
+from backend.stopping.told import told
+from backend.stopping.watch import StopWatch
 from drivers.errors import Busy, DriveError
 
 if TYPE_CHECKING:
     from backend.bench import Bench
     from backend.jobs import Job
+
+log = logging.getLogger(__name__)
 
 
 class Motion:
@@ -23,6 +29,8 @@ class Motion:
         self._bench = bench
         self._stops: set[asyncio.Task[dict[str, str]]] = set()
         self._later: set[asyncio.Task[None]] = set()
+        #: What watches each stopped axis, by drive: it goes on when nobody waits for it.
+        self._watches: dict[str, asyncio.Task[AxisStop]] = {}
         #: Drives of which something is changed that no motion may begin with.
         self._still: Counter[str] = Counter()
         #: Drives that are being removed.
@@ -95,6 +103,8 @@ class Motion:
             member.drive.name, self._bench.buses.urls_of(member.drive)
         )
         member.axis.permit()
+        # It sees that and ends; a STOP of the new motion gets a watch of its own.
+        self._watches.pop(drive_id, None)
 
     def granted(self, job: Job) -> contextlib.AbstractContextManager[object]:
         """What a job holds for its length: a grant where it moves its axis.
@@ -129,6 +139,7 @@ class Motion:
 
         The write does not wait for any job's cleanup, and goes out even when whoever asked for
         it is gone by then. Returns drive id to problem, empty text where the drive took the stop.
+        Whether the axis stands is watched from then on, and tells `standstill`.
         """
         members = [self._bench.member(drive_id) for drive_id in drive_ids]
         for member in members:
@@ -152,11 +163,66 @@ class Motion:
                 await member.axis.stop()
             except DriveError as error:
                 problem = error.message
+            self._begin_watch(member, problem)
             member.monitor.hurry()
             return problem
 
         problems = await asyncio.gather(*(one(member) for member in members))
         return {m.drive.id: text for m, text in zip(members, problems, strict=True)}
+
+    def _begin_watch(self, member: Member, problem: str) -> None:
+        """One watch of an axis at a time: STOP pressed again has sent its word again."""
+        drive_id = member.drive.id
+        if self.stopping(drive_id):
+            return
+
+        async def end_process_data() -> bool:
+            session = member.axis.session
+            if session is None or not session.running:
+                return False
+            await self._bench.exchanges.stop(session.link.url)
+            return True
+
+        async def work() -> AxisStop:
+            try:
+                found = await StopWatch(member.axis, end_process_data).run(problem)
+            except Exception as error:
+                # A watch that ended without a verdict must not pass for an axis that stands.
+                log.exception("the stop of %s cannot be watched", member.drive.name)
+                why = f"internal error: {type(error).__name__}: {error}"
+                found = AxisStop(drive_id, Verdict.STILL_MOVING, 0.0, problem=why)
+            self._note(member, found)
+            return found
+
+        self._watches[drive_id] = asyncio.create_task(work(), name=f"stop-watch-{drive_id}")
+
+    def _note(self, member: Member, found: AxisStop) -> None:
+        member.monitor.hurry()
+        if found.verdict is not Verdict.STOPPED and not found.superseded:
+            self._bench.journal.add(
+                told(member.drive.name, found), level="error", drive=member.drive.id
+            )
+
+    async def standstill(self, drive_ids: Sequence[str]) -> list[AxisStop]:
+        """What the last STOP of these drives has reached; waits for verdicts that are due.
+
+        Drives that were never stopped are left out. May take some seconds.
+        """
+        watches = [self._watches[each] for each in drive_ids if each in self._watches]
+        return list(await asyncio.gather(*(asyncio.shield(watch) for watch in watches)))
+
+    def stopping(self, drive_id: str) -> bool:
+        """Whether a STOP of this axis is being watched."""
+        watch = self._watches.get(drive_id)
+        return watch is not None and not watch.done()
+
+    async def end_watches(self, drive_id: str | None = None) -> None:
+        """The drive leaves the bench, or the bench is closed."""
+        ids = list(self._watches) if drive_id is None else [drive_id]
+        watches = [found for each in ids if (found := self._watches.pop(each, None)) is not None]
+        for watch in watches:
+            watch.cancel()
+        await asyncio.gather(*watches, return_exceptions=True)
 
     async def let_go(self, drive_id: str) -> None:
         """Take the power off an axis that was enabled here and left so; never raises."""

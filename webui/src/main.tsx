@@ -8,10 +8,11 @@ import { App } from './app/App'
 import { keepFocus } from './app/focus'
 import { keepPresses } from './app/press'
 import { checkSession } from './app/session'
-import { listenForEscape } from './app/stop'
+import { listenForAnswers, listenForEscape } from './app/stop'
 import * as live from './live/live'
 
 listenForEscape()
+listenForAnswers()
 keepPresses()
 keepFocus()
 whenUnknown(() => void checkSession())

@@ -46,10 +46,21 @@ class Commands:
 
     def setters(self) -> dict[str, Callable[[Raw], None]]:
         """What reacts to writes, by parameter key."""
-        return {
-            key: self._setter(key, actions)
-            for key, actions in self._core.family.traits.commands.items()
-        }
+        traits = self._core.family.traits
+        found = {key: self._setter(key, actions) for key, actions in traits.commands.items()}
+        if traits.jog is not None and traits.jog.trigger is not None:
+            found[traits.jog.trigger] = self._jog
+        if traits.own_homing is not None:
+            found[traits.own_homing.trigger] = self._home
+        return found
+
+    def _jog(self, value: Raw) -> None:
+        self._control.jog.order({1: 1, 2: -1}.get(int(value), 0))
+
+    def _home(self, value: Raw) -> None:
+        keys = self._core.family.traits.own_homing
+        if keys is not None:
+            self._control.jog.home(keys, begin=int(value) in keys.begins)
 
     def _setter(self, key: str, actions: dict[int, str]) -> Callable[[Raw], None]:
         self_clearing = self._core.family.traits.self_clearing
@@ -58,6 +69,10 @@ class Commands:
         def command(value: Raw) -> None:
             nonlocal last
             before, last = last, int(value)
+            if last == 0 and "identify_poles" in actions.values() and self._control.poles.active:
+                # What ends it is not printed; its parameter going back is taken for the end.
+                self._control.poles.cancel()
+                self._core.axis.power_off()
             # A trigger that stays acts on its change only (003:411-414).
             if last == 0 or (not self_clearing and last == before):
                 return

@@ -1,9 +1,16 @@
-"""The jog that a drive does by itself, by two of its inputs and without the bus.
+"""What a drive moves by itself, without the bus: its jog by inputs or a parameter, and homing.
 
 M6-L: inputs with functions 17 and 18 at the speed of P06.05 (000:1191-1193); the ramps P06.07 and
 P06.08 are taken to 1000 rpm, which is not printed. R6L: inputs with functions 39 and 40 at P04.04,
 with the servo off, and P04.05 and P04.06 as the times to and from 1000 rpm (002:9774-9807). Both
-inputs at once, or none, stand still. Whoever enables the axis over the bus ends it.
+inputs at once, or none, stand still. Whoever enables the axis over the bus ends it; an input that
+is still on when the axis is free again begins anew.
+
+R6L: P12.10 "JOG running" (002:11909) is printed without values: 1 forward, 2 backward and 0 for the
+end are assumed. M6-L: P12.00 = 4 or 5 homes at once (000:3618) at the speed P12.05 with the time
+P12.08, until the home or limit switch comes, P12.09 is over, or 0 is written; odd methods of P12.01
+go backward. Only the search for the first switch is simulated. That both move the axis as the
+inputs do, without having been enabled over the bus, is the worst case of what is left open.
 """
 
 from __future__ import annotations
@@ -12,9 +19,12 @@ from collections.abc import Callable
 
 from drivers.virtual.firmware.brake import HoldingBrake
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.families.base import RPM
+from drivers.virtual.firmware.families.base import RPM, OwnHomingKeys
+from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.schedule import Timer
 
 _REFERENCE_RPM = 1000.0
+_LOOK_S = 2e-3
 
 
 class TerminalJog:
@@ -27,6 +37,9 @@ class TerminalJog:
         self._free = free
         self._wanted = 0
         self._stopping = False
+        self._inputs = self._ordered = 0
+        self._homing: OwnHomingKeys | None = None
+        self._timer: Timer | None = None
 
     @property
     def active(self) -> bool:
@@ -35,7 +48,46 @@ class TerminalJog:
 
     def update(self, *, forward: bool, backward: bool) -> None:
         """Levels of the two inputs, whenever they may have changed."""
-        wanted = int(forward) - int(backward)
+        self._inputs = int(forward) - int(backward)
+        self._decide()
+
+    def order(self, direction: int) -> None:
+        """The parameter that jogs was written: 1 forward, -1 backward, 0 ends it."""
+        self._ordered = direction
+        self._decide()
+
+    def home(self, keys: OwnHomingKeys, *, begin: bool) -> None:
+        """The parameter that homes was written."""
+        self._end_homing()
+        if begin and self._free() and not self._wanted:
+            self._homing = keys
+            method = int(self._core.number(keys.method))
+            self._ordered = -1 if method % 2 else 1
+            self._look(self._value(keys.limit_ms) * 1e-3)
+        elif not begin:
+            self._ordered = 0
+        self._decide()
+
+    def _look(self, left_s: float) -> None:
+        """The search ends at a switch, or when its time is over."""
+        self._timer = None
+        pressed = int(self._axis.s[k.S_SIGNALS]) & (k.SIG_HOME | self._limit_ahead())
+        if left_s <= 0.0 or pressed:
+            self._ordered = 0
+            self._decide()
+            return
+        self._timer = self._core.schedule.after(_LOOK_S, lambda: self._look(left_s - _LOOK_S))
+
+    def _limit_ahead(self) -> int:
+        return k.SIG_POSITIVE if self._ordered > 0 else k.SIG_NEGATIVE
+
+    def _end_homing(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _decide(self) -> None:
+        wanted = self._inputs or self._ordered
         if wanted == self._wanted or self._core.family.traits.jog is None:
             return
         if wanted and not self._free():
@@ -48,13 +100,16 @@ class TerminalJog:
 
     def cancel(self) -> None:
         """Something else takes the axis."""
-        self._wanted, self._stopping = 0, False
+        self._end_homing()
+        self._homing = None
+        self._wanted, self._stopping, self._ordered = 0, False, 0
 
     def stopped(self) -> None:
         """The axis has come to rest."""
         if not self._stopping:
             return
         self._stopping = False
+        self._homing = None
         if not self._brake.close(lambda: self.active or not self._free()):
             self._axis.power_off()
 
@@ -72,10 +127,13 @@ class TerminalJog:
 
     def _settings(self) -> tuple[float, float, float]:
         """Speed [rad/s] and both ramps [rad/s²]."""
-        keys = self._core.family.traits.jog
+        keys, homing = self._core.family.traits.jog, self._homing
         if keys is None:
             return (0.0, 1.0, 1.0)
-        speed, rise_ms, fall_ms = (self._value(key) for key in (keys.speed, keys.rise, keys.fall))
+        names = (keys.speed, keys.rise, keys.fall)
+        if homing is not None:
+            names = (homing.speed, homing.ramp, homing.ramp)
+        speed, rise_ms, fall_ms = (self._value(key) for key in names)
         reference = _REFERENCE_RPM * RPM * 1e3
         return (speed * RPM, reference / max(rise_ms, 1.0), reference / max(fall_ms, 1.0))
 

@@ -2552,6 +2552,9 @@ export interface paths {
         /**
          * Stop
          * @description STOP: always allowed, for everyone; without a body, of every axis.
+         *
+         *     The quick stop goes out at once; the answer comes when the axes stand, or after the time that
+         *     their ramps allow and what is done then.
          */
         post: operations["stop"];
         delete?: never;
@@ -2980,6 +2983,8 @@ export interface components {
             time: string;
             /** Torque */
             torque: number | null;
+            /** @description it turns although nobody may move it; None where it does not */
+            turning: components["schemas"]["TurningInfo"] | null;
             /**
              * Units
              * @description unit of each of the values above
@@ -2989,6 +2994,47 @@ export interface components {
             };
             /** Velocity */
             velocity: number | null;
+        };
+        /**
+         * AxisStopInfo
+         * @description What STOP reached at one axis, by its measured motion.
+         */
+        AxisStopInfo: {
+            /** Drive */
+            drive: string;
+            /** Problem */
+            problem: string;
+            /**
+             * Speed
+             * @description measured last, magnitude
+             */
+            speed: number | null;
+            /** Speed Unit */
+            speed_unit: string;
+            /** Steps */
+            steps: components["schemas"]["StopStepInfo"][];
+            /**
+             * Superseded
+             * @description a new motion began before the verdict
+             */
+            superseded: boolean;
+            /**
+             * Took S
+             * @description seconds from STOP to the verdict
+             */
+            took_s: number;
+            /** Travel Unit */
+            travel_unit: string;
+            /**
+             * Travelled
+             * @description since STOP, magnitude
+             */
+            travelled: number | null;
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "stopped" | "coasting" | "still_moving" | "unreachable";
         };
         /**
          * BrakeTiming
@@ -7249,6 +7295,19 @@ export interface components {
             type: "stop";
         };
         /**
+         * StopReached
+         * @description Verdicts of this connection's STOP.
+         */
+        StopReached: {
+            result: components["schemas"]["StopResult"];
+            /**
+             * Type
+             * @default stop_result
+             * @constant
+             */
+            type: "stop_result";
+        };
+        /**
          * StopRequest
          * @description STOP; all drives where none is named.
          */
@@ -7262,14 +7321,69 @@ export interface components {
          */
         StopResult: {
             /**
+             * Axes
+             * @description each axis' verdict
+             */
+            axes: components["schemas"]["AxisStopInfo"][];
+            /**
              * Failed
-             * @description drives that could not be told, and why
+             * @description all others: not reached, coasting or still moving, and what to do
              */
             failed: {
                 [key: string]: string;
             };
-            /** Stopped */
+            /**
+             * Stopped
+             * @description drives whose axis stands by what it measures
+             */
             stopped: string[];
+        };
+        /**
+         * StopStepInfo
+         * @description One thing that STOP did, or tried in vain.
+         */
+        StopStepInfo: {
+            /**
+             * At S
+             * @description seconds since STOP
+             */
+            at_s: number;
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "quick_stop" | "halt" | "speed_control_taken" | "quick_stop_option_set" | "quick_stop_option_restored" | "trigger_cleared" | "brake_applied" | "voltage_disabled" | "process_data_ended";
+            /** Done */
+            done: boolean;
+            /** Figures */
+            figures: {
+                [key: string]: number;
+            };
+            /** Parameter */
+            parameter: string | null;
+            /** Problem */
+            problem: string;
+        };
+        /**
+         * StopTaken
+         * @description STOP has sent its quick stop; what it reached follows as ``stop_result``.
+         */
+        StopTaken: {
+            /** Drives */
+            drives: string[];
+            /**
+             * Problems
+             * @description drives that did not take it yet, and why
+             */
+            problems: {
+                [key: string]: string;
+            };
+            /**
+             * Type
+             * @default stop_taken
+             * @constant
+             */
+            type: "stop_taken";
         };
         /**
          * StoredSet
@@ -7643,6 +7757,22 @@ export interface components {
             mode?: number | null;
         };
         /**
+         * TurningInfo
+         * @description An axis that turns although nobody may move it.
+         */
+        TurningInfo: {
+            /**
+             * Kind
+             * @description without power: by hand or by gravity, or the drive's own jog; or enabled
+             * @enum {string}
+             */
+            kind: "disabled" | "without_grant";
+            /** Speed */
+            speed: number;
+            /** Unit */
+            unit: string;
+        };
+        /**
          * Undo
          * @description Raw values that were there before; writing them back undoes the change.
          *
@@ -7797,6 +7927,7 @@ export type AutotuneRequest = components['schemas']['AutotuneRequest'];
 export type AxisInfo = components['schemas']['AxisInfo'];
 export type AxisRecordInfo = components['schemas']['AxisRecordInfo'];
 export type AxisState = components['schemas']['AxisState'];
+export type AxisStopInfo = components['schemas']['AxisStopInfo'];
 export type BrakeTiming = components['schemas']['BrakeTiming'];
 export type BrakingInfo = components['schemas']['BrakingInfo'];
 export type BrakingRequest = components['schemas']['BrakingRequest'];
@@ -7979,8 +8110,11 @@ export type StartRecording = components['schemas']['StartRecording'];
 export type StateChanged = components['schemas']['StateChanged'];
 export type StepRequest = components['schemas']['StepRequest'];
 export type StopAll = components['schemas']['StopAll'];
+export type StopReached = components['schemas']['StopReached'];
 export type StopRequest = components['schemas']['StopRequest'];
 export type StopResult = components['schemas']['StopResult'];
+export type StopStepInfo = components['schemas']['StopStepInfo'];
+export type StopTaken = components['schemas']['StopTaken'];
 export type StoredSet = components['schemas']['StoredSet'];
 export type SweepRequest = components['schemas']['SweepRequest'];
 export type TagCount = components['schemas']['TagCount'];
@@ -7993,6 +8127,7 @@ export type ThreeWayRow = components['schemas']['ThreeWayRow'];
 export type TokenInfo = components['schemas']['TokenInfo'];
 export type TouchProbe = components['schemas']['TouchProbe'];
 export type TransitionRequest = components['schemas']['TransitionRequest'];
+export type TurningInfo = components['schemas']['TurningInfo'];
 export type Undo = components['schemas']['Undo'];
 export type ValuesChanged = components['schemas']['ValuesChanged'];
 export type VersionInfo = components['schemas']['VersionInfo'];

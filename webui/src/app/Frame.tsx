@@ -25,6 +25,7 @@ import { Preferences } from './Preferences'
 import { StopButton } from './StopButton'
 import { StopElsewhere } from './StopElsewhere'
 import { SupportBar } from './SupportBar'
+import { TurningNote } from './TurningNote'
 import { linkLook, stateLook } from './states'
 import { useCanTune } from './useCanTune'
 import { useHasIo } from './useHasIo'
@@ -98,6 +99,7 @@ export function Frame({ children }: { children: ReactNode }) {
         </div>
       </Drawer>
       <main id="main" tabIndex={-1}>
+        <TurningNote />
         <Late page={key}>
           <Refused />
           <LeaseNotices />

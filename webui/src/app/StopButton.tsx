@@ -1,5 +1,6 @@
 import { useEffect } from 'react'
 import { createPortal } from 'react-dom'
+import type { AxisStopInfo } from '../api/schema'
 import { useT } from '../i18n'
 import { said } from '../i18n/said'
 import { useDrives, useStore } from '../live/store'
@@ -53,7 +54,9 @@ function StopReportNote() {
   const failed = Object.entries(report.answer?.failed ?? {})
   return (
     <div className={`stop-report ${good ? 'good' : ''}`} role="alert">
-      {report.answer === null && report.failure === null && <p>{t('stop.sent')}</p>}
+      {report.answer === null && report.failure === null && (
+        <p>{t(report.taken ? 'stop.taken' : 'stop.sent')}</p>
+      )}
       {report.failure !== null && (
         <p>
           <strong>{t(report.failure === 'unknown' ? 'stop.unknown' : 'stop.unreachable')}</strong>{' '}
@@ -70,10 +73,12 @@ function StopReportNote() {
         <p>{t('stop.none')}</p>
       )}
       {failed.map(([id, why]) => (
-        <p key={id}>
-          <strong>{t('stop.failed', { name: name(id) })}</strong> {said(t, why)}.{' '}
-          {t('stop.useHardware')}
-        </p>
+        <Failed
+          key={id}
+          name={name(id)}
+          why={why}
+          axis={report.answer?.axes.find((each) => each.drive === id)}
+        />
       ))}
       {!good && (
         <button type="button" className="plain" onClick={dismissReport}>
@@ -81,5 +86,45 @@ function StopReportNote() {
         </button>
       )}
     </div>
+  )
+}
+
+/** One axis that does not stand, by what was measured. */
+function Failed({
+  name,
+  why,
+  axis,
+}: {
+  name: string
+  why: string
+  axis: AxisStopInfo | undefined
+}) {
+  const t = useT()
+  const problem = axis?.problem ?? why
+  const speed = axis?.speed == null ? '' : `${axis.speed.toPrecision(3)} ${axis.speed_unit}`
+  const key = axis?.verdict === 'coasting' || axis?.verdict === 'still_moving' ? axis.verdict : null
+  return (
+    <>
+      <p>
+        <strong>{key ? t(`stop.${key}`, { name, speed }) : t('stop.failed', { name })}</strong>{' '}
+        {!key && problem && <>{said(t, problem)}. </>}
+        {t(key === 'coasting' ? 'stop.keepAway' : 'stop.useHardware')}
+      </p>
+      {axis && axis.steps.length > 0 && (
+        <ul>
+          {axis.steps.map((step, place) => (
+            <li key={place}>
+              {step.at_s.toFixed(2)} s: {t(`stop.step.${step.code}`)}
+              {step.parameter && <> ({step.parameter})</>}
+              {!step.done && (
+                <>
+                  : {t('stop.inVain')} {said(t, step.problem)}
+                </>
+              )}
+            </li>
+          ))}
+        </ul>
+      )}
+    </>
   )
 }

@@ -1,7 +1,7 @@
 import { API_ROOT } from '../api/client'
 import type { StopResult } from '../api/schema'
 import * as live from '../live/live'
-import { contents, publish } from '../live/store'
+import { contents, publish, subscribe } from '../live/store'
 
 /** What the last STOP reached. `null` answer: the server has not answered yet. */
 export interface StopReport {
@@ -9,6 +9,8 @@ export interface StopReport {
   answer: StopResult | null
   /** Set when neither way to the server worked. */
   failure: string | null
+  /** The quick stop has gone out; whether the axes stand is being measured. */
+  taken: boolean
 }
 
 let report: StopReport | null = null
@@ -38,7 +40,7 @@ export async function stopEverything(): Promise<void> {
     keepalive: true,
     priority: 'high',
   })
-  const mine: StopReport = { at: Date.now(), answer: null, failure: null }
+  const mine: StopReport = { at: Date.now(), answer: null, failure: null, taken: false }
   pressed = mine.at
   try {
     live.send({ type: 'stop', drive: null })
@@ -61,8 +63,25 @@ export async function stopEverything(): Promise<void> {
   }
 }
 
+/** The websocket tells at once that STOP went out, and its verdicts where the request is lost. */
+export function listenForAnswers(): void {
+  subscribe('stopTaken', () => {
+    if (report === null || report.answer !== null) return
+    report = { ...report, taken: true }
+    publish('stop')
+  })
+  subscribe('stopReached', () => {
+    const reached = contents.stopReached
+    if (report === null || report.answer !== null || reached === null) return
+    report = { ...report, answer: reached.result, failure: null }
+    publish('stop')
+  })
+}
+
 function finish(mine: StopReport, result: Pick<StopReport, 'answer' | 'failure'>): void {
   if (report?.at !== mine.at) return
+  // The verdicts have come by the websocket already.
+  if (result.answer === null && report.answer !== null) return
   report = { ...mine, ...result }
   publish('stop')
 }

@@ -107,6 +107,14 @@ function receive(message: ToPage): void {
       store.contents.refused = { ...message, at: Date.now() }
       store.publish('refused')
       break
+    case 'stop_taken':
+      store.contents.stopTaken = Date.now()
+      store.publish('stopTaken')
+      break
+    case 'stop_result':
+      store.contents.stopReached = { at: Date.now(), result: message.result }
+      store.publish('stopReached')
+      break
     case 'pong':
       break
     case 'people':

@@ -33,6 +33,8 @@ import type {
   ScopeStop,
   StateChanged,
   StopAll,
+  StopReached,
+  StopTaken,
   ValuesChanged,
   WatchState,
   WatchValues,
@@ -71,6 +73,8 @@ export type ToPage =
   | ScopeInfo
   | Logged
   | Refused
+  | StopTaken
+  | StopReached
   | Pong
   | PeopleHere
   | LeaseNotice

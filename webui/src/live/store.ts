@@ -10,6 +10,7 @@ import type {
   Problem,
   ScopeChannelInfo,
   ScopeInfo,
+  StopResult,
 } from '../api/schema'
 import type { LinkState } from './socket'
 import type { TriggerState } from './worker-messages'
@@ -34,6 +35,9 @@ interface Contents {
   /** Of the scope, which seeks it on other pages too. */
   trigger: TriggerState
   refused: { request: string; problem: Problem; at: number } | null
+  /** When the server last said that this page's STOP has gone out, and what it reached. */
+  stopTaken: number | null
+  stopReached: { at: number; result: StopResult } | null
 }
 
 const LOG_LENGTH = 500
@@ -56,6 +60,8 @@ export const contents: Contents = {
   scopeChannels: new Map(),
   trigger: 'off',
   refused: null,
+  stopTaken: null,
+  stopReached: null,
 }
 
 const listeners = new Map<string, Set<() => void>>()

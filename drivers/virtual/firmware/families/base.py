@@ -154,6 +154,20 @@ class JogKeys:
     speed: str
     rise: str
     fall: str
+    trigger: str | None = None
+    """A parameter that jogs: 1 forward, 2 backward, 0 ends it (values assumed)."""
+
+
+@dataclass(frozen=True, slots=True)
+class OwnHomingKeys:
+    """The drive's own homing: its trigger, method, speed [rpm], ramp and time limit [ms]."""
+
+    trigger: str
+    begins: tuple[int, ...]
+    method: str
+    speed: str
+    ramp: str
+    limit_ms: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -308,6 +322,7 @@ class Traits:
     swing: SwingKeys | None = None
     quadrant: QuadrantKeys | None = None
     jog: JogKeys | None = None
+    own_homing: OwnHomingKeys | None = None
     identifies_poles: bool = False
     brake_by_bus: bool = False
     """Bit 0 of 60FEh applies the holding brake while process data carry it (EP3E, 001:970)."""

@@ -11,6 +11,7 @@ from drivers.virtual.firmware.families.base import (
     JogKeys,
     LimitSwitches,
     OffStop,
+    OwnHomingKeys,
     QuadrantKeys,
     Stops,
     SwingKeys,
@@ -127,6 +128,7 @@ M6L = Traits(
         bias="2009:1E", positive="2009:20", negative="2009:21", viscous="2009:1F"
     ),
     jog=JogKeys("2006:06", "2006:08", "2006:09"),
+    own_homing=OwnHomingKeys("200C:01", (4, 5), "200C:02", "200C:06", "200C:09", "200C:0A"),
     identifies_poles=True,
     swing=SwingKeys(frequency="2009:1B", width="2009:1C", mode="2009:1A", threshold="2009:1D"),
     quadrant=QuadrantKeys(
@@ -225,7 +227,7 @@ R6L = Traits(
         ramp="2006:38",
         third_delay="2006:39",
     ),
-    jog=JogKeys("2004:05", "2004:06", "2004:07"),
+    jog=JogKeys("2004:05", "2004:06", "2004:07", trigger="200C:0B"),
     third_gains=GainKeys("2006:09", "2006:07", "2006:08"),
     compensation=CompensationKeys(bias="2007:1F", positive="2007:20", negative="2007:21"),
     speed_filter=("2006:15", "Hz"),

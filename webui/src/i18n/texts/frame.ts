@@ -21,6 +21,48 @@ export const frame = {
     '已发送停止命令，但不清楚是否到达。',
   ],
   'stop.unreachable': ['STOP could not be sent: no connection.', '无法发送停止命令：没有连接。'],
+  'stop.taken': [
+    'The quick stop has gone out. Measuring whether the axes stand…',
+    '快速停止命令已发出，正在测量各轴是否静止…',
+  ],
+  'stop.coasting': [
+    '{name} has no power and coasts, {speed}.',
+    '{name} 已断电，正在惯性滑行，{speed}。',
+  ],
+  'stop.still_moving': ['{name} is still moving, {speed}!', '{name} 仍在运动，{speed}！'],
+  'stop.keepAway': ['Keep away until it stands.', '静止之前请勿靠近。'],
+  'stop.inVain': ['in vain:', '未成功：'],
+  'stop.step.quick_stop': ['quick stop sent', '已发送快速停止'],
+  'stop.step.halt': ['brakes by halt', '用暂停（halt）制动'],
+  'stop.step.speed_control_taken': [
+    'changed to Profile velocity with the target 0, as its torque mode does not brake',
+    '转矩模式不能制动，已切换到目标为 0 的轮廓速度模式',
+  ],
+  'stop.step.quick_stop_option_set': [
+    'the quick stop would have let it coast: option changed',
+    '快速停止原会使其滑行：已更改选项',
+  ],
+  'stop.step.quick_stop_option_restored': ['option restored', '选项已恢复'],
+  'stop.step.trigger_cleared': ["the drive's own motion taken back", '已撤销驱动器自身的运动'],
+  'stop.step.brake_applied': ['holding brake applied', '已施加保持制动器'],
+  'stop.step.voltage_disabled': ['power switched off', '已切断动力'],
+  'stop.step.process_data_ended': [
+    "process data ended, so that the drive's watchdog trips",
+    '已结束过程数据，使驱动器看门狗动作',
+  ],
+  'turning.disabled': ['{name} turns without power, {speed}.', '{name} 未使能却在转动，{speed}。'],
+  'turning.disabled.help': [
+    'By hand, by gravity, or the drive moves it by itself.',
+    '可能是手动转动、重力所致，或驱动器自行使其运动。',
+  ],
+  'turning.without_grant': [
+    '{name} is enabled and turns, {speed}, although nobody moves it here.',
+    '{name} 已使能并在转动，{speed}，但此处无人使其运动。',
+  ],
+  'turning.without_grant.help': [
+    'Another program or the drive itself moves it. STOP works.',
+    '是其他程序或驱动器自身使其运动。可以使用停止按钮。',
+  ],
   'stop.useHardware': ['Use the emergency stop of the machine.', '请使用机器的急停按钮。'],
   close: ['Close', '关闭'],
   cancel: ['Cancel', '取消'],

@@ -1,0 +1,63 @@
+"""What STOP reached, and axes that turn without a reason, as messages of the interface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from backend.api import models_axis
+from backend.bench import Bench
+from backend.stopping.facts import AxisStop, Verdict
+from backend.stopping.told import told
+from backend.stopping.turning import Turning
+
+
+def turning(found: Turning | None) -> models_axis.TurningInfo | None:
+    """An axis that turns although nobody may move it."""
+    if found is None:
+        return None
+    return models_axis.TurningInfo(kind=found.kind.value, speed=found.speed, unit=found.unit)
+
+
+def axis_stop(found: AxisStop) -> models_axis.AxisStopInfo:
+    """What STOP reached at one axis."""
+    steps = [
+        models_axis.StopStepInfo(
+            code=step.code.value,
+            at_s=round(step.at_s, 3),
+            done=step.done,
+            parameter=step.parameter,
+            figures=step.figures,
+            problem=step.problem,
+        )
+        for step in found.steps
+    ]
+    return models_axis.AxisStopInfo(
+        drive=found.drive,
+        verdict=found.verdict.value,
+        took_s=round(found.took_s, 3),
+        speed=found.speed,
+        speed_unit=found.speed_unit,
+        travelled=found.travelled,
+        travel_unit=found.travel_unit,
+        steps=steps,
+        problem=found.problem,
+        superseded=found.superseded,
+    )
+
+
+def stop_result(
+    bench: Bench, wanted: Sequence[str], found: Sequence[AxisStop]
+) -> models_axis.StopResult:
+    """Verdicts of these drives; one without a verdict has not been stopped."""
+    failed = {
+        each.drive: told(bench.name_of(each.drive), each)
+        for each in found
+        if each.verdict is not Verdict.STOPPED
+    }
+    judged = {each.drive for each in found}
+    failed |= {drive: "not on this bench" for drive in wanted if drive not in judged}
+    return models_axis.StopResult(
+        stopped=[each.drive for each in found if each.verdict is Verdict.STOPPED],
+        failed=failed,
+        axes=[axis_stop(each) for each in found],
+    )

@@ -1,0 +1,1 @@
+"""STOP until standstill: the quick stop, the watch over the measured speed, and what follows."""

@@ -1,0 +1,112 @@
+"""STOP of a drive whose quick stop would not brake.
+
+Either it takes the power off (605Ah = 0), or the family takes only the torque back in its torque
+modes (M6-L 000:3019): another mode brakes then.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from backend.drive import Drive
+from backend.stopping.facts import StepCode
+from backend.stopping.settings import OPTION, braking_option, known_settings
+from drivers import cia402
+from drivers.cia402 import Mode, State
+from drivers.errors import DriveError
+
+if TYPE_CHECKING:
+    from backend.power import PowerState
+
+#: A status word that was read longer ago says nothing of now.
+_SEEN_S = 2.5
+
+
+async def brake_then_quick_stop(power: PowerState) -> None:
+    """Brake by halt, have the quick stop brake, then quick stop.
+
+    A quick stop that would coast is sent only where nothing else brakes.
+
+    Raises:
+        DriveError: no word reaches the drive.
+    """
+    drive, halted = power.drive, False
+    if torque_coasts(drive):
+        halted = await _take_speed_control(power)
+        if not known_settings(drive).coasts:
+            await power.send_quick_stop()
+            power.stop_step(StepCode.QUICK_STOP)
+            return
+    elif known_settings(drive).halt_brakes and _seen_enabled(drive):
+        # Over an axis that is not enabled this word would enable it.
+        halt = cia402.ENABLE_OPERATION | cia402.HALT
+        await drive.command(drive.require("control_word"), halt)
+        power.stop_step(StepCode.HALT)
+        halted = True
+    brakes = await _let_quick_stop_brake(power)
+    if brakes or not halted:
+        await power.send_quick_stop()
+        power.stop_step(StepCode.QUICK_STOP)
+
+
+def quick_stop_coasts(drive: Drive) -> bool:
+    """By what was read last, a quick stop would not brake and something else would."""
+    return known_settings(drive).coasts or torque_coasts(drive)
+
+
+def torque_coasts(drive: Drive) -> bool:
+    """It is enabled in a torque mode, where this family's quick stop lets it coast."""
+    profile = drive.profile
+    if profile.quirk("torque_stop_by_slope") is None or Mode.PV not in drive.modes:
+        return False
+    if profile.quirk("mode_change_at_standstill") is not None:
+        return False
+    shown = _seen(drive, drive.key("mode_display"))
+    return shown in (Mode.PT, Mode.CST) and _seen_enabled(drive)
+
+
+async def _take_speed_control(power: PowerState) -> bool:
+    """Profile velocity with the target 0: the drive brakes by 6084h."""
+    drive, problem = power.drive, ""
+    try:
+        await drive.command(drive.require("velocity_target"), 0)
+        await drive.command(drive.require("mode"), int(Mode.PV))
+        if await drive.raw(drive.require("mode_display")) != Mode.PV:
+            problem = "the drive does not change its mode"
+    except DriveError as error:
+        problem = error.message
+    power.stop_step(StepCode.SPEED_CONTROL, problem, drive.key("mode"), {"raw": float(Mode.PV)})
+    return not problem
+
+
+async def _let_quick_stop_brake(power: PowerState) -> bool:
+    drive, before = power.drive, known_settings(power.drive).option
+    option = braking_option(drive)
+    if option is None:
+        return False
+    problem = ""
+    try:
+        await drive.command(OPTION, option)
+        if await drive.raw(OPTION) != option:
+            problem = "the drive keeps its value"
+        elif power.option_before is None:
+            power.option_before = before
+    except DriveError as error:
+        problem = error.message
+    power.stop_step(StepCode.OPTION_SET, problem, OPTION, {"raw": float(option)})
+    return not problem
+
+
+def _seen_enabled(drive: Drive) -> bool:
+    """The status word that was read last, a moment ago, said so."""
+    word = _seen(drive, drive.key("status_word"))
+    return word is not None and drive.decode_state(word) is State.OPERATION_ENABLED
+
+
+def _seen(drive: Drive, key: str | None) -> int | None:
+    """What was read of this a moment ago."""
+    reading = drive.readings.get(key or "")
+    if reading is None or not isinstance(reading.raw, int) or reading.time is None:
+        return None
+    return reading.raw if time.time() - reading.time < _SEEN_S else None

@@ -1,0 +1,209 @@
+"""Whether an axis moves, by 606Ch and by differences of 6064h; neither is believed alone."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections import deque
+from dataclasses import dataclass
+
+from backend.axis import Axis
+from backend.faults import integer
+from backend.units import AxisUnits
+from drivers.cia402 import State
+from drivers.errors import DriveError, LinkTimeout
+
+#: Slower than this by both: standing. A 606Ch without a filter shows some rpm of noise at rest.
+STANDS_BY_POSITION_RPM = 3.0
+STANDS_BY_SPEED_RPM = 6.0
+#: Where the increments per revolution are not known: increments in a window, raw speed.
+_STILL_INC, _STILL_RAW = 20, 2000
+#: Differences of the position are taken over this time at least.
+WINDOW_S = 0.05
+#: An axis stands when it has stood for this long: one that turns round stands for a moment.
+DWELL_S = 0.15
+#: Process data older than this say nothing of the present.
+_NEWEST_S = 0.05
+#: One look may take this long; a serial line asks several drives in turn.
+LOOK_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One look at an axis: monotonic time, raw position and speed (None: not told)."""
+
+    at_s: float
+    state: State
+    position: int | None
+    velocity: int | None
+
+
+class SpeedWatch:
+    """Speed of one axis from one look to the next."""
+
+    def __init__(self, axis: Axis, units: AxisUnits | None) -> None:
+        self._axis = axis
+        self.units = units
+        self._samples: deque[Sample] = deque(maxlen=100)
+        self._still_since: float | None = None
+        self.travelled_inc = 0
+        self.answered_s: float | None = None
+
+    @property
+    def certain(self) -> bool:
+        """The increments per revolution are known, so that speeds are in rpm."""
+        return self.units is not None and self.units.counts_per_rev is not None
+
+    @property
+    def newest(self) -> Sample | None:
+        """The last look."""
+        return self._samples[-1] if self._samples else None
+
+    async def look(self) -> Sample:
+        """Take one sample.
+
+        Raises:
+            DriveError: the drive tells neither position nor speed.
+        """
+        try:
+            async with asyncio.timeout(LOOK_S):
+                sample = await self._sample()
+        except TimeoutError as error:
+            name = self._axis.drive.name
+            raise LinkTimeout(
+                f"{name} does not tell how it moves", drive=name,
+                remedy="use the machine's emergency stop",
+            ) from error  # fmt: skip
+        self.take(sample)
+        return sample
+
+    async def _sample(self) -> Sample:
+        drive = self._axis.drive
+        roles = ("status_word", "position_actual", "velocity_actual")
+        keys = [key for role in roles if (key := drive.key(role)) is not None]
+        session, told = self._axis.session, {}
+        if session is not None:
+            told = drive.take(session.newest(drive, keys, _NEWEST_S))
+        missing = [key for key in keys if key not in told]
+        if len(missing) > 1 or drive.require("status_word") in missing:
+            # A drive whose mailbox is mute is not asked for what the process data tell already.
+            told |= await drive.read_many(missing)
+        word, position, velocity = (integer(told.get(drive.key(role) or "")) for role in roles)
+        if word is None or (position is None and velocity is None):
+            problem = next((r.error for r in told.values() if r.error), "no answer")
+            raise LinkTimeout(problem, drive=drive.name)
+        return Sample(time.monotonic(), drive.decode_state(word), position, velocity)
+
+    def take(self, sample: Sample) -> None:
+        """Count a sample in."""
+        before = self.newest
+        if before is not None and sample.position is not None and before.position is not None:
+            self.travelled_inc += abs(_difference(sample.position, before.position))
+        self._samples.append(sample)
+        self.answered_s = sample.at_s
+        if self._moves(sample):
+            self._still_since = None
+        elif self._still_since is None:
+            self._still_since = sample.at_s
+
+    @property
+    def turns(self) -> bool:
+        """The last look showed motion, or nothing certain."""
+        return self._still_since is None
+
+    def stands(self, dwell_s: float = DWELL_S) -> bool:
+        """Both have said so for this long."""
+        now = self.newest
+        return (
+            now is not None
+            and self._still_since is not None
+            and now.at_s - self._still_since >= dwell_s
+        )
+
+    def speed(self) -> float | None:
+        """Magnitude in the axis' unit: the greater of the two."""
+        now = self.newest
+        if now is None:
+            return None
+        both = [self._by_position(now), self._by_velocity(now)]
+        return max((value for value in both if value is not None), default=None)
+
+    def slows(self, over_s: float = 0.25) -> bool:
+        """Whether it is slower now than it was then, by more than its noise."""
+        pair = self._then_and_now(over_s)
+        return pair is not None and pair[1] < pair[0] * 0.995 - 0.2
+
+    def stands_in_s(self, over_s: float = 0.25) -> float:
+        """Time to rest, should it go on to slow down as it does; infinite where it does not."""
+        pair = self._then_and_now(over_s)
+        if pair is None or not self.slows(over_s):
+            return math.inf
+        return pair[1] / (pair[0] - pair[1]) * over_s
+
+    def _then_and_now(self, over_s: float) -> tuple[float, float] | None:
+        now = self.newest
+        if now is None:
+            return None
+        then = next((s for s in reversed(self._samples) if now.at_s - s.at_s >= over_s), None)
+        if then is None:
+            return None
+        before, after = self._best(then), self._best(now)
+        return None if before is None or after is None else (before, after)
+
+    def _best(self, sample: Sample) -> float | None:
+        by_position = self._by_position(sample)
+        return self._by_velocity(sample) if by_position is None else by_position
+
+    def _moves(self, sample: Sample) -> bool:
+        by_position, by_velocity = self._by_position(sample), self._by_velocity(sample)
+        if by_position is None and sample.position is not None:
+            return True  # not known before two looks
+        if not self.certain:
+            moved = self._moved(sample)
+            return moved is None or abs(moved) > _STILL_INC or (by_velocity or 0.0) > _STILL_RAW
+        return (by_position or 0.0) > STANDS_BY_POSITION_RPM or (
+            (by_velocity or 0.0) > STANDS_BY_SPEED_RPM
+        )
+
+    def _moved(self, sample: Sample) -> int | None:
+        earlier = self._earlier(sample)
+        if earlier is None or sample.position is None or earlier.position is None:
+            return None
+        return _difference(sample.position, earlier.position)
+
+    def _earlier(self, sample: Sample) -> Sample | None:
+        return next((s for s in reversed(self._samples) if sample.at_s - s.at_s >= WINDOW_S), None)
+
+    def _by_position(self, sample: Sample) -> float | None:
+        """Magnitude in rpm, or increments per second where nothing better is known."""
+        earlier, moved = self._earlier(sample), self._moved(sample)
+        if earlier is None or moved is None:
+            return None
+        per_s = abs(moved) / (sample.at_s - earlier.at_s)
+        counts = None if self.units is None else self.units.counts_per_rev
+        return per_s if counts is None else per_s / counts * 60.0
+
+    def _by_velocity(self, sample: Sample) -> float | None:
+        if sample.velocity is None:
+            return None
+        return abs(
+            float(sample.velocity) if self.units is None else self.units.velocity(sample.velocity)
+        )
+
+
+def _difference(new: int, old: int) -> int:
+    """Of positions of 32 bits, which begin anew at the end of their range."""
+    return (new - old + 2**31) % 2**32 - 2**31
+
+
+async def units_of(axis: Axis) -> AxisUnits | None:
+    """Units as known; asked for where they are not, None where the drive does not tell."""
+    known = axis.known_units
+    if known is not None:
+        return known
+    try:
+        async with asyncio.timeout(LOOK_S):
+            return await axis.units()
+    except (DriveError, TimeoutError):
+        return None

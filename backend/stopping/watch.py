@@ -1,0 +1,300 @@
+"""Watches one axis from STOP to standstill, and does more where the quick stop is not enough.
+
+The first quick-stop word is out when this begins. What follows, each as a `StopStep`: where the
+axis turns without being enabled, what the drive moves by itself is taken back (`stop_clears` of
+its profile); where an enabled axis neither stands nor slows down when its ramp should be over, its
+power goes, the brake first where the bus rules it; and at last the process data end, so that the
+drive's watchdog trips. An axis that slows down on a long ramp keeps its power: to coast is worse.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+
+from backend.axis import Axis
+from backend.restoring import shielded
+from backend.stopping.facts import AxisStop, StepCode, Verdict
+from backend.stopping.settings import (
+    OPTION,
+    deceleration_rpm_s,
+    known_settings,
+)
+from backend.stopping.speed import LOOK_S, Sample, SpeedWatch, units_of
+from drivers import cia402
+from drivers.cia402 import State
+from drivers.errors import DriveError, LinkLost, LinkTimeout
+from profiles.stopping import StopClear
+
+#: The ramp's own time gets this much more, and is at least and at most so long.
+_MORE, _LAG_S, SHORTEST_S, LONGEST_S = 1.3, 0.25, 0.4, 3.0
+#: An axis that still slows down is waited for until then.
+_PATIENCE_S = 8.0
+#: An axis without power that will stand so soon is waited for, too.
+_SOON_S = 1.0
+#: How long a further step has to act.
+_STEP_S = 0.5
+#: What the drive moves by itself ends by the drive's own ramp.
+_OWN_RAMP_S = 1.0
+_LOOK_EVERY_S = 0.02
+#: Turning without being enabled for this long is not the end of a quick stop.
+_UNPOWERED_S = 0.1
+#: Slower than this part of the speed within that time: it comes to rest. Faster: it falls.
+_RUNS_OUT, _FALLS = 0.95, 1.05
+#: A drive that tells nothing for this long is not reached.
+_SILENT_S = 1.5
+#: A position that was read in this time before tells whether the axis stood.
+_BEFORE_S = (0.03, 5.0)
+_POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION, State.UNKNOWN)
+
+
+class StopWatch:
+    """One STOP of one axis."""
+
+    def __init__(
+        self, axis: Axis, end_process_data: Callable[[], Awaitable[bool]] | None = None
+    ) -> None:
+        self._axis = axis
+        self._end_process_data = end_process_data
+        self._began_s = time.monotonic()
+        self._watch = SpeedWatch(axis, None)
+        self._permits = axis.permits
+        self._cleared = self._disabled = self._ended = False
+        self._unpowered_since: float | None = None
+        self._unpowered_speed = 0.0
+        self._until_s = 0.0
+
+    async def run(self, problem: str = "") -> AxisStop:
+        """Until the verdict. ``problem`` says why the first word did not go out."""
+        axis, self._began_s = self._axis, time.monotonic()
+        stood_at = axis.drive.readings.get(axis.drive.key("position_actual") or "")
+        try:
+            units = await units_of(axis)
+            self._watch = SpeedWatch(axis, units)
+            first = await self._watch.look()
+        except DriveError as error:
+            return await self._silent(problem or error.message)
+        if not problem and self._stood(first, stood_at.raw if stood_at else None,
+                                       stood_at.time if stood_at else None):  # fmt: skip
+            return self._verdict(Verdict.STOPPED)
+        self._until_s = self._began_s + SHORTEST_S
+        await self._know_ramp()
+        return await self._follow(problem)
+
+    async def _know_ramp(self) -> None:
+        """What was not read before the motion is asked for now, the word being out."""
+        axis = self._axis
+        if known_settings(axis.drive).ramp_raw() is None:
+            try:
+                async with asyncio.timeout(LOOK_S):
+                    await axis.know_stop()
+            except TimeoutError:
+                return
+
+    def _stood(self, sample: Sample, raw: object, at_epoch_s: float | None) -> bool:
+        """It stood before STOP, has no power, and stands: no need to look for longer."""
+        if sample.state in _POWERED or not isinstance(raw, int) or at_epoch_s is None:
+            return False
+        ago_s = time.time() - at_epoch_s
+        if not _BEFORE_S[0] <= ago_s <= _BEFORE_S[1]:
+            return False
+        self._watch.take(Sample(sample.at_s - ago_s, sample.state, raw, sample.velocity))
+        self._watch.take(sample)
+        return self._watch.stands(0.0)
+
+    async def _silent(self, problem: str) -> AxisStop:
+        """The first look failed: another within the time, then it is not reached."""
+        while time.monotonic() - self._began_s < _SILENT_S:
+            await asyncio.sleep(_LOOK_EVERY_S)
+            try:
+                await self._axis.repeat_stop()
+                await self._watch.look()
+            except DriveError:
+                continue
+            self._until_s = time.monotonic() + LONGEST_S
+            return await self._follow("")
+        return self._verdict(Verdict.UNREACHABLE, problem)
+
+    async def _follow(self, problem: str) -> AxisStop:
+        watch, axis, ramp_known = self._watch, self._axis, False
+        while True:
+            if axis.permits != self._permits:
+                return self._superseded()
+            await asyncio.sleep(_LOOK_EVERY_S)
+            try:
+                if axis.owes_stop and await axis.repeat_stop():
+                    problem = ""
+                sample = await watch.look()
+            except DriveError as error:
+                if time.monotonic() - (watch.answered_s or self._began_s) > _SILENT_S:
+                    return self._verdict(Verdict.UNREACHABLE, problem or error.message)
+                continue
+            if watch.stands():
+                if axis.owes_stop:
+                    return self._verdict(Verdict.UNREACHABLE, problem)
+                await self._settle(sample)
+                return self._verdict(Verdict.STOPPED)
+            if not ramp_known and (allowed := self._allowed_s()) is not None:
+                ramp_known = True
+                self._until_s = max(self._until_s, self._began_s + allowed)
+            await self._without_power(sample)
+            over = time.monotonic() >= self._until_s and watch.turns
+            if over and not await self._next(sample):
+                return self._moving(sample, problem)
+
+    def _allowed_s(self) -> float | None:
+        """Time that the ramp in force takes from the speed that is measured."""
+        watch = self._watch
+        speed = watch.speed()
+        if speed is None or not watch.certain or watch.units is None:
+            return None
+        ramp = deceleration_rpm_s(watch.units, known_settings(self._axis.drive).ramp_raw())
+        if ramp is None:
+            return 2 * SHORTEST_S
+        return min(max(speed / ramp * _MORE + _LAG_S, SHORTEST_S), LONGEST_S)
+
+    async def _without_power(self, sample: Sample) -> None:
+        """An axis that turns although it is not enabled: what the drive does by itself is ended."""
+        now, speed = time.monotonic(), self._watch.speed() or 0.0
+        if sample.state in (*_POWERED, State.FAULT) or not self._watch.turns:
+            self._unpowered_since = None
+            return
+        if self._unpowered_since is None or speed < self._unpowered_speed * _RUNS_OUT:
+            # The rest of a ramp, or a load that swings: what moves by itself keeps its speed.
+            self._unpowered_since, self._unpowered_speed = now, speed
+        if self._cleared or now - self._unpowered_since < _UNPOWERED_S:
+            return
+        self._cleared = True
+        # A holding brake is no stopping device: it is for an axis that falls, not one that coasts.
+        await self._clear(brake=speed > self._unpowered_speed * _FALLS)
+        self._until_s = max(self._until_s, time.monotonic() + _OWN_RAMP_S)
+
+    async def _next(self, sample: Sample) -> bool:
+        """The time is over: wait on, or do the next thing. False where nothing is left."""
+        now, slows = time.monotonic(), self._watch.slows()
+        soon = self._watch.stands_in_s() < _SOON_S
+        if slows and (sample.state in _POWERED or soon) and now - self._began_s < _PATIENCE_S:
+            self._until_s = now + _STEP_S / 2
+            return True
+        if slows and (self._cleared or sample.state is State.FAULT):
+            return False  # it coasts, or ends by its own ramp: nothing brakes it more
+        if not self._disabled and sample.state in _POWERED:
+            self._disabled = True
+            await self._clear(triggers=False)
+            await self._disable_voltage()
+        elif not self._cleared and sample.state is not State.FAULT:
+            self._cleared = True
+            await self._clear(brake=False)
+        elif not self._ended:
+            self._ended = True
+            if not await self._trip_watchdog():
+                return False
+        else:
+            return False
+        self._until_s = time.monotonic() + _STEP_S
+        return True
+
+    async def _disable_voltage(self) -> None:
+        axis, problem = self._axis, ""
+        try:
+            await shielded(self._power_off, LOOK_S, axis.drive.name)
+        except DriveError as error:
+            problem = error.message
+        axis.stop_step(StepCode.VOLTAGE_DISABLED, problem)
+
+    async def _power_off(self) -> None:
+        axis = self._axis
+        power, session = axis.cyclic_power(), axis.session
+        if power is not None and session is not None:
+            await power.drive_to(session.station(axis.drive), State.SWITCH_ON_DISABLED)
+        else:
+            await axis.control(cia402.DISABLE_VOLTAGE)
+
+    async def _trip_watchdog(self) -> bool:
+        """Whether there were process data to end."""
+        if self._end_process_data is None:
+            return False
+        problem = ""
+        try:
+            if not await self._end_process_data():
+                return False
+        except DriveError as error:
+            problem = error.message
+        self._axis.stop_step(StepCode.PROCESS_DATA_ENDED, problem)
+        return True
+
+    async def _clear(self, *, brake: bool = True, triggers: bool = True) -> None:
+        """Write the neutral values of what the drive moves by itself, and apply the brake."""
+        for entry in self._axis.drive.profile.stop_clears:
+            wanted = brake if entry.kind == "brake" else triggers
+            if wanted and not await self._clear_one(entry):
+                return
+
+    async def _clear_one(self, entry: StopClear) -> bool:
+        """Whether the drive answers."""
+        axis, drive, problem, answers = self._axis, self._axis.drive, "", True
+        if drive.unreachable_why(drive.parameter(entry.key)):
+            return True
+        figures: dict[str, float] = {}
+        try:
+            async with asyncio.timeout(LOOK_S):
+                before = await drive.raw(entry.key)
+                wanted = entry.neutral(before)
+                if wanted is None:
+                    return True
+                figures = {"before": float(before), "after": float(wanted)}
+                await drive.command(entry.key, wanted)
+        except (LinkLost, LinkTimeout, TimeoutError):
+            answers, problem = False, "no answer"
+        except DriveError as error:
+            problem = error.message
+        code = StepCode.BRAKE_APPLIED if entry.kind == "brake" else StepCode.TRIGGER_CLEARED
+        axis.stop_step(code, problem, entry.key, figures)
+        return answers
+
+    async def _settle(self, sample: Sample) -> None:
+        """It stands: 605Ah as it was, and no power where it was only halted."""
+        axis, before = self._axis, self._axis.option_before
+        halted = any(step.code is StepCode.HALT for step in axis.stop_steps)
+        try:
+            if halted and sample.state is State.OPERATION_ENABLED and axis.cyclic_power() is None:
+                await axis.control(cia402.QUICK_STOP)
+            if before is not None:
+                await axis.drive.command(OPTION, before)
+                axis.option_before = None
+                figures = {"raw": float(before)}
+                axis.stop_step(StepCode.OPTION_RESTORED, "", OPTION, figures)
+        except DriveError as error:
+            axis.stop_step(StepCode.OPTION_RESTORED, error.message, OPTION)
+
+    def _moving(self, sample: Sample, problem: str) -> AxisStop:
+        coasts = sample.state not in _POWERED and self._watch.slows()
+        return self._verdict(Verdict.COASTING if coasts else Verdict.STILL_MOVING, problem)
+
+    def _superseded(self) -> AxisStop:
+        found = Verdict.STOPPED if self._watch.stands() else Verdict.STILL_MOVING
+        return self._verdict(found, superseded=True)
+
+    def _verdict(
+        self, verdict: Verdict, problem: str = "", *, superseded: bool = False
+    ) -> AxisStop:
+        watch, axis = self._watch, self._axis
+        units = watch.units
+        names = {} if units is None else units.names
+        told = watch.newest is not None
+        travelled = float(watch.travelled_inc) if units is None else units.position(
+            watch.travelled_inc
+        )  # fmt: skip
+        return AxisStop(
+            drive=axis.drive.id,
+            verdict=verdict,
+            took_s=time.monotonic() - self._began_s,
+            speed=watch.speed() if told else None,
+            speed_unit=names.get("velocity", "inc/s"),
+            travelled=travelled if told else None,
+            travel_unit=names.get("position", "inc"),
+            steps=tuple(axis.stop_steps),
+            problem=problem,
+            superseded=superseded,
+        )
