@@ -25,6 +25,7 @@ from pathlib import Path
 
 import pysoem
 
+from drivers.adapters import require_interface
 from drivers.errors import Busy, LinkLost, NotAllowed, ProtocolError
 from drivers.ethercat import frames, permissions
 from drivers.ethercat.steps import Read, Write
@@ -304,6 +305,7 @@ class Segment:
                 f"{self.interface!r} cannot be an interface: names have 1 to {_NAME_LIMIT} letters",
                 remedy="choose one of the interfaces that the page Connect lists",
             )
+        require_interface(self.interface)
         report = permissions.check(self.interface)
         if not report.exists or not report.up:
             names = ", ".join(name for _, name in socket.if_nameindex())
