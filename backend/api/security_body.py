@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Iterable
 
 from starlette.types import Message, Receive
 
@@ -18,6 +19,20 @@ class BodyRefused(Exception):
     def __init__(self, status: int) -> None:
         super().__init__(f"body refused ({status})")
         self.status = status
+
+
+def framing(headers: Iterable[tuple[bytes, bytes]]) -> tuple[str | None, bool]:
+    """Content-Length as it was sent, and whether the body comes in chunks.
+
+    Raises:
+        BodyRefused: both, or one of them twice. Who stands in front may end the body elsewhere
+            than we do, and take its rest for another request (RFC 9112 clause 6.3, 11.2).
+    """
+    lengths = [value for key, value in headers if key == b"content-length"]
+    codings = [value for key, value in headers if key == b"transfer-encoding"]
+    if len(lengths) + len(codings) > 1:
+        raise BodyRefused(400)
+    return (lengths[0].decode("latin-1") if lengths else None), bool(codings)
 
 
 class MeasuredBody:

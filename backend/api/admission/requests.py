@@ -1,0 +1,69 @@
+"""How many requests run at once, and how often somebody unknown may ask. STOP is not counted."""
+
+from __future__ import annotations
+
+from collections import Counter, OrderedDict
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from backend.people.errors import TooOften
+from backend.people.login.budgets import address_group
+from backend.people.throttle import Bucket
+
+#: Requests under way at once: all but STOP, those of nobody known, and of these from one address.
+MOST_REQUESTS, MOST_OF_STRANGERS, MOST_OF_PLACE = 400, 200, 40
+#: Requests of nobody known from one address: so many at once, and a second.
+_STRANGERS = (200.0, 50.0)
+_KEEP = 4096
+
+
+class Admission:
+    """Of one server. ``place`` is an address; a browser that is known counts as nobody's crowd."""
+
+    def __init__(self) -> None:
+        self._running = 0
+        self._strangers: Counter[str] = Counter()
+        self._buckets: OrderedDict[str, Bucket] = OrderedDict()
+
+    def require_rate(self, address: str) -> None:
+        """Somebody unknown from this address may ask now.
+
+        Raises:
+            TooOften: they have asked too often.
+        """
+        place = address_group(address)
+        bucket = self._buckets.pop(place, None) or Bucket(*_STRANGERS)
+        self._buckets[place] = bucket
+        while len(self._buckets) > _KEEP:
+            self._buckets.popitem(last=False)
+        if not bucket.take():
+            raise TooOften("too many requests of nobody in particular", 1.0)
+
+    @contextmanager
+    def running(self, address: str, *, known: bool, stop: bool) -> Iterator[None]:
+        """Count a request while it runs.
+
+        Raises:
+            TooOften: too many run.
+        """
+        if stop:
+            yield
+            return
+        place = "" if known else address_group(address)
+        if self._running >= MOST_REQUESTS:
+            raise TooOften("too many requests run at once", 1.0)
+        if not known and (
+            self._strangers[place] >= MOST_OF_PLACE or self._strangers.total() >= MOST_OF_STRANGERS
+        ):
+            raise TooOften("too many requests of nobody in particular run at once", 1.0)
+        self._running += 1
+        if not known:
+            self._strangers[place] += 1
+        try:
+            yield
+        finally:
+            self._running -= 1
+            if not known:
+                self._strangers[place] -= 1
+                if self._strangers[place] <= 0:
+                    del self._strangers[place]
