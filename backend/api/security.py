@@ -145,6 +145,8 @@ class Gate:
             await send(message)
 
         try:
+            if not self._is_somebodys_stop(scope):
+                await self._admission.beginnings.turn()
             length, chunked = framing(scope["headers"])
             admitted = self._admit(scope)
             body = MeasuredBody(receive, admitted.body_bytes, length, chunked)
@@ -179,6 +181,14 @@ class Gate:
         finally:
             acting.reset(token)
 
+    def _is_somebodys_stop(self, scope: Scope) -> bool:
+        """STOP of whoever may: it goes past everything else that waits."""
+        if not self._policy.is_stop(scope["method"], scope["path"]):
+            return False
+        brought = credentials(scope)
+        known = self._people.identify(brought.cookie, brought.bearer)
+        return (known or self._people.may_stop(brought.cookie)) is not None
+
     def _admit(self, scope: Scope) -> _Admitted:
         """Who may go on.
 
@@ -190,7 +200,7 @@ class Gate:
         brought = credentials(scope)
         identity = self._people.identify(brought.cookie, brought.bearer)
         needs = self._policy.needs(method, path)
-        stop = any(matched.need.right == "stop" for matched in needs)
+        stop = self._policy.is_stop(method, path)
         if identity is None and stop:
             identity = self._people.may_stop(brought.cookie)
         known = identity is not None or self._people.is_known(brought.device)

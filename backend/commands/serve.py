@@ -33,8 +33,9 @@ WS_MAX_BYTES = 64 << 10
 #: A line that is dead but not closed (lid shut, cable pulled) is given up after both together.
 #: Control, jog and enabling button do not wait for that: they end by their own silence.
 PING_S, PONG_S = 5.0, 10.0
-#: Accepted in one turn of the loop, so that those who are connected wait no longer than that.
-BACKLOG = 256
+#: Connections that the system keeps until they are accepted; the system bounds it too. One that
+#: finds no room tries again after a second.
+BACKLOG = 2048
 #: Files and connections at once: what a process may have at first is often a thousand.
 DESCRIPTORS = 8192
 

@@ -1,8 +1,12 @@
-"""How many requests run at once, and how often somebody unknown may ask. STOP is not counted."""
+"""How many requests begin and run at once, and how often somebody unknown may ask.
+
+STOP is neither counted nor kept waiting.
+"""
 
 from __future__ import annotations
 
-from collections import Counter, OrderedDict
+import asyncio
+from collections import Counter, OrderedDict, deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -12,15 +16,57 @@ from backend.people.throttle import Bucket
 
 #: Requests under way at once: all but STOP, those of nobody known, and of these from one address.
 MOST_REQUESTS, MOST_OF_STRANGERS, MOST_OF_PLACE = 400, 200, 40
+#: Requests that begin in one turn of the event loop.
+PER_TURN = 4
 #: Requests of nobody known from one address: so many at once, and a second.
 _STRANGERS = (200.0, 50.0)
 _KEEP = 4096
+
+
+class Beginnings:
+    """So many requests begin in one turn of the event loop; the others wait for the next ones.
+
+    A turn does all that is ready. With hundreds of requests in one, STOP, which is read in the
+    turn after, would wait for all of them; so their work is spread, and STOP goes past it.
+    """
+
+    def __init__(self) -> None:
+        self._left = PER_TURN
+        self._waiting: deque[asyncio.Future[None]] = deque()
+        self._turning = False
+
+    async def turn(self) -> None:
+        """Return when this request may begin."""
+        self._keep_turning()
+        if self._left > 0 and not self._waiting:
+            self._left -= 1
+            return
+        mine: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._waiting.append(mine)
+        await mine
+
+    def _keep_turning(self) -> None:
+        if not self._turning:
+            self._turning = True
+            asyncio.get_running_loop().call_soon(self._turn)
+
+    def _turn(self) -> None:
+        self._turning = False
+        self._left = PER_TURN
+        while self._waiting and self._left > 0:
+            mine = self._waiting.popleft()
+            if not mine.done():
+                mine.set_result(None)
+                self._left -= 1
+        if self._waiting:
+            self._keep_turning()
 
 
 class Admission:
     """Of one server. ``place`` is an address; a browser that is known counts as nobody's crowd."""
 
     def __init__(self) -> None:
+        self.beginnings = Beginnings()
         self._running = 0
         self._strangers: Counter[str] = Counter()
         self._buckets: OrderedDict[str, Bucket] = OrderedDict()
