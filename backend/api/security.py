@@ -37,7 +37,16 @@ DEVICE_COOKIE, SECURE_DEVICE_COOKIE = "servodeck-device", "__Host-servodeck-devi
 CSRF_HEADER = "x-servodeck-csrf"
 CONNECTION_HEADER = "x-servodeck-connection"
 _SAFE = ("GET", "HEAD", "OPTIONS")
-_REFUSED = {400: "Bad request", 408: "Too slow", 413: "Too large"}
+_REFUSED = {
+    400: ("Bad request", "it is not said where it ends, or in two ways", "send its length, once"),
+    408: ("Too slow", "it came too slowly", "send it faster"),
+    413: ("Too large", "it is too large", "send less"),
+    422: (
+        "Not acceptable",
+        "it has half of a surrogate pair (\\ud800 to \\udfff), which is no character",
+        "send whole characters",
+    ),
+}
 
 HEADERS = {
     "Content-Security-Policy": (
@@ -357,10 +366,11 @@ def _address(scope: Scope) -> str:
 
 
 def _refusal(status: int) -> Problem:
+    title, why, remedy = _REFUSED[status]
     return Problem(
         type="urn:servodeck:body",
-        title=_REFUSED[status],
+        title=title,
         status=status,
-        detail="the body of the request is refused: " + _REFUSED[status].lower(),
-        remedy="send less, or faster",
+        detail=f"the body of the request is refused: {why}",
+        remedy=remedy,
     )

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import ipaddress
 import itertools
 import socket
 from collections import Counter
 from collections.abc import Sequence
+from weakref import WeakKeyDictionary
 
 import h11
 import uvicorn
@@ -17,6 +19,8 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.frames import Frame
 
 from backend.api.admission.accepting import AcceptingSocket
+from backend.api.admission.requests import Beginnings
+from backend.api.rights import API
 from backend.people.throttle import Bucket
 
 #: Time for the head of a request, from the connection or the first byte on.
@@ -36,6 +40,18 @@ _FRAMES = (100.0, 20.0)
 
 _open: Counter[str] = Counter()
 _numbers = itertools.count(1)
+#: How STOP begins.
+_STOP = f"POST {API}/stop ".encode()
+_turns: WeakKeyDictionary[asyncio.AbstractEventLoop, Beginnings] = WeakKeyDictionary()
+
+
+def _beginnings() -> Beginnings:
+    """Those of the running loop."""
+    loop = asyncio.get_running_loop()
+    found = _turns.get(loop)
+    if found is None:
+        found = _turns[loop] = Beginnings()
+    return found
 
 
 class AcceptingConfig(uvicorn.Config):
@@ -80,6 +96,7 @@ class PatientSocket(WebSocketsSansIOProtocol):
 class PatientProtocol(H11Protocol):
     """HTTP/1.1 with a deadline for request heads and a bound on connections per address."""
 
+    _waits = False
     _head_timer: asyncio.TimerHandle | None = None
     number = 0
     asked = False
@@ -164,7 +181,25 @@ class PatientProtocol(H11Protocol):
         super().resume_writing()
 
     def data_received(self, data: bytes) -> None:
-        """While the head of a request is incomplete, its time runs."""
+        """While the head of a request is incomplete, its time runs.
+
+        What begins a request is looked at so many a turn, but for what may be STOP.
+        """
+        if self.conn.their_state is not h11.IDLE or data.startswith(_STOP):
+            self._received(data)
+        else:
+            self._waits = True
+            # Nothing more comes before this has been looked at.
+            self.flow.pause_reading()
+            _beginnings().begin(functools.partial(self._begin, data))
+
+    def _begin(self, data: bytes) -> None:
+        self._waits = False
+        if not self.transport.is_closing():
+            self.flow.resume_reading()
+            self._received(data)
+
+    def _received(self, data: bytes) -> None:
         super().data_received(data)
         self.asked = self.asked or self.conn.their_state is not h11.IDLE
         if self.conn.their_state is h11.IDLE:

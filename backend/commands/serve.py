@@ -65,9 +65,18 @@ async def serve(bench: Bench, serving: Serving) -> None:
     """Serve until interrupted. Port 0 takes a free one; the address is printed.
 
     Raises:
+        Busy: another server uses the state folder.
         NotAllowed: the port is taken, the certificate is none, or others could come in without
             an account.
     """
+    bench.records.claim()
+    try:
+        await _serve_claimed(bench, serving)
+    finally:
+        bench.records.release()
+
+
+async def _serve_claimed(bench: Bench, serving: Serving) -> None:
     needed = await accounts_needed(bench.state_folder, serving)
     people = People(bench.state_folder, accounts_needed=needed)
     certificate = _certificate(bench.state_folder, serving)

@@ -27,7 +27,7 @@ import pysoem
 
 from drivers.adapters import require_interface
 from drivers.errors import Busy, LinkLost, NotAllowed, ProtocolError
-from drivers.ethercat import frames, permissions
+from drivers.ethercat import frames, permissions, promiscuous
 from drivers.ethercat.steps import Read, Write
 
 IO_MAP_BYTES = 4096
@@ -88,6 +88,7 @@ class Segment:
         self._check_interface()
         self._lock = _lock(self.interface)
         master = pysoem.Master()
+        was_promiscuous = promiscuous.is_set(self.interface)
         before = _sockets()
         try:
             master.open(self.interface)
@@ -105,6 +106,9 @@ class Segment:
         self.socket_fd = min(_sockets() - before)
         self._index = socket.if_nametoindex(self.interface)
         self._ear = socket.socket(fileno=os.dup(self.socket_fd))
+        if not was_promiscuous:
+            # SOEM switches it for good; bound to the socket it ends with it, even on SIGKILL.
+            promiscuous.bind_to(self._ear, self.interface, self._index)
         self._master = master
 
     def close(self) -> None:

@@ -13,6 +13,7 @@ import socket
 import sys
 import time
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 
 LONGEST_S = 60.0
 
@@ -130,25 +131,28 @@ class Flood:
         await asyncio.gather(*(one() for _ in range(8)))
 
 
-def stops(port: int, head: str, count: int) -> list[float]:
-    """STOP by a connection of its own each time; seconds from the first packet to the answer."""
+def stops(port: int, head: str) -> None:
+    """STOP by a connection of its own for each line of the standard input.
+
+    Prints the seconds from the first packet to the answer, and those that this process waited for
+    a processor meanwhile.
+    """
     data = (
         f"POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\n{head}"
         "Content-Type: application/json\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{}"
     ).encode()
-    took = []
-    for _ in range(count):
-        began = time.monotonic()
+    waits = Path("/proc/self/schedstat")
+    for _ in sys.stdin:
+        before, began = int(waits.read_text().split()[1]), time.monotonic()
         with socket.create_connection(("127.0.0.1", port), timeout=30) as line:
             line.sendall(data)
             answer = b""
             while part := line.recv(65536):
                 answer += part
-        took.append(time.monotonic() - began)
+        took = time.monotonic() - began
         if not answer.startswith(b"HTTP/1.1 200") or b'"failed":{}' not in answer:
             raise SystemExit(f"STOP was not served: {answer[:300]!r}")
-        time.sleep(0.01)
-    return took
+        print(took, (int(waits.read_text().split()[1]) - before) / 1e9, flush=True)
 
 
 async def main(kind: str, port: int, head: str) -> None:
@@ -170,6 +174,6 @@ async def main(kind: str, port: int, head: str) -> None:
 
 if __name__ == "__main__":
     if sys.argv[1] == "stops":
-        print(json.dumps(stops(int(sys.argv[2]), sys.argv[3], int(sys.argv[4]))))
+        stops(int(sys.argv[2]), sys.argv[3])
         raise SystemExit
     asyncio.run(main(sys.argv[1], int(sys.argv[2]), sys.argv[3] if len(sys.argv) > 3 else ""))

@@ -15,7 +15,7 @@ from collections import OrderedDict
 #: Without a handshake at a time. One takes some milliseconds.
 MOST_SILENT = 128
 #: Accepted in one turn of the event loop, which does all that is ready before it looks again.
-PER_TURN = 16
+PER_TURN = 64
 
 
 class AcceptingSocket(socket.socket):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter, OrderedDict, deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from backend.people.errors import TooOften
@@ -16,8 +16,8 @@ from backend.people.throttle import Bucket
 
 #: Requests under way at once: all but STOP, those of nobody known, and of these from one address.
 MOST_REQUESTS, MOST_OF_STRANGERS, MOST_OF_PLACE = 400, 200, 40
-#: Requests that begin in one turn of the event loop.
-PER_TURN = 4
+#: Requests that begin in one turn of the event loop; a turn with nothing else to do is short.
+PER_TURN = 1
 #: Requests of nobody known from one address: so many at once, and a second.
 _STRANGERS = (200.0, 50.0)
 _KEEP = 4096
@@ -32,17 +32,27 @@ class Beginnings:
 
     def __init__(self) -> None:
         self._left = PER_TURN
-        self._waiting: deque[asyncio.Future[None]] = deque()
+        self._waiting: deque[Callable[[], None]] = deque()
         self._turning = False
 
-    async def turn(self) -> None:
-        """Return when this request may begin."""
+    def begin(self, work: Callable[[], None]) -> None:
+        """Do this now, or in one of the next turns; what came before goes first."""
         self._keep_turning()
         if self._left > 0 and not self._waiting:
             self._left -= 1
-            return
+            work()
+        else:
+            self._waiting.append(work)
+
+    async def turn(self) -> None:
+        """Return when this request may begin."""
         mine: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._waiting.append(mine)
+
+        def called() -> None:
+            if not mine.done():
+                mine.set_result(None)
+
+        self.begin(called)
         await mine
 
     def _keep_turning(self) -> None:
@@ -53,13 +63,11 @@ class Beginnings:
     def _turn(self) -> None:
         self._turning = False
         self._left = PER_TURN
-        while self._waiting and self._left > 0:
-            mine = self._waiting.popleft()
-            if not mine.done():
-                mine.set_result(None)
-                self._left -= 1
         if self._waiting:
             self._keep_turning()
+        while self._waiting and self._left > 0:
+            self._left -= 1
+            self._waiting.popleft()()
 
 
 class Admission:
