@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest'
 import { decodeBlocks, type ScopeBlock } from './blocks'
+
 import { csvText } from './csv-text'
 import { columns, thinned } from './decimate'
 import { Ring, Trace } from './ring'
