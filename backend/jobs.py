@@ -75,6 +75,8 @@ class JobRunner:
     """
 
     KEEP = 100
+    #: Jobs at once that move nothing: of one kind for one drive (or for none), and all together.
+    MOST_OF_A_KIND, MOST = 4, 32
 
     def __init__(
         self,
@@ -105,6 +107,24 @@ class JobRunner:
             (j for j in self._jobs.values() if j.motion and j.drive == drive and _runs(j)), None
         )
 
+    def _require_room(self, kind: str, drive: str | None) -> None:
+        """Jobs that nothing else bounds do not take the computer from STOP and from what moves.
+
+        Raises:
+            Busy: too many run.
+        """
+        running = [job for job in self._jobs.values() if _runs(job) and not job.motion]
+        same = sum(job.kind == kind and job.drive == drive for job in running)
+        if same >= self.MOST_OF_A_KIND or len(running) >= self.MOST:
+            what, limit = ("such jobs", self.MOST_OF_A_KIND) if same >= self.MOST_OF_A_KIND else (
+                "jobs", self.MOST)  # fmt: skip
+            raise Busy(
+                f"{limit} {what} run already",
+                drive=drive,
+                limit=str(limit),
+                remedy="wait until one of them has ended, or cancel one",
+            )
+
     def start(
         self,
         kind: str,
@@ -123,7 +143,8 @@ class JobRunner:
         it must leave the axis where it is.
 
         Raises:
-            Busy: a motion job already holds this axis, or its bus is being changed.
+            Busy: a motion job already holds this axis, its bus is being changed, or as many jobs
+                run as may.
         """
         if motion and drive is not None and (other := self.moving(drive)) is not None:
             raise Busy(
@@ -131,6 +152,8 @@ class JobRunner:
                 drive=drive,
                 remedy="wait for it to end, or stop it",
             )
+        if not motion and by_person:
+            self._require_room(kind, drive)
         if motion and by_person and drive is not None:
             self._permit(drive)
         job = Job(

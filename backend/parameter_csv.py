@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 from backend.parameter_set import MAX_BYTES, BadSet, Row
 from backend.readings import Reading
+from backend.spreadsheet import as_text
 from profiles.schema import Parameter, Profile, Raw
 
 _MAX_LINES = 20_000
@@ -70,7 +71,8 @@ def write_csv(profile: Profile, rows: Iterable[Row]) -> str:
         else:
             value = parameter.to_value(row.raw)
             facts = (parameter.name, parameter.group, parameter.unit, value)
-        writer.writerow(_harmless(cell) for cell in (row.key, *facts, row.raw))
+        cells = (row.key, *facts, row.raw)
+        writer.writerow(as_text(cell) if isinstance(cell, str) else cell for cell in cells)
     return out.getvalue()
 
 
@@ -117,12 +119,6 @@ def read_csv(data: bytes, profile: Profile, name: str = "the file") -> Parameter
             remedy="the columns must be key and raw, key and value, or index, subindex and value",
         )
     return ParameterList(tuple(readings.values()), tuple(problems))
-
-
-def _harmless(cell: Raw) -> Raw:
-    """Text that a spreadsheet does not take for a formula; numbers pass."""
-    risky = isinstance(cell, str) and cell[:1] in ("=", "+", "-", "@")
-    return f"'{cell}" if risky else cell
 
 
 def _decoded(data: bytes, name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from backend.library.index import Index
 from backend.store import DatabaseFailed, Store
 from backend.store.blobs import Blobs
 from backend.store.lock import FolderLock
+from drivers.errors import Busy
 
 #: How long a start waits for a database on a server.
 REMOTE_S = 1.0
@@ -41,6 +43,27 @@ class Records:
         self._journal = journal
         self._loop: asyncio.AbstractEventLoop | None = None
         self._taking_up: asyncio.Task[None] | None = None
+
+    def claim(self) -> None:
+        """Be the only one who uses the state folder, which is made where it is not there. Blocks.
+
+        Raises:
+            Busy: another servodeck uses it.
+        """
+        with contextlib.suppress(OSError):
+            # One that cannot be made or written has nothing that two could disturb.
+            self.store.folder.mkdir(parents=True, exist_ok=True)
+        if not self._lock.take():
+            raise Busy(
+                f"another servodeck uses the state folder {self.store.folder}: two would write "
+                "over one another's list of drives and move the same axes",
+                value=str(self.store.folder),
+                remedy="end the other one, or choose another folder with --config",
+            )
+
+    def release(self) -> None:
+        """Let another have the folder; does nothing where it is not claimed."""
+        self._lock.give()
 
     async def open(self) -> None:
         """Open the database and take up what was left over. A station without it still works:

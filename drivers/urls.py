@@ -18,8 +18,14 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from typing import Literal
-from urllib.parse import parse_qsl
+from urllib.parse import parse_qsl, unquote
 
+from drivers.adapters import (
+    CAN_INTERFACES,
+    require_channel,
+    require_interface,
+    require_serial_form,
+)
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.link import Link
 from drivers.modbus.port import STANDARD_SILENCE_S, LineSettings, Parity
@@ -66,7 +72,8 @@ def parse_url(text: str) -> BusUrl:
     """Take a bus URL apart.
 
     Raises:
-        OutOfRange: no such scheme, no adapter named, or an option given twice.
+        OutOfRange: no such scheme, no adapter named, one that is not of the forms in
+            `drivers.adapters`, or an option given twice.
     """
     match = re.fullmatch(r"([a-z]+)://([^?]*)(?:\?(.*))?", text.strip())
     scheme = next((known for known in SCHEMES if match and known == match[1]), None)
@@ -83,7 +90,22 @@ def parse_url(text: str) -> BusUrl:
     options = parse_qsl(match[3] or "", keep_blank_values=True)
     if len(dict(options)) != len(options):
         raise OutOfRange(f"{text!r} gives an option twice", value=text, remedy=_like(scheme))
-    return BusUrl(scheme, place, tuple(options))
+    bus = BusUrl(scheme, place, tuple(options))
+    if not bus.is_virtual:
+        _require_adapter(bus)
+    return bus
+
+
+def _require_adapter(bus: BusUrl) -> None:
+    if bus.scheme == "ethercat":
+        require_interface(bus.place)
+    elif bus.scheme == "canopen":
+        interface, _, channel = bus.place.partition("/")
+        # What else can be wrong with it, the CANopen link says (`parse_canopen_url`).
+        if interface in CAN_INTERFACES and channel:
+            require_channel(interface, unquote(channel))
+    else:
+        require_serial_form(bus.place)
 
 
 def line_settings(url: BusUrl) -> LineSettings:

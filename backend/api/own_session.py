@@ -5,11 +5,18 @@ from __future__ import annotations
 from fastapi import Request, Response
 
 from backend.api.models_people import Session
-from backend.api.security import COOKIE, SECURE_COOKIE
+from backend.api.security import (
+    COOKIE,
+    DEVICE_COOKIE,
+    SECURE_COOKIE,
+    SECURE_DEVICE_COOKIE,
+    credentials,
+)
 from backend.people.accounts import Accounts
 from backend.people.credentials import csrf_of
 from backend.people.errors import Forbidden
 from backend.people.identity import Identity
+from backend.people.login.devices import LIFETIME_S
 from backend.people.records import Account
 from backend.people.rights import Right
 from backend.people.station import People
@@ -32,7 +39,7 @@ def session_of(people: People, identity: Identity | None, cookie: str | None) ->
 
 def with_cookie(request: Request, response: Response, people: People, secret: str) -> Session:
     """Set the cookie of a fresh session, which HTTPS alone carries where the page came by it."""
-    secure = request.url.scheme == "https" or request.headers.get("origin", "").startswith("https:")
+    secure = _is_secure(request)
     response.set_cookie(
         SECURE_COOKIE if secure else COOKIE,
         secret,
@@ -42,6 +49,33 @@ def with_cookie(request: Request, response: Response, people: People, secret: st
         path="/",
     )
     return session_of(people, people.identify(secret, None), secret)
+
+
+def remember_device(request: Request, response: Response, people: People, account: int) -> None:
+    """Know this browser again: strangers who guess do not use up its tries."""
+    devices = people.accounts.devices
+    known = devices.known(device_of(request))
+    if known is not None and known.account == account:
+        return
+    secure = _is_secure(request)
+    response.set_cookie(
+        SECURE_DEVICE_COOKIE if secure else DEVICE_COOKIE,
+        devices.issue(account),
+        max_age=LIFETIME_S,
+        httponly=True,
+        secure=secure,
+        samesite="strict",
+        path="/",
+    )
+
+
+def device_of(request: Request) -> str | None:
+    """The cookie by which a browser may be known, whoever is logged in."""
+    return credentials(request.scope).device
+
+
+def _is_secure(request: Request) -> bool:
+    return request.url.scheme == "https" or request.headers.get("origin", "").startswith("https:")
 
 
 def address_of(request: Request) -> str:

@@ -255,6 +255,9 @@ class Matched:
     """As it stands in `ROUTES`."""
 
 
+_STOP_ROUTE = ("POST", f"{API}/stop")
+
+
 class Policy:
     """Finds what a request needs. Several patterns may fit a path: all of them must be met."""
 
@@ -274,6 +277,10 @@ class Policy:
             for known, pattern, need, route in self._patterns
             if known == method and (found := pattern.match(path))
         ]
+
+    def is_stop(self, method: str, path: str) -> bool:
+        """Whether this is STOP, which nothing else may keep waiting."""
+        return (method, path) == _STOP_ROUTE
 
     def methods(self, path: str) -> list[str]:
         """HTTP methods that are declared for a path."""

@@ -84,7 +84,8 @@ async def audit_names(bench: TheBench) -> AuditNames:
 async def audit_status(bench: TheBench) -> AuditStatus:
     """Whether events reach the database."""
     return AuditStatus(
-        problem=bench.audit.problem,
+        # What is written into a file that is gone is lost, and no event may have come to tell so.
+        problem=bench.audit.problem or bench.records.store.missing(),
         pending=bench.audit.pending,
         database=bench.records.store.shown,
     )

@@ -26,6 +26,7 @@ from backend.bench import Bench
 from backend.drive_identity import confirm_identity
 from backend.jobs import JobResult, Progress
 from backend.member import Member
+from drivers.adapters import require_interface
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.ethercat import firmware, permissions
@@ -96,7 +97,10 @@ async def ethercat_permissions(url: Annotated[str, Query()]) -> EthercatPermissi
             limit=f"{_SCHEME}INTERFACE",
             remedy="choose a bus whose address begins with ethercat://",
         )
-    return _permissions(permissions.check(url.removeprefix(_SCHEME)))
+    interface = url.removeprefix(_SCHEME)
+    # It becomes part of commands that somebody copies into a terminal.
+    require_interface(interface)
+    return _permissions(permissions.check(interface))
 
 
 @router.post("/ethercat/counters/clear", status_code=204)

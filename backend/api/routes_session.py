@@ -9,7 +9,9 @@ from backend.api.models_people import LogIn, PasswordChange, Session, SessionInf
 from backend.api.own_session import (
     address_of,
     client_of,
+    device_of,
     own_account,
+    remember_device,
     session_of,
     whose_sessions,
     with_cookie,
@@ -36,8 +38,8 @@ async def log_in(
     """Log in. Wrong tries are answered later and later."""
     people.require_accounts()
     try:
-        secret, _ = await people.accounts.log_in(
-            body.name, body.password, address_of(request), client_of(request)
+        secret, begun = await people.accounts.log_in(
+            body.name, body.password, address_of(request), client_of(request), device_of(request)
         )
     except NotLoggedIn:
         record.note(
@@ -51,6 +53,7 @@ async def log_in(
         )
         raise
     made = with_cookie(request, response, people, secret)
+    remember_device(request, response, people, begun.account)
     record.note(
         "login",
         "logged in",
@@ -82,10 +85,11 @@ async def set_up(
 ) -> Session:
     """Make the first administrator, with the code that stands in the terminal."""
     people.require_accounts()
-    secret, _ = await people.accounts.set_up(
+    secret, begun = await people.accounts.set_up(
         body.code, body.name, body.password, address_of(request), client_of(request)
     )
     made = with_cookie(request, response, people, secret)
+    remember_device(request, response, people, begun.account)
     record.note(
         "account",
         "made",

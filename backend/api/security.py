@@ -15,10 +15,11 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from backend.access import Leases
+from backend.api.admission.requests import Admission
 from backend.api.errors import NotFound, WrongMethod, answer, answer_error, problem_of
 from backend.api.models import Problem
 from backend.api.rights import Matched, Policy
-from backend.api.security_body import BodyRefused, MeasuredBody
+from backend.api.security_body import BodyRefused, MeasuredBody, framing
 from backend.api.security_origin import Addresses, header
 from backend.api.security_socket import GuardedSocket, OpenSockets
 from backend.people.credentials import csrf_of, same_text
@@ -26,18 +27,26 @@ from backend.people.errors import Forbidden, NotLoggedIn, TooOften
 from backend.people.identity import Actor, Identity, acting
 from backend.people.rights import Right
 from backend.people.station import People
-from backend.people.throttle import Bucket
 from drivers.errors import DriveError, NotAllowed
 
 log = logging.getLogger(__name__)
 
 COOKIE, SECURE_COOKIE = "servodeck", "__Host-servodeck"
+#: By which a browser is known that has logged in before; see `backend.people.login.devices`.
+DEVICE_COOKIE, SECURE_DEVICE_COOKIE = "servodeck-device", "__Host-servodeck-device"
 CSRF_HEADER = "x-servodeck-csrf"
 CONNECTION_HEADER = "x-servodeck-connection"
 _SAFE = ("GET", "HEAD", "OPTIONS")
-#: Requests of nobody in particular: so many at once, and a second.
-_STRANGERS = (200.0, 50.0)
-_REFUSED = {400: "Bad request", 408: "Too slow", 413: "Too large"}
+_REFUSED = {
+    400: ("Bad request", "it is not said where it ends, or in two ways", "send its length, once"),
+    408: ("Too slow", "it came too slowly", "send it faster"),
+    413: ("Too large", "it is too large", "send less"),
+    422: (
+        "Not acceptable",
+        "it has half of a surrogate pair (\\ud800 to \\udfff), which is no character",
+        "send whole characters",
+    ),
+}
 
 HEADERS = {
     "Content-Security-Policy": (
@@ -60,6 +69,7 @@ class Credentials:
 
     cookie: str | None
     bearer: str | None
+    device: str | None = None
 
 
 def credentials(scope: Scope) -> Credentials:
@@ -81,8 +91,23 @@ def credentials(scope: Scope) -> Credentials:
                 jar.load(value.decode("latin-1"))
     except CookieError:
         return Credentials(None, token)
-    name = SECURE_COOKIE if SECURE_COOKIE in jar else COOKIE
-    return Credentials(jar[name].value if name in jar else None, token)
+
+    def brought(*names: str) -> str | None:
+        return next((jar[name].value for name in names if name in jar), None)
+
+    return Credentials(
+        brought(SECURE_COOKIE, COOKIE), token, brought(SECURE_DEVICE_COOKIE, DEVICE_COOKIE)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Admitted:
+    """A request that may go on: whose it is, and what it may take."""
+
+    actor: Actor | None
+    body_bytes: int
+    known: bool
+    stop: bool
 
 
 class Gate:
@@ -102,7 +127,7 @@ class Gate:
         self._app, self._people, self._leases = app, people, leases
         self._addresses, self._sockets = addresses, sockets
         self._policy = policy or Policy()
-        self._strangers = Bucket(*_STRANGERS)
+        self._admission = Admission()
         self._headers = dict(HEADERS)
         if strict_transport:
             self._headers["Strict-Transport-Security"] = "max-age=31536000"
@@ -129,21 +154,24 @@ class Gate:
             await send(message)
 
         try:
-            actor, limit = self._admit(scope)
-            body = MeasuredBody(
-                receive,
-                limit,
-                header(scope["headers"], b"content-length"),
-                header(scope["headers"], b"transfer-encoding") is not None,
-            )
+            if not self._is_somebodys_stop(scope):
+                await self._admission.beginnings.turn()
+            length, chunked = framing(scope["headers"])
+            admitted = self._admit(scope)
+            body = MeasuredBody(receive, admitted.body_bytes, length, chunked)
             body.require_accepted()
-            await self._run(scope, body, dressed, actor)
+            with self._admission.running(_address(scope), known=admitted.known, stop=admitted.stop):
+                await self._run(scope, body, dressed, admitted.actor)
         except BodyRefused as refusal:
             response = answer(_refusal(refusal.status))
             response.headers["Connection"] = "close"
             await response(scope, receive, dressed)
         except DriveError as error:
-            await answer_error(error)(scope, receive, dressed)
+            refused = answer_error(error)
+            if isinstance(error, TooOften):
+                # Its body is not waited for: the connection's place is for somebody else.
+                refused.headers["Connection"] = "close"
+            await refused(scope, receive, dressed)
         except Exception as error:
             log.exception("unhandled error at %s %s", scope["method"], scope["path"])
             if begun:
@@ -162,8 +190,16 @@ class Gate:
         finally:
             acting.reset(token)
 
-    def _admit(self, scope: Scope) -> tuple[Actor | None, int]:
-        """Who may go on, and how large the body may be.
+    def _is_somebodys_stop(self, scope: Scope) -> bool:
+        """STOP of whoever may: it goes past everything else that waits."""
+        if not self._policy.is_stop(scope["method"], scope["path"]):
+            return False
+        brought = credentials(scope)
+        known = self._people.identify(brought.cookie, brought.bearer)
+        return (known or self._people.may_stop(brought.cookie)) is not None
+
+    def _admit(self, scope: Scope) -> _Admitted:
+        """Who may go on.
 
         Raises:
             DriveError: nobody may, and why.
@@ -172,9 +208,13 @@ class Gate:
         self._check_place(scope, changes=method not in _SAFE)
         brought = credentials(scope)
         identity = self._people.identify(brought.cookie, brought.bearer)
-        if identity is None and not self._strangers.take():
-            raise TooOften("too many requests without login", 1.0)
         needs = self._policy.needs(method, path)
+        stop = self._policy.is_stop(method, path)
+        if identity is None and stop:
+            identity = self._people.may_stop(brought.cookie)
+        known = identity is not None or self._people.is_known(brought.device)
+        if not known:
+            self._admission.require_rate(_address(scope))
         if not needs:
             raise self._undeclared(method, path, identity)
         connection = self._own_connection(scope, identity)
@@ -185,15 +225,14 @@ class Gate:
                 (key, value) for key, value in scope["headers"] if key != CONNECTION_HEADER.encode()
             ]
         for matched in needs:
-            if matched.need.right == "stop" and identity is None:
-                identity = self._people.may_stop(brought.cookie)
             self._require(matched, identity, connection)
         if method not in _SAFE and any(m.need.lease == "drive" for m in needs):
             self._require_present(named)
         if method not in _SAFE and all(m.need.right != "stop" for m in needs):
             self._require_csrf(scope, identity, brought)
         limit = min(m.need.body_bytes for m in needs)
-        return (None if identity is None else Actor(identity, connection)), limit
+        actor = None if identity is None else Actor(identity, connection)
+        return _Admitted(actor, limit, known=known, stop=stop)
 
     def _check_place(self, scope: Scope, *, changes: bool) -> None:
         server = scope.get("server")
@@ -279,8 +318,8 @@ class Gate:
             self._check_place(scope, changes=True)
             brought = credentials(scope)
             identity = self._people.identify(brought.cookie, brought.bearer)
-            if identity is None and not self._strangers.take():
-                raise TooOften("too many requests without login", 1.0)
+            if identity is None and not self._people.is_known(brought.device):
+                self._admission.require_rate(_address(scope))
             needs = self._policy.needs("WS", scope["path"])
             if not needs:
                 raise NotFound(f"there is nothing at {scope['path']}")
@@ -321,11 +360,17 @@ def require_right(people: People, identity: Identity, right: Right, drive: str |
         )
 
 
+def _address(scope: Scope) -> str:
+    client = scope.get("client")
+    return str(client[0]) if client else ""
+
+
 def _refusal(status: int) -> Problem:
+    title, why, remedy = _REFUSED[status]
     return Problem(
         type="urn:servodeck:body",
-        title=_REFUSED[status],
+        title=title,
         status=status,
-        detail="the body of the request is refused: " + _REFUSED[status].lower(),
-        remedy="send less, or faster",
+        detail=f"the body of the request is refused: {why}",
+        remedy=remedy,
     )

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import json
+import re
+from collections.abc import Iterable
 
 from starlette.types import Message, Receive
 
@@ -20,6 +23,49 @@ class BodyRefused(Exception):
         self.status = status
 
 
+def framing(headers: Iterable[tuple[bytes, bytes]]) -> tuple[str | None, bool]:
+    """Content-Length as it was sent, and whether the body comes in chunks.
+
+    Raises:
+        BodyRefused: both, or one of them twice. Who stands in front may end the body elsewhere
+            than we do, and take its rest for another request (RFC 9112 clause 6.3, 11.2).
+    """
+    lengths = [value for key, value in headers if key == b"content-length"]
+    codings = [value for key, value in headers if key == b"transfer-encoding"]
+    if len(lengths) + len(codings) > 1:
+        raise BodyRefused(400)
+    return (lengths[0].decode("latin-1") if lengths else None), bool(codings)
+
+
+#: A character beyond U+FFFF is written as two of these in JSON; one alone is none.
+_HALF = re.compile(rb"\\u[dD][89a-fA-F]")
+
+
+def has_half_characters(body: bytes) -> bool:
+    """Whether a JSON has half of a surrogate pair in one of its strings.
+
+    Python reads it, but no file, database or answer can hold it: it is refused before anything
+    keeps it. What is no JSON is none here; its route says so.
+    """
+    if not _HALF.search(body):
+        return False
+    try:
+        content = json.loads(body)
+    except (ValueError, RecursionError):
+        return False
+    left = [content]
+    while left:
+        each = left.pop()
+        if isinstance(each, str):
+            if any("\ud800" <= sign <= "\udfff" for sign in each):
+                return True
+        elif isinstance(each, dict):
+            left += [*each.keys(), *each.values()]
+        elif isinstance(each, list):
+            left += each
+    return False
+
+
 class MeasuredBody:
     """The receiving side of a request, with a limit and a deadline. ``refused`` is the status."""
 
@@ -29,6 +75,7 @@ class MeasuredBody:
         self._receive = receive
         self._limit = limit_bytes
         self._seen = 0
+        self._kept: list[bytes] | None = [] if limit_bytes <= _SMALL else None
         self._ended = declared in (None, "0") and not chunked
         wait = BODY_S if limit_bytes <= _SMALL else FILE_S
         self._deadline = asyncio.get_running_loop().time() + wait
@@ -49,7 +96,7 @@ class MeasuredBody:
         """The next message for the application.
 
         Raises:
-            BodyRefused: too large (413) or too slow (408).
+            BodyRefused: too large (413), too slow (408), or with half of a character (422).
         """
         if self._ended:
             return await self._receive()
@@ -60,11 +107,17 @@ class MeasuredBody:
             self.refused = 408
             raise BodyRefused(408) from None
         if message["type"] == "http.request":
-            self._seen += len(message.get("body", b""))
+            part = message.get("body", b"")
+            self._seen += len(part)
             self._ended = not message.get("more_body", False)
+            if self._kept is not None:
+                self._kept.append(part)
         else:
             self._ended = True
         if self._seen > self._limit:
             self.refused = 413
             raise BodyRefused(413)
+        if self._ended and self._kept and has_half_characters(b"".join(self._kept)):
+            self.refused = 422
+            raise BodyRefused(422)
         return message

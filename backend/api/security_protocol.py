@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import ipaddress
+import itertools
 import socket
 from collections import Counter
+from collections.abc import Sequence
+from weakref import WeakKeyDictionary
 
 import h11
+import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
 
+from backend.api.admission.accepting import AcceptingSocket
+from backend.api.admission.requests import Beginnings
+from backend.api.rights import API
 from backend.people.throttle import Bucket
 
 #: Time for the head of a request, from the connection or the first byte on.
@@ -22,10 +30,34 @@ DRAIN_S = 60.0
 #: Connections from one address that is not this machine. A page needs about eight.
 MOST_PER_ADDRESS = 100
 
+#: Connections at once, over all: beyond this the longest idle one is closed for a new one. What
+#: is under way and every websocket have limits of their own, below it together
+#: (`backend.api.admission.requests`, `backend.api.security_socket`), so that there always is one.
+MOST_CONNECTIONS = 800
+
 #: Frames beside messages at once, and a second. A page of ours answers a ping every 5 s.
 _FRAMES = (100.0, 20.0)
 
 _open: Counter[str] = Counter()
+_numbers = itertools.count(1)
+#: How STOP begins.
+_STOP = f"POST {API}/stop ".encode()
+_turns: WeakKeyDictionary[asyncio.AbstractEventLoop, Beginnings] = WeakKeyDictionary()
+
+
+def _beginnings() -> Beginnings:
+    """Those of the running loop."""
+    loop = asyncio.get_running_loop()
+    found = _turns.get(loop)
+    if found is None:
+        found = _turns[loop] = Beginnings()
+    return found
+
+
+class AcceptingConfig(uvicorn.Config):
+    """With the listening sockets, which want to know when a connection has begun."""
+
+    accepting: Sequence[AcceptingSocket] = ()
 
 
 class PatientSocket(WebSocketsSansIOProtocol):
@@ -64,22 +96,69 @@ class PatientSocket(WebSocketsSansIOProtocol):
 class PatientProtocol(H11Protocol):
     """HTTP/1.1 with a deadline for request heads and a bound on connections per address."""
 
+    _waits = False
     _head_timer: asyncio.TimerHandle | None = None
+    number = 0
+    asked = False
     _drain_timer: asyncio.TimerHandle | None = None
-    _address: str | None = None
+    address: str | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Count the connection; one too many is closed before it says anything."""
+        """Count the connection; for one too many the longest idle one is closed.
+
+        So those who only hold connections keep nobody out: STOP comes in by a new one too.
+        """
         super().connection_made(transport)
         _give_up_unread(transport)
+        self._note_begun(transport)
         address = self.client[0] if self.client else ""
-        if not _is_loopback(address):
-            if _open[address] >= MOST_PER_ADDRESS:
-                transport.close()
-                return
-            _open[address] += 1
-            self._address = address
+        room = len(self.connections) <= MOST_CONNECTIONS or self._close_idle(None)
+        if room and not _is_loopback(address):
+            room = _open[address] < MOST_PER_ADDRESS or self._close_idle(address)
+            if room:
+                _open[address] += 1
+                self.address = address
+        if not room:
+            transport.close()
+            return
+        self.number = next(_numbers)
         self._arm()
+
+    def _note_begun(self, transport: asyncio.Transport) -> None:
+        line = transport.get_extra_info("socket")
+        for server in self.config.accepting if isinstance(self.config, AcceptingConfig) else ():
+            if line is not None:
+                server.begun(line.fileno())
+
+    def _close_idle(self, address: str | None) -> bool:
+        """Close the longest idle connection, of this address or any; whether there was one.
+
+        Those that have never asked anything go before those whose next request is awaited.
+        """
+        idle = [
+            each
+            for each in self.connections
+            if isinstance(each, PatientProtocol)
+            and each.is_idle
+            and address in (None, each.address)
+        ]
+        if not idle:
+            return False
+        oldest = min(idle, key=lambda each: (each.asked, each.number))
+        oldest.drop()
+        return True
+
+    def drop(self) -> None:
+        """Close this connection at once: its place is needed."""
+        self._uncount()
+        self._disarm()
+        self.connections.discard(self)
+        self.transport.abort()
+
+    @property
+    def is_idle(self) -> bool:
+        """Nothing of a request but perhaps the beginning of its head has come."""
+        return self._head_timer is not None and not self.transport.is_closing()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Uncount it."""
@@ -102,8 +181,27 @@ class PatientProtocol(H11Protocol):
         super().resume_writing()
 
     def data_received(self, data: bytes) -> None:
-        """While the head of a request is incomplete, its time runs."""
+        """While the head of a request is incomplete, its time runs.
+
+        What begins a request is looked at so many a turn, but for what may be STOP.
+        """
+        if self.conn.their_state is not h11.IDLE or data.startswith(_STOP):
+            self._received(data)
+        else:
+            self._waits = True
+            # Nothing more comes before this has been looked at.
+            self.flow.pause_reading()
+            _beginnings().begin(functools.partial(self._begin, data))
+
+    def _begin(self, data: bytes) -> None:
+        self._waits = False
+        if not self.transport.is_closing():
+            self.flow.resume_reading()
+            self._received(data)
+
+    def _received(self, data: bytes) -> None:
         super().data_received(data)
+        self.asked = self.asked or self.conn.their_state is not h11.IDLE
         if self.conn.their_state is h11.IDLE:
             self._arm()
         else:
@@ -117,11 +215,11 @@ class PatientProtocol(H11Protocol):
         super().handle_websocket_upgrade(event)
 
     def _uncount(self) -> None:
-        if self._address is not None:
-            _open[self._address] -= 1
-            if _open[self._address] <= 0:
-                del _open[self._address]
-            self._address = None
+        if self.address is not None:
+            _open[self.address] -= 1
+            if _open[self.address] <= 0:
+                del _open[self.address]
+            self.address = None
 
     def _arm(self) -> None:
         if self._head_timer is None:

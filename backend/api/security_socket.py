@@ -17,6 +17,8 @@ OVER, FLOODED = 4401, 4429
 _FLOOD = (600.0, 200.0)
 #: Websockets of one log-in: ten pages with plots, recordings and the axis in 3D.
 MOST_PER_SESSION = 40
+#: Of all log-ins together.
+MOST_SOCKETS = 300
 
 
 class GuardedSocket:
@@ -83,13 +85,15 @@ class OpenSockets:
         self._owners: dict[str, str] = {}
 
     def require_room(self, session: str) -> None:
-        """One session does not take the places of all others.
+        """One session does not take the places of all others, and all together not those of STOP.
 
         Raises:
             TooOften: it has as many as it may.
         """
         if session and sum(each.session == session for each in self._open) >= MOST_PER_SESSION:
             raise TooOften(f"{MOST_PER_SESSION} connections of one log-in are open", 1.0)
+        if len(self._open) >= MOST_SOCKETS:
+            raise TooOften(f"{MOST_SOCKETS} pages are open", 1.0)
 
     @contextmanager
     def open(self, socket: GuardedSocket) -> Iterator[None]:

@@ -15,14 +15,13 @@ from sqlalchemy.orm import Session
 
 from backend.audit.chain import Anchor, Verdict, verify
 from backend.audit.facts import Kind, Value, stamp
+from backend.spreadsheet import as_text
 from backend.store.audit_tables import AuditEntry, AuditHead
 from backend.store.database import Store
 
 Format = Literal["csv", "jsonl"]
 _CHUNK = 500
 _ESCAPE = "\\"
-#: Spreadsheets take a cell that begins so for a formula.
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,8 +207,7 @@ def _csv_row(entry: AuditEntry) -> list[str]:
 def _cell(value: object) -> str:
     if value is None:
         return ""
-    text = str(value)
-    return "'" + text if isinstance(value, str) and text.startswith(_FORMULA) else text
+    return as_text(value) if isinstance(value, str) else str(value)
 
 
 def _csv_line(row: list[str]) -> str:

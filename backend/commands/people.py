@@ -37,8 +37,10 @@ def _with(config: Path | None, work: Callable[[Accounts], Awaitable[None]]) -> N
     async def doing() -> None:
         people = People(state_folder(config), accounts_needed=True)
         try:
-            await people.open()
+            # Who has the terminal of the machine may also begin anew, on purpose.
+            await people.open(recovering=True)
             await work(people.accounts)
+            await people.mark()
         finally:
             people.close()
 
@@ -46,9 +48,7 @@ def _with(config: Path | None, work: Callable[[Accounts], Awaitable[None]]) -> N
 
 
 def _find(accounts: Accounts, name: str) -> Account:
-    found = next(
-        (a for a in accounts.directory.all() if a.name.casefold() == name.casefold()), None
-    )
+    found = accounts.directory.find(name)
     if found is None:
         known = ", ".join(a.name for a in accounts.directory.all())
         raise NotAllowed(f"there is no account {name}", limit=known, remedy="see `people list`")

@@ -6,16 +6,19 @@ import asyncio
 import contextlib
 import socket
 import ssl
+import sys
 import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
 
 import uvicorn
 
+from backend.api.admission.accepting import AcceptingSocket
 from backend.api.app import make_app
-from backend.api.security_protocol import PatientProtocol, PatientSocket
+from backend.api.security_protocol import AcceptingConfig, PatientProtocol, PatientSocket
 from backend.bench import Bench
 from backend.journal import Entry
+from backend.people.login.marker import AccountsMarker
 from backend.people.station import People
 from backend.people.tls import Certificate, machine_names, own_certificate, station_certificate
 from backend.store.database import FILE
@@ -30,8 +33,11 @@ WS_MAX_BYTES = 64 << 10
 #: A line that is dead but not closed (lid shut, cable pulled) is given up after both together.
 #: Control, jog and enabling button do not wait for that: they end by their own silence.
 PING_S, PONG_S = 5.0, 10.0
-#: Connections at once, over all. STOP comes by those that are open already.
-MOST_CONNECTIONS = 500
+#: Connections that the system keeps until they are accepted; the system bounds it too. One that
+#: finds no room tries again after a second.
+BACKLOG = 2048
+#: Files and connections at once: what a process may have at first is often a thousand.
+DESCRIPTORS = 8192
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,14 +65,26 @@ async def serve(bench: Bench, serving: Serving) -> None:
     """Serve until interrupted. Port 0 takes a free one; the address is printed.
 
     Raises:
+        Busy: another server uses the state folder.
         NotAllowed: the port is taken, the certificate is none, or others could come in without
             an account.
     """
+    bench.records.claim()
+    try:
+        await _serve_claimed(bench, serving)
+    finally:
+        bench.records.release()
+
+
+async def _serve_claimed(bench: Bench, serving: Serving) -> None:
     needed = await accounts_needed(bench.state_folder, serving)
     people = People(bench.state_folder, accounts_needed=needed)
     certificate = _certificate(bench.state_folder, serving)
     listening = _listen(serving.host, serving.port)
-    server = uvicorn.Server(_config(bench, people, serving, certificate))
+    config = _config(bench, people, serving, certificate)
+    config.accepting = [listening]
+    _raise_descriptors()
+    server = uvicorn.Server(config)
     running = asyncio.create_task(server.serve(sockets=[listening]))
     while not server.started and not running.done():
         await asyncio.sleep(0.02)
@@ -93,6 +111,8 @@ async def accounts_needed(folder: Path, serving: Serving) -> bool:
 
     Raises:
         NotAllowed: they would not have to where others could reach the server.
+        AccountsGone: they have had to, and there are no accounts any more.
+        DatabaseFailed: it cannot be told.
     """
     reachable = not serving.on_loopback or bool(serving.behind)
     if reachable and serving.accounts is False:
@@ -103,14 +123,15 @@ async def accounts_needed(folder: Path, serving: Serving) -> bool:
             limit="127.0.0.1, localhost, ::1",
             remedy="leave out --single-user, or serve on 127.0.0.1",
         )
-    if serving.accounts is not None or reachable:
-        return serving.accounts is not False
-    if not (folder / FILE).is_file():
+    if serving.accounts is False:
         return False
+    asked = serving.accounts is True or reachable
+    if not (folder / FILE).is_file() and not AccountsMarker(folder).exists:
+        return asked
     people = People(folder, accounts_needed=True)
     try:
         await people.open()
-        return people.accounts.directory.is_set_up
+        return asked or people.accounts.directory.is_set_up
     finally:
         people.close()
 
@@ -127,7 +148,7 @@ def _certificate(folder: Path, serving: Serving) -> Certificate | None:
 
 def _config(
     bench: Bench, people: People, serving: Serving, certificate: Certificate | None
-) -> uvicorn.Config:
+) -> AcceptingConfig:
     names = LOOPBACK
     if not serving.on_loopback:
         names |= {f"[{n}]" if ":" in n else n for n in machine_names()}
@@ -140,7 +161,7 @@ def _config(
         own_addresses=not serving.on_loopback,
         strict_transport=own,
     )
-    config = uvicorn.Config(
+    config = AcceptingConfig(
         app,
         log_level="warning",
         http=PatientProtocol,
@@ -149,7 +170,7 @@ def _config(
         ws_max_size=WS_MAX_BYTES,
         ws_ping_interval=PING_S,
         ws_ping_timeout=PONG_S,
-        limit_concurrency=MOST_CONNECTIONS,
+        backlog=BACKLOG,
         timeout_graceful_shutdown=3,
         server_header=False,
         # Who a proxy speaks for is believed only where one was announced.
@@ -199,10 +220,21 @@ def _tell_problems(bench: Bench) -> None:
     bench.journal.listen(tell)
 
 
-def _listen(host: str, port: int) -> socket.socket:
+def _raise_descriptors() -> None:
+    if sys.platform != "win32":
+        import resource
+
+        now, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+        wanted = DESCRIPTORS if most == resource.RLIM_INFINITY else min(DESCRIPTORS, most)
+        if now != resource.RLIM_INFINITY and now < wanted:
+            with contextlib.suppress(OSError, ValueError):
+                resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
+
+
+def _listen(host: str, port: int) -> AcceptingSocket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     # With the protocol named: only then does asyncio send small answers without waiting for more.
-    listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    listening = AcceptingSocket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((host.strip("[]"), port))
@@ -220,5 +252,5 @@ def _listen(host: str, port: int) -> socket.socket:
             value=port,
             remedy="end the program that uses it, or choose another with --port",
         ) from error
-    listening.listen(128)
+    listening.listen(BACKLOG)
     return listening

@@ -17,14 +17,18 @@ from backend.people import changes
 from backend.people.credentials import checked_person, digest, new_secret, same_code, spoken_code
 from backend.people.directory import Directory
 from backend.people.errors import Forbidden, NotLoggedIn
+from backend.people.login.budgets import LoginBudgets, address_group
+from backend.people.login.devices import KnownDevices
+from backend.people.login.turns import HashTurns
 from backend.people.passwords import Passwords, require_good
-from backend.people.patience import Patience
 from backend.people.records import Account, LoginSession, Token, read
 from backend.people.rights import ACCOUNT_ROLES, RIGHTS, Right, Role
 from backend.store import Store
 from drivers.errors import NotAllowed
 
 LONGEST_TOKEN = timedelta(days=366)
+#: No account is called so: a name has no line break.
+_SET_UP = "set-up\ncode"
 TOKEN_PREFIX = "sdk_"  # noqa: S105 - what every token begins with
 
 
@@ -46,9 +50,11 @@ class Accounts:
         self._store, self._passwords, self._now = store, passwords, now
         self.directory = Directory(now, ended)
         self._changing = asyncio.Lock()
-        #: One hash at a time: many at once would keep the cores from what moves.
-        self._hashing = asyncio.Semaphore(1)
-        self._patience = Patience()
+        self._turns = HashTurns()
+        self._budgets = LoginBudgets()
+        self.devices = KnownDevices()
+        #: Called on a thread when there is an administrator where there may have been none.
+        self.on_set_up: Callable[[], None] = lambda: None
         self.setup_code = spoken_code(3)
 
     # --- log-in -----------------------------------------------------------------------
@@ -61,37 +67,47 @@ class Accounts:
         Raises:
             Forbidden: there is one already, or the code is wrong. TooOften: too many tries.
         """
-        self._patience.require("setup", address)
+        self._budgets.require(_SET_UP, address)
         async with self._changing:
             if self.directory.is_set_up:
                 raise Forbidden("this station has an administrator", remedy="log in")
             if not same_code(code, self.setup_code):
-                self._patience.tried("setup", address)
+                self._budgets.tried(_SET_UP, address)
                 raise Forbidden("the code is wrong", remedy="read it in the terminal again")
             account = await self._add(name, password, Role.ADMINISTRATOR)
         return await self._begin(account, client)
 
     async def log_in(
-        self, name: str, password: str, address: str, client: str
+        self, name: str, password: str, address: str, client: str, device: str | None = None
     ) -> tuple[str, LoginSession]:
         """A session for the right name and password. Returns the cookie and the session.
+
+        ``device`` is the cookie by which the browser may be known (`KnownDevices`).
 
         Raises:
             NotLoggedIn: one of them is wrong; it is not said which. TooOften: too many tries.
         """
-        self._patience.require(name, address)
-        async with self._changing:
-            await self._load()
-        account = self.directory.find(name)
-        kept = self._passwords.decoy if account is None else account.password
-        # Counted before the hash, so that tries at the same time count one another.
-        self._patience.tried(name, address)
-        async with self._hashing:
+        known = self._known(name, device)
+        self._budgets.require(name, address, known)
+        async with self._turns.turn(known or address_group(address), known=bool(known)):
+            async with self._changing:
+                await self._load()
+            known = self._known(name, device)
+            # Those before may have used up the budget in the meantime.
+            self._budgets.require(name, address, known)
+            self._budgets.tried(name, address, known)
+            account = self.directory.find(name)
+            kept = self._passwords.decoy if account is None else account.password
             good = await asyncio.to_thread(self._passwords.verify, kept, password)
         if account is None or not good:
             raise NotLoggedIn("name or password is wrong", remedy="try again")
-        self._patience.succeeded(name, address)
+        self._budgets.succeeded(name, address, known)
         return await self._begin(account, client)
+
+    def _known(self, name: str, device: str | None) -> str:
+        """The browser's id where it has logged in to this account before, else empty."""
+        found, account = self.devices.known(device), self.directory.find(name)
+        return found.id if found and account and found.account == account.id else ""
 
     async def log_out(self, session: str) -> None:
         """End a session at once; it cannot even press STOP any more."""
@@ -133,6 +149,8 @@ class Accounts:
             changes.add_account, self._store, name, role, kept, self._now()
         )
         self.directory.put(account)
+        if role is Role.ADMINISTRATOR:
+            await asyncio.to_thread(self.on_set_up)
         return account
 
     async def set_role(self, account_id: int, role: Role) -> Account:
@@ -152,6 +170,8 @@ class Accounts:
             )
             account = replace(account, role=role)
             self.directory.put(account)
+            if role is Role.ADMINISTRATOR:
+                await asyncio.to_thread(self.on_set_up)
             return account
 
     async def set_password(self, account_id: int, password: str, keep: str = "") -> None:
@@ -174,13 +194,15 @@ class Accounts:
             Forbidden: it is wrong. TooOften: too many tries.
         """
         account = self.directory.account(account_id)
-        self._patience.require(account.name, address)
-        self._patience.tried(account.name, address)
-        async with self._hashing:
+        # Only who has a session of the account comes here: not a stranger's budget.
+        own = f"account {account_id}"
+        self._budgets.require(account.name, address, own)
+        self._budgets.tried(account.name, address, own)
+        async with self._turns.turn(own, known=True):
             good = await asyncio.to_thread(self._passwords.verify, account.password, password)
         if not good:
             raise Forbidden("the present password is wrong", remedy="try again")
-        self._patience.succeeded(account.name, address)
+        self._budgets.succeeded(account.name, address, own)
 
     async def remove(self, account_id: int) -> None:
         """Delete an account with its sessions and tokens.
@@ -195,7 +217,7 @@ class Accounts:
             self.directory.drop_account(account_id)
 
     async def _hash(self, password: str) -> str:
-        async with self._hashing:
+        async with self._turns.turn("hash", known=True):
             return await asyncio.to_thread(self._passwords.hash, password)
 
     # --- sessions ---------------------------------------------------------------------

@@ -44,8 +44,15 @@ def same_code(given: str, code: str) -> bool:
 
 
 def name_key(name: str) -> str:
-    """Names that look the same are the same."""
-    return unicodedata.normalize("NFKC", name).casefold()
+    """What a name is counted and looked up by: names that look the same are the same.
+
+    Compatibility forms, case and white space around and between words make no difference
+    (Unicode's NFKC_Casefold, Unicode Standard 3.13 D147, which is stable under itself).
+    """
+    text = unicodedata.normalize("NFD", name)
+    for _ in range(2):
+        text = unicodedata.normalize("NFKC", text.casefold())
+    return " ".join(text.split())
 
 
 def checked_person(name: str) -> str:

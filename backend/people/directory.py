@@ -109,7 +109,7 @@ class Directory:
 
     def find(self, name: str) -> Account | None:
         """The account of this name, however it is spelled; None where there is none."""
-        key = name_key(name.strip())
+        key = name_key(name)
         return next((a for a in self._accounts.values() if name_key(a.name) == key), None)
 
     def require_another_administrator(self, account: Account) -> None:

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 from backend.elapsed import moment_of
+from backend.files import StorageFailed
 from backend.people.accounts import Accounts
 from backend.people.errors import NotLoggedIn
 from backend.people.identity import LOCAL, Identity
+from backend.people.login.devices import KnownDevices
+from backend.people.login.marker import AccountsMarker
 from backend.people.passwords import Passwords
 from backend.people.records import Account, LoginSession
 from backend.people.rights import RIGHTS
 from backend.people.support import Support
 from backend.store import Store
 from drivers.errors import NotAllowed
+
+log = logging.getLogger(__name__)
 
 
 class People:
@@ -37,17 +44,42 @@ class People:
         #: Called with the id of a session, token or guest that is over.
         self.on_ended: list[Callable[[str], None]] = []
         self.accounts = Accounts(self._store, passwords or Passwords(), ended=self._ended)
+        self._marker = AccountsMarker(folder)
+        self.accounts.on_set_up = self._set_up
         self.support = Support()
         self.support.on_ended.append(self._ended)
 
-    async def open(self) -> None:
-        """Read the accounts, where there are any to be asked for."""
+    async def open(self, *, recovering: bool = False) -> None:
+        """Read the accounts, where there are any to be asked for.
+
+        With ``recovering`` also where they are gone, which the machine's terminal alone may do.
+
+        Raises:
+            AccountsGone: the station has had accounts, and has no administrator now.
+            DatabaseFailed: they cannot be read.
+        """
         if self.accounts_needed:
             await self.accounts.open()
             file = self._store.sqlite_file
             if file is not None:
                 # Hashes of passwords are nobody else's business; its side files follow its mode.
                 file.chmod(0o600)
+            set_up = self.accounts.directory.is_set_up
+            if not recovering:
+                await asyncio.to_thread(self._marker.require_accounts, file, set_up=set_up)
+            await self.mark()
+
+    async def mark(self) -> None:
+        """Note outside of the database that there are accounts, where there are."""
+        if self.accounts_needed and self.accounts.directory.is_set_up:
+            await asyncio.to_thread(self._set_up)
+
+    def _set_up(self) -> None:
+        try:
+            self.accounts.devices = KnownDevices(self._marker.write().key)
+        except StorageFailed as error:
+            # Who is to log in can; only that there are accounts stands in one place too few.
+            log.error("it is not noted beside the database that there are accounts: %s", error)  # noqa: TRY400
 
     def close(self) -> None:
         """Let go of the database."""
@@ -122,6 +154,10 @@ class People:
         if not self.accounts.directory.is_remembered(session):
             return None
         return Identity(account.name, account.role, "session", session.id, frozenset())
+
+    def is_known(self, device: str | None) -> bool:
+        """Whether this cookie is of a browser that has logged in here before."""
+        return self.accounts.devices.known(device) is not None
 
     def require_accounts(self) -> None:
         """Whoever may come from afar must be told apart.

@@ -37,14 +37,20 @@ class Throttle:
             (r.blocked_until - now for k in keys if (r := self._known(k)) is not None), default=0.0
         )
 
-    def failed(self, *keys: str) -> None:
-        """A wrong try."""
+    def failures(self, key: str) -> int:
+        """Wrong tries within the last hour without a right one."""
+        record = self._known(key)
+        return 0 if record is None else record.failures
+
+    def failed(self, *keys: str, free_tries: int | None = None) -> None:
+        """A wrong try. ``free_tries`` is how many this one is judged by, where not as always."""
         now = self._clock()
+        free = self._free_tries if free_tries is None else free_tries
         for key in keys:
             record = self._known(key) or _Record()
             record.failures += 1
             record.last = now
-            over = record.failures - self._free_tries
+            over = record.failures - free
             if over >= 0:
                 wait = min(LONGEST_WAIT_S, FIRST_WAIT_S * 2.0 ** min(over, 20))
                 record.blocked_until = now + wait

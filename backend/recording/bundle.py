@@ -21,6 +21,7 @@ from backend.recording.bundle_page import drawings_of, log_line, page, when
 from backend.recording.evidence import Evidence, Value
 from backend.recording.export import NICE, to_csv
 from backend.recording.reader import RecordingReader
+from backend.spreadsheet import as_text
 
 
 async def build_apart(evidence: Evidence, target: Path) -> None:
@@ -129,7 +130,7 @@ def _table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     text = io.StringIO()
     out = csv.writer(text)
     out.writerow(titles)
-    out.writerows(rows)
+    out.writerows([as_text(c) if isinstance(c, str) else c for c in row] for row in rows)
     return text.getvalue()
 
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from backend.recording.reader import Channel, RecordingReader
 from backend.recording.table import merged
+from backend.spreadsheet import as_text
 
 #: The process writes text for seconds; the bus and the pages go first.
 NICE = 10
@@ -92,8 +93,8 @@ def _write_csv(
         out = csv.writer(file)
         zero = datetime.fromtimestamp(summary.clock.epoch(summary.first_s or 0.0), UTC)
         out.writerow(
-            [f"time_s (0 = {zero.isoformat()})", *(column.title for column in columns)]
-            + [f"{titles[n]} valid" for n in marked]
+            [f"time_s (0 = {zero.isoformat()})", *(as_text(column.title) for column in columns)]
+            + [as_text(f"{titles[n]} valid") for n in marked]
         )
         for rows in merged(reader):
             times = (rows.time_ns / 1e9).tolist()

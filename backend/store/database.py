@@ -38,6 +38,8 @@ _PATIENCE_S = 5
 #: For the write lock of SQLite. A writer of another process is waited for by asking again and
 #: again, and may be overtaken each time; on a slow disk that takes a while.
 _SQLITE_PATIENCE_S = 15
+#: SQLITE_CORRUPT and SQLITE_NOTADB (sqlite.org/rescode.html).
+_DAMAGED = frozenset({11, 26})
 #: Writers of this process queue here, by file, where none is overtaken for long.
 _writers: dict[str, threading.Lock] = {}
 
@@ -59,6 +61,7 @@ class Store:
         self.folder = folder
         self.url = _url(folder, database)
         self._engine: Engine | None = None
+        self._identity: tuple[int, int] | None = None
         self._opening = threading.Lock()
         self._pool = ThreadPoolExecutor(max_workers=4, thread_name_prefix="store")
 
@@ -92,6 +95,7 @@ class Store:
                     engine.dispose()
                     raise
                 self._engine = engine
+                self._identity = self._identify()
             return self._engine
 
     def close(self) -> None:
@@ -100,6 +104,28 @@ class Store:
             if self._engine is not None:
                 self._engine.dispose()
                 self._engine = None
+
+    def missing(self) -> str:
+        """Why nothing that is written now would be found later; empty where it would be.
+
+        A file that was removed or replaced while it is open still takes everything, and then is
+        gone with the process.
+        """
+        if self._engine is None:
+            return ""
+        if not self.folder.is_dir():
+            return f"the state folder {self.folder} is gone"
+        if self._identity is not None and self._identify() != self._identity:
+            return f"the database {self.shown} was removed or replaced while servodeck runs"
+        return ""
+
+    def _identify(self) -> tuple[int, int] | None:
+        file = self.sqlite_file
+        try:
+            known = None if file is None else file.stat()
+        except OSError:
+            return None
+        return None if known is None else (known.st_dev, known.st_ino)
 
     # --- transactions -----------------------------------------------------------------
 
@@ -126,6 +152,12 @@ class Store:
             DatabaseFailed: nothing was changed.
         """
         engine = self.open().execution_options(immediate=True)
+        if missing := self.missing():
+            raise DatabaseFailed(
+                missing,
+                value=str(self.folder),
+                remedy="put it back as it was, or end servodeck and restore a backup",
+            )
         with (
             self._alone(),
             self._translated(),
@@ -221,11 +253,18 @@ class Store:
         except SQLAlchemyError as error:
             cause = getattr(error, "orig", None) or error
             first = (str(cause).strip() or type(cause).__name__).splitlines()[0]
+            if getattr(cause, "sqlite_errorcode", None) in _DAMAGED:
+                raise DatabaseFailed(
+                    f"the database {self.shown} is damaged, or is no database: {first}",
+                    value=self.shown,
+                    remedy="keep a copy of the file and restore a backup (`servodeck restore`); "
+                    "servodeck has not tried to repair it, and does not know what of it is whole",
+                ) from error
             raise DatabaseFailed(
                 f"the database {self.shown} failed: {first}",
                 value=self.shown,
                 remedy="check free space, permissions and, for PostgreSQL, that its server "
-                "runs and can be reached; what was stored before is unharmed",
+                "runs and can be reached",
             ) from error
 
 

@@ -22,7 +22,9 @@ class FolderLock:
         self.held = False
 
     def take(self) -> bool:
-        """Try to take it; False while another process has it."""
+        """Try to take it; False while another process has it. Holding it already is taking it."""
+        if self.held:
+            return True
         try:
             self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         except OSError:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import can
 
+from drivers.adapters import require_channel, serial_device
 from drivers.canopen.slcan import AdapterBlocked, AdapterGone, SlcanBus
 from drivers.canopen.url import CanUrl
-from drivers.errors import LinkLost
+from drivers.errors import DriveError, LinkLost
 
 #: What python-can and the makers' libraries beneath it raise when an adapter is missing or dies.
 #: They agree on nothing narrower: ctypes bindings raise TypeError, AttributeError, NameError …
@@ -21,17 +22,22 @@ def open_bus(url: CanUrl) -> can.BusABC:
 
     Raises:
         LinkLost: missing, not permitted, in use, or without its driver; the message says which.
+        OutOfRange: no adapter by its form, whoever made the ``url``.
     """
     try:
         return _open(url)
+    except DriveError:
+        raise
     except ADAPTER_ERRORS as error:
         raise translate(url, error) from error
 
 
 def _open(url: CanUrl) -> can.BusABC:
+    require_channel(url.interface, url.channel)
     if url.interface == "slcan":
+        # python-can would open any URL that pyserial knows; a resolved device is none.
         return SlcanBus(
-            url.channel,
+            serial_device(url.channel),
             tty_baudrate=url.tty_baudrate or 115200,
             bitrate=url.bitrate,
             sleep_after_open=url.settle_s,

@@ -12,9 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from urllib.parse import parse_qsl, unquote, urlsplit
 
+from drivers.adapters import CAN_INTERFACES, require_channel
 from drivers.errors import OutOfRange
 
-INTERFACES = ("socketcan", "slcan", "pcan", "kvaser", "usb2can", "udp_multicast", "virtual")
+INTERFACES = CAN_INTERFACES
 
 BITRATES = (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
 """Bit rates of CiA 301 clause 6.2, and 100 kbit/s, which it no longer recommends."""
@@ -48,8 +49,8 @@ def parse_canopen_url(url: str) -> CanUrl:
     """Take a URL apart.
 
     Raises:
-        OutOfRange: another scheme, unknown interface, option or bit rate; the message lists
-            what there is.
+        OutOfRange: another scheme, unknown interface, option or bit rate, or a channel that is
+            none of this interface; the message lists what there is.
     """
     parts = urlsplit(url)
     if parts.scheme != "canopen":
@@ -73,6 +74,7 @@ def parse_canopen_url(url: str) -> CanUrl:
             value=url,
             remedy=f"write canopen://{interface}/CHANNEL, for example can0 or /dev/ttyACM0",
         )
+    require_channel(interface, channel)
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
     unknown = sorted(set(options) - set(_OPTIONS))
     if unknown:
@@ -99,9 +101,15 @@ def parse_canopen_url(url: str) -> CanUrl:
         own_id=int(_number(options, "own_id", 127, 1, 127)),
         guard_s=_number(options, "guard_ms", 0, 0, 60_000) / 1e3,
         settle_s=_number(options, "settle_ms", 0, 0, 10_000) / 1e3,
-        port=int(_number(options, "port", 0, 0, 65535)) or None,
+        port=_port(options),
         tty_baudrate=int(_number(options, "tty_baudrate", 0, 0, 20_000_000)) or None,
     )
+
+
+def _port(options: dict[str, str]) -> int | None:
+    # Below 1024 other services listen, to which a frame would be a message.
+    port = int(_number(options, "port", 0, 0, 65535))
+    return int(_number(options, "port", 0, 1024, 65535)) if port else None
 
 
 def _number(options: dict[str, str], name: str, default: float, low: float, high: float) -> float:

@@ -25,8 +25,9 @@ from pathlib import Path
 
 import pysoem
 
+from drivers.adapters import require_interface
 from drivers.errors import Busy, LinkLost, NotAllowed, ProtocolError
-from drivers.ethercat import frames, permissions
+from drivers.ethercat import frames, permissions, promiscuous
 from drivers.ethercat.steps import Read, Write
 
 IO_MAP_BYTES = 4096
@@ -87,6 +88,7 @@ class Segment:
         self._check_interface()
         self._lock = _lock(self.interface)
         master = pysoem.Master()
+        was_promiscuous = promiscuous.is_set(self.interface)
         before = _sockets()
         try:
             master.open(self.interface)
@@ -104,6 +106,9 @@ class Segment:
         self.socket_fd = min(_sockets() - before)
         self._index = socket.if_nametoindex(self.interface)
         self._ear = socket.socket(fileno=os.dup(self.socket_fd))
+        if not was_promiscuous:
+            # SOEM switches it for good; bound to the socket it ends with it, even on SIGKILL.
+            promiscuous.bind_to(self._ear, self.interface, self._index)
         self._master = master
 
     def close(self) -> None:
@@ -304,6 +309,7 @@ class Segment:
                 f"{self.interface!r} cannot be an interface: names have 1 to {_NAME_LIMIT} letters",
                 remedy="choose one of the interfaces that the page Connect lists",
             )
+        require_interface(self.interface)
         report = permissions.check(self.interface)
         if not report.exists or not report.up:
             names = ", ".join(name for _, name in socket.if_nameindex())

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 import serial
-from serial.tools import list_ports
 
+from drivers.adapters import ports_found, serial_device
 from drivers.errors import DriveError, LinkLost, OutOfRange
 
 if sys.platform != "win32":
@@ -88,13 +88,14 @@ def open_port(settings: LineSettings) -> Port:
     """Open the adapter named in ``settings``.
 
     Raises:
-        LinkLost: no such port, no permission, in use.
-        OutOfRange: the adapter cannot do this baud rate or parity.
+        LinkLost: no such port, no serial port, no permission, in use.
+        OutOfRange: the adapter cannot do this baud rate or parity, or its name is of no port.
     """
-    parity = "N" if is_pseudo_terminal(settings.device) else settings.parity
+    device = serial_device(settings.device)
+    parity = "N" if is_pseudo_terminal(device) else settings.parity
     try:
         port = serial.Serial(
-            settings.device,
+            device,
             settings.baudrate,
             parity=parity,
             stopbits=settings.stopbits,
@@ -136,10 +137,9 @@ def _explain(settings: LineSettings, error: OSError) -> DriveError:
     device, text = settings.device, str(error)
     number = error.errno or next((n for n in _ERRNOS if f"Errno {n}]" in text), 0)
     if number == errno.ENOENT:
-        known = ", ".join(sorted(p.device for p in list_ports.comports())) or "none"
         return LinkLost(
             f"there is no serial port {device}",
-            remedy=f"plug the adapter in; ports found now: {known}",
+            remedy=f"plug the adapter in; ports found now: {ports_found()}",
         )
     if number == errno.EACCES:
         return LinkLost(

@@ -130,6 +130,7 @@ class GuardedServer:
             self.bench, self.member = await self._making(self.folder)
             serving = Serving(accounts=self.people.accounts_needed)
             config = _config(self.bench, self.people, serving, None)
+            config.accepting = [listening]
             self.app, self.config = config.app, config
             self._server = uvicorn.Server(config)
             task = asyncio.create_task(self._server.serve(sockets=[listening]))

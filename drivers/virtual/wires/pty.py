@@ -54,7 +54,8 @@ def open_pty(path: Path) -> tuple[int, int]:
     Raises:
         LinkLost: something that is not a wire of ours is already at the path.
     """
-    if path.exists() and not path.is_symlink():
+    ours = path.is_symlink() and str(path.readlink()).startswith("/dev/pts/")
+    if (path.exists() or path.is_symlink()) and not ours:
         raise LinkLost(
             f"{path} exists and is no virtual wire",
             remedy="choose another path, or remove the file",

@@ -56,10 +56,16 @@ def test_wrong_urls_say_what_is_wrong(url: str, says: str) -> None:
     assert says in f"{refused.value} {refused.value.limit}"
 
 
+MISSING = {
+    "socketcan": "no-such-can7", "slcan": "/dev/ttyNoSuch7", "pcan": "PCAN_USBBUS16",
+    "kvaser": "97", "usb2can": "NOSUCH77",
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("interface", sorted(set(INTERFACES) - {"virtual", "udp_multicast"}))
 def test_an_adapter_that_is_not_there_is_a_lost_link(interface: str) -> None:
     with pytest.raises(LinkLost) as lost:
-        open_bus(parse_canopen_url(f"canopen://{interface}/no-such-channel-7"))
+        open_bus(parse_canopen_url(f"canopen://{interface}/{MISSING[interface]}"))
     assert lost.value.remedy
 
 

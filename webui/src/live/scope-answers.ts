@@ -1,4 +1,5 @@
 /** Answers of the scope that follow from its traces alone. */
+import { csvText } from './csv-text'
 import { columns, thinned } from './decimate'
 import type { stretch } from './measure'
 import type { Trace } from './ring'
@@ -27,7 +28,7 @@ export function csv(
   { from, to, origin }: { from: number; to: number; origin: number },
 ): string {
   const [times, ...series] = columns(traces, from, to, Number.MAX_SAFE_INTEGER)
-  const quoted = ['time_s', ...names].map((name) => `"${name.replaceAll('"', '""')}"`)
+  const quoted = ['time_s', ...names].map(csvText)
   const lines = [quoted.join(',')]
   for (let i = 0; i < times.length; i++) {
     const values = series.map((column) => column[i] ?? '')

@@ -1,5 +1,7 @@
 import { describe, expect, it } from 'vitest'
 import { decodeBlocks, type ScopeBlock } from './blocks'
+
+import { csvText } from './csv-text'
 import { columns, thinned } from './decimate'
 import { Ring, Trace } from './ring'
 import { ScopeStore } from './scope-store'
@@ -310,6 +312,11 @@ describe('scope store', () => {
     expect(scope.answer('csv', { ids: ['c1', 'c2'], names, from: 0, to: 200, origin: 100 })).toBe(
       '"time_s","a ""x""","b"\r\n0.000000,1,2\r\n0.500000,3,\r\n',
     )
+  })
+  it('exports no name that a spreadsheet would run', () => {
+    for (const name of ['=1+1', '+1', '-1', '@x', '\t=1', ' =1'])
+      expect(csvText(name)).toBe(`"'${name}"`)
+    for (const name of ['a=1', 'X', '', '1-2']) expect(csvText(name)).toBe(`"${name}"`)
   })
   it('keeps what a channel has when others come and go', () => {
     const { store: scope, sent } = store()

@@ -3,6 +3,7 @@ import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { ScopeSetup } from '../../api/schema'
 import { useT } from '../../i18n'
+import { csvText } from '../../live/csv-text'
 import * as live from '../../live/live'
 import { dateTime } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
@@ -93,7 +94,7 @@ export function KeepPanel({
       const { header, samples: all } = await loadSnapshot(file)
       const lines = ['trace,unit,time_s,value']
       for (const [i, { label, unit }] of header.traces.entries()) {
-        const quoted = [label, unit].map((text) => `"${text.replaceAll('"', '""')}"`).join(',')
+        const quoted = [label, unit].map(csvText).join(',')
         const { times, values } = all[i] ?? {
           times: new Float64Array(),
           values: new Float64Array(),

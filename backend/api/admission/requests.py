@@ -1,0 +1,123 @@
+"""How many requests begin and run at once, and how often somebody unknown may ask.
+
+STOP is neither counted nor kept waiting.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter, OrderedDict, deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from backend.people.errors import TooOften
+from backend.people.login.budgets import address_group
+from backend.people.throttle import Bucket
+
+#: Requests under way at once: all but STOP, those of nobody known, and of these from one address.
+MOST_REQUESTS, MOST_OF_STRANGERS, MOST_OF_PLACE = 400, 200, 40
+#: Requests that begin in one turn of the event loop; a turn with nothing else to do is short.
+PER_TURN = 1
+#: Requests of nobody known from one address: so many at once, and a second.
+_STRANGERS = (200.0, 50.0)
+_KEEP = 4096
+
+
+class Beginnings:
+    """So many requests begin in one turn of the event loop; the others wait for the next ones.
+
+    A turn does all that is ready. With hundreds of requests in one, STOP, which is read in the
+    turn after, would wait for all of them; so their work is spread, and STOP goes past it.
+    """
+
+    def __init__(self) -> None:
+        self._left = PER_TURN
+        self._waiting: deque[Callable[[], None]] = deque()
+        self._turning = False
+
+    def begin(self, work: Callable[[], None]) -> None:
+        """Do this now, or in one of the next turns; what came before goes first."""
+        self._keep_turning()
+        if self._left > 0 and not self._waiting:
+            self._left -= 1
+            work()
+        else:
+            self._waiting.append(work)
+
+    async def turn(self) -> None:
+        """Return when this request may begin."""
+        mine: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+        def called() -> None:
+            if not mine.done():
+                mine.set_result(None)
+
+        self.begin(called)
+        await mine
+
+    def _keep_turning(self) -> None:
+        if not self._turning:
+            self._turning = True
+            asyncio.get_running_loop().call_soon(self._turn)
+
+    def _turn(self) -> None:
+        self._turning = False
+        self._left = PER_TURN
+        if self._waiting:
+            self._keep_turning()
+        while self._waiting and self._left > 0:
+            self._left -= 1
+            self._waiting.popleft()()
+
+
+class Admission:
+    """Of one server. ``place`` is an address; a browser that is known counts as nobody's crowd."""
+
+    def __init__(self) -> None:
+        self.beginnings = Beginnings()
+        self._running = 0
+        self._strangers: Counter[str] = Counter()
+        self._buckets: OrderedDict[str, Bucket] = OrderedDict()
+
+    def require_rate(self, address: str) -> None:
+        """Somebody unknown from this address may ask now.
+
+        Raises:
+            TooOften: they have asked too often.
+        """
+        place = address_group(address)
+        bucket = self._buckets.pop(place, None) or Bucket(*_STRANGERS)
+        self._buckets[place] = bucket
+        while len(self._buckets) > _KEEP:
+            self._buckets.popitem(last=False)
+        if not bucket.take():
+            raise TooOften("too many requests of nobody in particular", 1.0)
+
+    @contextmanager
+    def running(self, address: str, *, known: bool, stop: bool) -> Iterator[None]:
+        """Count a request while it runs.
+
+        Raises:
+            TooOften: too many run.
+        """
+        if stop:
+            yield
+            return
+        place = "" if known else address_group(address)
+        if self._running >= MOST_REQUESTS:
+            raise TooOften("too many requests run at once", 1.0)
+        if not known and (
+            self._strangers[place] >= MOST_OF_PLACE or self._strangers.total() >= MOST_OF_STRANGERS
+        ):
+            raise TooOften("too many requests of nobody in particular run at once", 1.0)
+        self._running += 1
+        if not known:
+            self._strangers[place] += 1
+        try:
+            yield
+        finally:
+            self._running -= 1
+            if not known:
+                self._strangers[place] -= 1
+                if self._strangers[place] <= 0:
+                    del self._strangers[place]

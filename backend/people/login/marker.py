@@ -1,0 +1,104 @@
+"""The note beside the database that this station has accounts.
+
+A database file that was emptied, lost or replaced looks like a station that never had any, and
+such a station lets whoever reaches it do everything. So that there are accounts also stands in
+``accounts.json`` in the state folder, with the key of the known browsers, and a station that finds
+the note without an administrator in its database does not start.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from backend.files import write_atomically
+from drivers.errors import NotAllowed
+
+FILE = "accounts.json"
+_KEY_BYTES = 32
+
+
+class AccountsGone(NotAllowed):
+    """The station has had accounts, and its database has none."""
+
+    kind = "accounts-gone"
+
+
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """Since when (UTC) there are accounts, empty where the note is unreadable; the devices' key."""
+
+    since: str
+    key: bytes
+
+
+class AccountsMarker:
+    """The note of one state folder. All of it blocks."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / FILE
+
+    @property
+    def exists(self) -> bool:
+        """Whether the station has ever had accounts; a note that cannot be read is one."""
+        return self.path.is_symlink() or self.path.exists()
+
+    def read(self) -> Marker | None:
+        """The note, or None where there is none; one that is damaged still says that there is one.
+
+        Raises:
+            AccountsGone: it cannot be read, so that nobody can tell.
+        """
+        try:
+            content = json.loads(self.path.read_bytes())
+            return Marker(str(content["since"]), bytes.fromhex(content["device_key"]))
+        except FileNotFoundError:
+            return Marker("", b"") if self.path.is_symlink() else None
+        except (ValueError, KeyError, TypeError):
+            return Marker("", b"")
+        except OSError as error:
+            raise AccountsGone(
+                f"{self.path} cannot be read ({error.strerror}), so it is not known whether this "
+                "station has accounts",
+                value=str(self.path),
+                remedy="let the user that servodeck runs as read it",
+            ) from error
+
+    def write(self) -> Marker:
+        """Note that there are accounts, unless that is noted; a damaged note is written anew.
+
+        Raises:
+            StorageFailed: it cannot be written.
+        """
+        found = self.read()
+        if found is not None and len(found.key) == _KEY_BYTES:
+            return found
+        made = Marker(datetime.now(UTC).isoformat(timespec="seconds"), secrets.token_bytes(32))
+        content = {"version": 1, "since": made.since, "device_key": made.key.hex()}
+        # Temporary files are made readable by their user only, and so is what they become.
+        write_atomically(self.path, json.dumps(content, indent=2).encode())
+        return made
+
+    def require_accounts(self, database: Path | None, *, set_up: bool) -> None:
+        """A station that has had accounts still has an administrator.
+
+        Raises:
+            AccountsGone: it has none; the message says how to recover on purpose.
+        """
+        found = self.read()
+        if found is None or set_up:
+            return
+        folder = self.path.parent
+        since = f" since {found.since}" if found.since else ""
+        raise AccountsGone(
+            f"this station has had accounts{since}, and its database {database} has no "
+            "administrator: it was emptied, lost or replaced. The station does not start, as "
+            "without accounts whoever reaches it could move axes",
+            value=str(database),
+            remedy="restore a backup: `servodeck restore ARCHIVE --replace --config "
+            f"{folder}`; or begin with new accounts on purpose: `servodeck people add NAME "
+            f"--role administrator --config {folder}`",
+        )

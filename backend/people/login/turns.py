@@ -1,0 +1,106 @@
+"""Turns at the password hash: one at a time, and nobody's crowd keeps another waiting.
+
+A hash costs a tenth of a second of a core on purpose, and more than one at a time would keep the
+cores from what moves. So turns are given in a fixed order: first to those who are known (a browser
+that has logged in before, somebody who changes their password), then to the addresses of everybody
+else in rotation. Of one address the newest has the turn and the oldest goes away with "try again",
+so that a crowd of guesses in front does not keep back the one that comes after it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import OrderedDict, deque
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from backend.people.errors import TooOften
+
+#: Waiting at a time: of one place, and places.
+MOST_OF_PLACE, MOST_PLACES = 3, 64
+_RETRY_S = 1.0
+
+Waiting = asyncio.Future[None]
+
+
+class _Lane:
+    """Those who wait, by the place that they come from."""
+
+    def __init__(self) -> None:
+        self._places: OrderedDict[str, deque[Waiting]] = OrderedDict()
+
+    def join(self, place: str) -> Waiting:
+        """Wait for a turn.
+
+        Raises:
+            TooOften: too many places wait already.
+        """
+        waiting = self._places.get(place)
+        if waiting is None:
+            if len(self._places) >= MOST_PLACES:
+                raise TooOften("too many log-ins at once", _RETRY_S)
+            waiting = self._places[place] = deque()
+        if len(waiting) >= MOST_OF_PLACE:
+            oldest = waiting.popleft()
+            if not oldest.done():
+                oldest.set_exception(TooOften("too many log-ins at once", _RETRY_S))
+        mine: Waiting = asyncio.get_running_loop().create_future()
+        waiting.append(mine)
+        return mine
+
+    def leave(self, place: str, mine: Waiting) -> None:
+        """Wait no longer."""
+        waiting = self._places.get(place)
+        if waiting is not None and mine in waiting:
+            waiting.remove(mine)
+            if not waiting:
+                del self._places[place]
+
+    def next(self) -> Waiting | None:
+        """The newest of the place whose turn it is; None where nobody waits."""
+        while self._places:
+            place, waiting = self._places.popitem(last=False)
+            mine = waiting.pop()
+            if waiting:
+                self._places[place] = waiting
+            if not mine.done():
+                return mine
+        return None
+
+
+class HashTurns:
+    """The turns of one station."""
+
+    def __init__(self) -> None:
+        self._busy = False
+        self._known, self._strangers = _Lane(), _Lane()
+
+    @asynccontextmanager
+    async def turn(self, place: str, *, known: bool) -> AsyncIterator[None]:
+        """Wait for a turn and have it. ``place`` is an address, or a browser or session.
+
+        Raises:
+            TooOften: others of the same place came after, or too many places wait.
+        """
+        if self._busy:
+            lane = self._known if known else self._strangers
+            mine = lane.join(place)
+            try:
+                await mine
+            except asyncio.CancelledError:
+                lane.leave(place, mine)
+                if mine.done() and not mine.cancelled() and mine.exception() is None:
+                    self._pass_on()  # the turn had just come
+                raise
+        self._busy = True
+        try:
+            yield
+        finally:
+            self._pass_on()
+
+    def _pass_on(self) -> None:
+        following = self._known.next() or self._strangers.next()
+        # It stays taken in between: who comes now does not get in before who was called.
+        self._busy = following is not None
+        if following is not None:
+            following.set_result(None)

@@ -1,0 +1,186 @@
+"""What the adapter of a bus URL may be: an allow-list of forms, and nothing else.
+
+The place in a bus URL comes from the network, from a saved list of drives or from a file, and
+the libraries beneath understand far more than an adapter's name: pyserial opens URLs of its own
+(``spy:`` writes a file, ``socket:`` and ``rfc2217:`` connect to any computer, ``hwgrep:`` and
+``alt:`` search and load code), python-can takes ``NAME@BAUD``, and opening a device that is no
+serial port can have effects by itself (a watchdog begins to count). So only these pass:
+
+- a serial port: an absolute path that leads to a serial device, or ``COM1`` … ``COM999``;
+- a network interface by its name;
+- a channel of one of python-can's interfaces, in the form that this interface has.
+
+`require_serial_form` looks at the text alone, so that an address can be judged on any computer;
+`serial_device` follows links and is asked again each time that a port is opened.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import re
+import stat
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from serial.tools import list_ports
+
+from drivers.errors import LinkLost, OutOfRange
+
+_COM = re.compile(r"(?:\\\\\.\\)?COM[1-9]\d{0,2}", re.IGNORECASE)
+#: Absolute, without control signs, and without the signs that the libraries give a meaning to.
+_PATH = re.compile(r"/[^\x00-\x1f\x7f-\x9f\ud800-\udfff\\?#]{1,250}")
+#: Serial lines, USB adapters, Bluetooth, the Mac's call-out ports, and pseudo-terminals. Consoles
+#: (/dev/tty, /dev/tty1) and everything else that can be opened are not among them.
+_DEVICE = re.compile(
+    r"/dev/(?:tty[A-Za-z][\w.\-]{0,60}|(?:cu|tty)\.[\w.\-]{1,80}|rfcomm\d{1,3}|pts/\d{1,7})"
+)
+#: As the kernel names interfaces, without the signs that only a trap would use.
+_INTERFACE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.@:\-]{0,14}")
+
+SERIAL_LIMIT = "the path of a serial device, as /dev/ttyUSB0, or COM1 to COM999"
+
+
+def require_serial_form(place: str) -> None:
+    """The text is a device path or a COM port.
+
+    Raises:
+        OutOfRange: it is anything else, such as a URL of pyserial.
+    """
+    if _COM.fullmatch(place):
+        return
+    parts = place.split("/")
+    if not _PATH.fullmatch(place) or ".." in parts or place.startswith("//"):
+        raise OutOfRange(
+            f"{place!r} is no serial port",
+            value=place,
+            limit=SERIAL_LIMIT,
+            remedy="give the device itself, as /dev/ttyUSB0, /dev/serial/by-id/… or COM3",
+        )
+
+
+def serial_device(place: str) -> str:
+    """The device that a serial port's name leads to, every link followed: what is to be opened.
+
+    A link anywhere may lead to it, as those of udev and of virtual drives do; what is no serial
+    device is never opened, and outside ``/dev`` it is not said whether it exists.
+
+    Raises:
+        OutOfRange: not a serial port by its form.
+        LinkLost: no serial device, or the terminal that this server itself was started in.
+    """
+    require_serial_form(place)
+    if sys.platform == "win32":
+        return place
+    device = os.path.realpath(place)
+    if not place.startswith("/dev/") and not _is_serial(device):
+        raise LinkLost(
+            f"there is no serial port {place}",
+            value=place,
+            limit=SERIAL_LIMIT,
+            remedy=f"plug the adapter in; ports found now: {ports_found()}",
+        )
+    if Path(device).exists() and not _is_serial(device):
+        raise LinkLost(
+            f"{place} is no serial port",
+            value=place,
+            limit=SERIAL_LIMIT,
+            remedy="give the device of the adapter, as /dev/ttyUSB0",
+        )
+    if device in _own_terminals():
+        raise LinkLost(
+            f"{place} is the terminal that servodeck itself runs in",
+            value=place,
+            remedy="give the device of the adapter, as /dev/ttyUSB0",
+        )
+    return device
+
+
+def ports_found() -> str:
+    """The serial ports that this computer has, to be shown."""
+    return ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
+
+
+def _is_serial(device: str) -> bool:
+    try:
+        mode = Path(device).stat().st_mode
+    except OSError:
+        return False
+    return _DEVICE.fullmatch(device) is not None and stat.S_ISCHR(mode)
+
+
+def _own_terminals() -> set[str]:
+    found = set()
+    for descriptor in (0, 1, 2):
+        with suppress(OSError):
+            found.add(os.ttyname(descriptor))
+    return found
+
+
+def require_interface(name: str) -> None:
+    """The text is the name of a network interface, 1 to 15 signs.
+
+    Raises:
+        OutOfRange: it is not.
+    """
+    if not _INTERFACE.fullmatch(name):
+        raise OutOfRange(
+            f"{name!r} is no network interface",
+            value=name,
+            limit="1 to 15 letters, digits and . _ - @ :, as eth0",
+            remedy="choose one of the interfaces that the page Connect lists",
+        )
+
+
+def _require_multicast(channel: str) -> None:
+    """Any other address would send frames to a computer of the caller's choice."""
+    try:
+        address = ipaddress.ip_address(channel)
+    except ValueError:
+        address = None
+    if address is None or not address.is_multicast or "%" in channel:
+        raise OutOfRange(
+            f"{channel!r} is no multicast address",
+            value=channel,
+            limit="224.0.0.0 to 239.255.255.255, ff00::/8",
+            remedy="write canopen://udp_multicast/239.74.163.2",
+        )
+
+
+def _pattern(pattern: str, example: str) -> Callable[[str], None]:
+    form = re.compile(pattern)
+
+    def require(channel: str) -> None:
+        if not form.fullmatch(channel):
+            raise OutOfRange(
+                f"{channel!r} is no channel of this kind of CAN adapter",
+                value=channel,
+                limit=example,
+                remedy=f"write it like {example}",
+            )
+
+    return require
+
+
+#: By python-can's name of the interface: the form of its channel.
+_CHANNELS: dict[str, Callable[[str], None]] = {
+    "socketcan": require_interface,
+    "slcan": require_serial_form,
+    "pcan": _pattern(r"PCAN_(?:NONE|[A-Z]{3}BUS(?:[1-9]|1[0-6]))", "PCAN_USBBUS1"),
+    "kvaser": _pattern(r"\d{1,3}", "0"),
+    "usb2can": _pattern(r"[A-Za-z0-9]{1,32}", "ED000200"),
+    "udp_multicast": _require_multicast,
+    "virtual": _pattern(r"[\w.\-]{1,64}", "can0"),
+}
+CAN_INTERFACES = tuple(_CHANNELS)
+
+
+def require_channel(interface: str, channel: str) -> None:
+    """The text is a channel of this interface of python-can, one of `CAN_INTERFACES`.
+
+    Raises:
+        OutOfRange: it is not.
+    """
+    _CHANNELS[interface](channel)

@@ -1,0 +1,47 @@
+"""Promiscuous mode for as long as a socket lives, and no longer.
+
+SOEM sets the flag of the interface itself (IFF_PROMISC, netdevice(7)), which stays when the master
+is closed or killed: the computer then reads all traffic of that network for ever. A membership of
+the socket (PACKET_MR_PROMISC, packet(7)) does the same, and the kernel takes it back by itself.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import socket
+import struct
+
+_SIOCGIFFLAGS, _SIOCSIFFLAGS = 0x8913, 0x8914
+_IFF_PROMISC = 0x100
+_SOL_PACKET, _ADD_MEMBERSHIP, _MR_PROMISC = 263, 1, 1
+
+
+def is_set(interface: str) -> bool:
+    """Whether somebody has switched the interface to promiscuous mode for good."""
+    try:
+        return bool(_flags(interface) & _IFF_PROMISC)
+    except OSError:
+        return False
+
+
+def bind_to(packets: socket.socket, interface: str, index: int) -> None:
+    """Have the mode by this packet socket, and take it off the interface's own flags.
+
+    Where this is not permitted, SOEM was not permitted to switch it either.
+    """
+    with contextlib.suppress(OSError):
+        membership = struct.pack("iHH8s", index, _MR_PROMISC, 0, b"")
+        packets.setsockopt(_SOL_PACKET, _ADD_MEMBERSHIP, membership)
+        flags = _flags(interface)
+        if flags & _IFF_PROMISC:
+            request = struct.pack("16sH14x", interface.encode(), flags & ~_IFF_PROMISC)
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
+                fcntl.ioctl(control, _SIOCSIFFLAGS, request)
+
+
+def _flags(interface: str) -> int:
+    request = struct.pack("16sH14x", interface.encode(), 0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
+        answer = fcntl.ioctl(control, _SIOCGIFFLAGS, request)
+    return int(struct.unpack("16sH14x", answer)[1])

@@ -1,0 +1,1 @@
+"""Locked packages, bill of materials and notice: see `supply.__main__`."""
