@@ -198,9 +198,7 @@ def _on_empty(
         if bins.size < _FEWEST_EMPTY:
             found.append(None)
             continue
-        near = np.asarray(
-            np.interp(bins, lines, g.real) + 1j * np.interp(bins, lines, g.imag)
-        )
+        near = np.asarray(np.interp(bins, lines, g.real) + 1j * np.interp(bins, lines, g.imag))
         around = np.interp(bins, lines, np.abs(mean_y[lines]))
         left = np.abs(mean_y[bins] - near * mean_u[bins]) / around
         found.append(float(np.sqrt(np.mean(left**2))))

@@ -18,6 +18,8 @@ _NEAR = 0.06
 _CI95 = 1.96
 #: No frequency is known better than the clock and the structure of the model allow.
 _FLOOR = 1e-3
+#: Nor a damping, which friction and backlash change with the level (logarithm, one deviation).
+_DAMPING_FLOOR = 0.15
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ def modes_of(fit: ProductFit, f: FloatArray) -> tuple[FoundMode, ...]:
             i = min(near)[1]
             pair = model.pairs[i]
             spread = float(np.hypot(deviations[first + 2 * i], _FLOOR))
-            of_damping = float(deviations[first + 2 * i + 1])
+            of_damping = float(np.hypot(deviations[first + 2 * i + 1], _DAMPING_FLOOR))
             signed = float(height) if kind == "resonance" else -float(height)
             found.append(
                 FoundMode(

@@ -19,8 +19,10 @@ TURN = 2.0 * np.pi
 _WORTH = 0.8
 #: Further real poles cost little and must be worth it, too.
 _WORTH_REAL = 0.85
-_MOST_PAIRS, _MOST_REAL = 5, 3
-_STEPS = 40
+_MOST_PAIRS, _MOST_REAL = 4, 3
+_STEPS = 30
+#: Residuals of neighbours that correlate less than this are scatter, which no mode explains.
+_WHITE = 0.2
 _GRID, _START_DAMPING = 36, (0.02, 0.1)
 #: Damping and delay stay within; pairs up to this far beyond the lines.
 _DAMPING = (5e-4, 0.5)
@@ -107,15 +109,19 @@ def fit_product(f: FloatArray, response: ComplexArray, weight: FloatArray) -> Pr
     w = weight / float(np.sqrt(np.mean(weight**2)))
     best = _start(f, response, w)
     for _ in range(_MOST_PAIRS):
+        if _alike(w * log_ratio(response, best, f)) < _WHITE:
+            break
         more = _with_pair(best, f, response, w)
         if more is None or _cost(more, f, response, w) > _WORTH * _cost(best, f, response, w):
             break
-        best = more
-    if len(best.poles_hz) < _MOST_REAL:
-        more = _refined(replace(best, poles_hz=(*best.poles_hz, float(f[-1]))), f, response, w)
-        if _cost(more, f, response, w) < _WORTH_REAL * _cost(best, f, response, w):
-            best = more
+        best = _with_real(more, f, response, w)
     return _described(best, f, response, w)
+
+
+def _alike(left: ComplexArray) -> float:
+    """Correlation of neighbours."""
+    near = float(np.vdot(left[:-1], left[1:]).real)
+    return near / max(float(np.sum(np.abs(left) ** 2)), 1e-300)
 
 
 def _cost(model: ProductModel, f: FloatArray, response: ComplexArray, w: FloatArray) -> float:
@@ -137,6 +143,27 @@ def _start(f: FloatArray, response: ComplexArray, w: FloatArray) -> ProductModel
     for other in rows[1:]:
         if _cost(other, f, response, w) < _WORTH_REAL * _cost(best, f, response, w):
             best = other
+    return best
+
+
+def _with_real(
+    model: ProductModel, f: FloatArray, response: ComplexArray, w: FloatArray
+) -> ProductModel:
+    """Real poles that show only now that a mode is explained."""
+    best = model
+    while len(best.poles_hz) < _MOST_REAL:
+        tried = [
+            _refined(
+                replace(best, gain=sign * best.gain, poles_hz=(*best.poles_hz, corner)),
+                f, response, w,
+            )
+            for corner in (float(f[0]) / 3.0, float(np.sqrt(f[0] * f[-1])), float(f[-1]))
+            for sign in (1.0, -1.0)
+        ]  # fmt: skip
+        more = min(tried, key=lambda each: _cost(each, f, response, w))
+        if _cost(more, f, response, w) > _WORTH_REAL * _cost(best, f, response, w):
+            break
+        best = more
     return best
 
 
@@ -163,7 +190,7 @@ def _with_pair(
     tried.sort(key=lambda row: row[0])
     best: ProductModel | None = None
     single = [row for row in tried if len(row[1]) == 1][:3]
-    for _, pairs in [*tried[:3], *single]:
+    for _, pairs in [*tried[:2], *single[:2]]:
         found = _refined(replace(model, pairs=(*model.pairs, *pairs)), f, response, w)
         # A pair alone is simpler than two.
         price = _WORTH ** len(pairs)
@@ -209,7 +236,13 @@ def _refined(
 
     x0 = np.clip(vector_of(model), low + span, high - span)
     found = least_squares(
-        error, x0, slopes, bounds=(low, high), loss="soft_l1", f_scale=0.3, max_nfev=_STEPS,
+        error,
+        x0,
+        slopes,
+        bounds=(low, high),
+        loss="soft_l1",
+        f_scale=0.3,
+        max_nfev=_STEPS,
         x_scale="jac",
     )
     return model_of(np.asarray(found.x), model)
@@ -240,7 +273,6 @@ def _described(
     weighted = w * left
     freedom = max(2 * f.size - stacked.shape[1], 1)
     square = float(np.sum(np.abs(weighted) ** 2)) / freedom
-    near = float(np.vdot(weighted[:-1], weighted[1:]).real)
-    share = np.clip(near / max(float(np.sum(np.abs(weighted) ** 2)), 1e-300), 0.0, 0.9)
+    share = min(max(_alike(weighted), 0.0), 0.9)
     covariance = np.linalg.pinv(stacked.T @ stacked) * square * (1 + share) / (1 - share)
     return ProductFit(model, np.asarray(covariance), left, float(np.sqrt(square)))
