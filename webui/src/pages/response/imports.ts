@@ -1,7 +1,7 @@
 import type { ImportedAxis, ImportedFacts, Sweep } from './results'
-import type { operations, RecordingPreview } from '../../api/schema'
+import type { paths, RecordingPreview } from '../../api/schema'
 
-type Query = operations['import_recording_api_v1_measurements_import_post']['parameters']['query']
+type Query = paths['/api/v1/measurements/import']['post']['parameters']['query']
 
 export const INPUT_UNITS = [
   'A', 'mA', 'Nm', 'mNm', 'rated', 'percent', 'permille', 'rad/s', 'rpm', '1',
