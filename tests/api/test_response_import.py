@@ -83,12 +83,8 @@ def test_a_filtered_speed_gives_no_inertia(station: Station) -> None:
     [b"", os.urandom(1 << 16), gzip.compress(b"\0" * (300 << 20), 1), b"1,2\n" * 10, b"{}" * 999],
     ids=["empty", "binary", "bomb", "short", "json"],
 )
-def test_hostile_files_are_refused_and_the_server_answers(
-    station: Station, content: bytes
-) -> None:
-    answer = station.http.post(
-        "/measurements/import", params=QUERY, content=content, timeout=60
-    )
+def test_hostile_files_are_refused_and_the_server_answers(station: Station, content: bytes) -> None:
+    answer = station.http.post("/measurements/import", params=QUERY, content=content, timeout=60)
     assert answer.status_code == 409, answer.text
     problem = answer.json()
     assert problem["type"] == "urn:servodeck:bad-recording"

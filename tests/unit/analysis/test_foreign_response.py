@@ -79,7 +79,9 @@ def test_a_linear_axis_comes_out_as_it_is() -> None:
     assert {m.row.kind for m in found.modes} == set(truth)
 
 
-def share_held(found: ForeignResponse, bench: Bench, torque: np.ndarray, lines: np.ndarray) -> float:
+def share_held(
+    found: ForeignResponse, bench: Bench, torque: np.ndarray, lines: np.ndarray
+) -> float:
     """Share of another run's lines inside the band in size and in phase."""
     u, y = bench.record(torque, RATE, 77)
     n = round(RATE)

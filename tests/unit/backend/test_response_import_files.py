@@ -23,11 +23,15 @@ Y = np.round(np.cumsum(U) / 50.0, 5)
 
 
 def text(
-    separator: str = ",", comma: bool = False, head: str = "time_s{s}in{s}out\n", time: object = None
+    separator: str = ",",
+    comma: bool = False,
+    head: str = "time_s{s}in{s}out\n",
+    time: object = None,
 ) -> str:
     times = T if time is None else time
     rows = [
-        separator.join(f"{v:.6g}" for v in row) for row in zip(times, U, Y, strict=True)  # type: ignore[call-overload]
+        separator.join(f"{v:.6g}" for v in row)
+        for row in zip(times, U, Y, strict=True)  # type: ignore[call-overload]
     ]
     body = "\n".join(rows)
     return head.replace("{s}", separator) + (body.replace(".", ",") if comma else body) + "\n"
@@ -90,9 +94,7 @@ def test_columns_by_name_without_its_unit_and_by_number() -> None:
 
 
 def test_a_twincat_scope_export_has_a_time_for_each_channel() -> None:
-    rows = "".join(
-        f"{t:g}\t{u}\t{t:g}\t{y}\n" for t, u, y in zip(T * 1e3, U, Y, strict=True)
-    )
+    rows = "".join(f"{t:g}\t{u}\t{t:g}\t{y}\n" for t, u, y in zip(T * 1e3, U, Y, strict=True))
     table = read_table((TWINCAT + rows).encode(), "scope.csv")
     assert [n.split(" ")[0] for n in table.names] == ["Name", "Torque", "Name", "Velocity"]
     found = signals_of(
