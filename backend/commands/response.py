@@ -177,7 +177,9 @@ def _candidate(row: dict[str, object]) -> str:
 
 
 def _method(answer: dict[str, object], said: dict[str, object]) -> str:
-    low, high = answer["valid_band_hz"]  # type: ignore[misc]
+    band = answer["valid_band_hz"]
+    assert isinstance(band, list)
+    low, high = float(band[0]), float(band[1])
     if said["method"] == "periods":
         how = (
             f"periodic excitation, period {said['period_s']:.6g} s: {answer['periods_used']} "

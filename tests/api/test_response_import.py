@@ -1,4 +1,4 @@
-"""Recordings of other programs through the interface: columns, evaluation, storage, hostile files."""
+"""Recordings of other programs through the interface: columns, storage, hostile files."""
 
 from __future__ import annotations
 

@@ -158,8 +158,8 @@ def test_what_supports_no_answer_says_why() -> None:
     rng = np.random.default_rng(1)
     with pytest.raises(NoResponse, match="incoherent"):
         evaluate(rng.normal(size=20000), rng.normal(size=20000), RATE)
+    t = np.arange(5000) / RATE
     with pytest.raises(NoResponse, match="few-lines"):
-        t = np.arange(5000) / RATE
         evaluate(np.sin(2 * np.pi * 50 * t), np.cos(2 * np.pi * 50 * t), RATE)
     with pytest.raises(NoResponse, match="input-constant"):
         evaluate(np.ones(5000), rng.normal(size=5000), RATE)
