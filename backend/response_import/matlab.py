@@ -37,7 +37,8 @@ def read_matlab(data: bytes, name: str) -> tuple[tuple[str, ...], tuple[FloatArr
     from scipy.io import loadmat
 
     try:
-        found = loadmat(io.BytesIO(data), squeeze_me=False, struct_as_record=True,
+        file: Any = io.BytesIO(data)
+        found = loadmat(file, squeeze_me=False, struct_as_record=True,
                         chars_as_strings=True)  # fmt: skip
     except Exception as error:
         # A damaged file makes this reader raise nearly anything; it runs in a process of its own.

@@ -99,7 +99,7 @@ def _friction_pole(model: ProductModel, filter_hz: float | None) -> int | None:
     """Number of the lowest real pole that is not the filter's."""
     rows = [(corner, i) for i, corner in enumerate(model.poles_hz)]
     if filter_hz is not None and len(rows) > 1:
-        rows.remove(min(rows, key=lambda row: abs(np.log(row[0] / filter_hz))))
+        rows.remove(min(rows, key=lambda row: abs(float(np.log(row[0] / filter_hz)))))
     return min(rows)[1] if rows else None
 
 

@@ -252,8 +252,8 @@ def jacobian(model: ProductModel, f: FloatArray) -> ComplexArray:
     """Change of the logarithm [lines, parameters] with `vector_of`."""
     columns = [np.ones(f.size, dtype=np.complex128), -2e-3j * np.pi * f]
     for corner in model.poles_hz:
-        x = 1j * f / corner
-        columns.append(x / (1.0 + x))
+        turned = 1j * f / corner
+        columns.append(turned / (1.0 + turned))
     for pair in model.pairs:
         x = f / pair.frequency_hz
         sign = 1.0 if pair.kind == "antiresonance" else -1.0
