@@ -99,7 +99,8 @@ def _friction_pole(model: ProductModel, filter_hz: float | None) -> int | None:
     """Number of the lowest real pole that is not the filter's."""
     rows = [(corner, i) for i, corner in enumerate(model.poles_hz)]
     if filter_hz is not None and len(rows) > 1:
-        rows.remove(min(rows, key=lambda row: abs(float(np.log(row[0] / filter_hz)))))
+        away = [abs(float(np.log(corner / filter_hz))) for corner, _ in rows]
+        rows.pop(int(np.argmin(away)))
     return min(rows)[1] if rows else None
 
 

@@ -26,7 +26,6 @@ export const saidOfImports = {
     "the phase is {deg}° at {hz} Hz; from a torque to the speed of the same shaft it stays within ±90°. The output is filtered, late, or another shaft's: no inertia, notch or gain is concluded.{filtered}",
     '{hz} Hz 处相位为 {deg}°；从转矩到同一轴的速度，相位应在 ±90° 之内。输出经过滤波、滞后，或属于另一根轴：不得出惯量、陷波或增益。{filtered}',
   ],
-  'said.iConstant': ["the column '{column}' is constant", '列“{column}”为常数'],
   'said.iIncoherent': [
     'check which columns are input and output, or excite more strongly',
     '请检查哪些列是输入和输出，或加大激励',
