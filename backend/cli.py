@@ -50,6 +50,10 @@ COMMANDS = {
         "measure:sweep",
         "Measure a frequency response and write it as JSON. The axis moves.",
     ),
+    "response": (
+        "response:app",
+        "Frequency responses from recordings of other programs. Nothing moves.",
+    ),
     "inertia": (
         "measure:inertia",
         "Measure inertia and friction and write them as JSON. The axis moves.",

@@ -10,6 +10,7 @@ import numpy as np
 
 from backend.axis import Envelope
 from backend.measurements import BadMeasurement, Measurement
+from backend.response_import import stored as response_import
 from backend.tools import inertia_evaluation, sweep_evaluation
 from backend.tools import step_response as step_tool
 from backend.tools.recording import Recording
@@ -60,6 +61,8 @@ def recompute(measurement: Measurement) -> dict[str, object]:
                 return sweep_evaluation.as_json(sweep_evaluation.reevaluate(arrays, meta))
             case "inertia":
                 return inertia_evaluation.as_json(inertia_evaluation.reevaluate(arrays, meta))
+            case "response-import":
+                return response_import.reevaluate(arrays, meta)
             case "step":
                 return _step(measurement)
     except (

@@ -106,6 +106,23 @@ def pack(
     return _zipped(head, arrays)
 
 
+def pack_other(
+    kind: str,
+    title: str,
+    arrays: Mapping[str, npt.NDArray[np.generic]],
+    meta: Mapping[str, object],
+    saved: datetime,
+    result: Mapping[str, object] | None = None,
+) -> bytes:
+    """A file's contents where no drive of this station measured; ``title`` stands for its name."""
+    head = {
+        **meta, "version": VERSION, "kind": kind, "saved": saved.isoformat(), "drive": title,
+        "program": backend.__version__, "profile": "", "profile_version": "", "identity": None,
+        "result": result,
+    }  # fmt: skip
+    return _zipped(head, arrays)
+
+
 def _zipped(head: Mapping[str, object], arrays: Mapping[str, npt.NDArray[np.generic]]) -> bytes:
     out = io.BytesIO()
     text = np.frombuffer(json.dumps(head, default=str).encode(), dtype=np.uint8)

@@ -166,6 +166,8 @@ _API: dict[str, Need] = {
     "POST /drives/{drive_id}/tune/undo": _PARAMETERS,
     "GET /measurements": _LOOK,
     "POST /measurements": _FILES_UPLOAD,
+    "POST /measurements/import": _FILES_UPLOAD,
+    "POST /measurements/import/preview": _FILES_UPLOAD,
     "GET /measurements/{name}": _LOOK,
     "GET /measurements/{name}/file": _LOOK,
     "DELETE /measurements/{name}": _FILES,

@@ -55,7 +55,8 @@ def measurement_head(bench: Bench, name: str) -> Head:
         raise NotFound(error.message, value=name) from error
 
 
-def _info(name: str, found: Head) -> MeasurementInfo:
+def info_of(name: str, found: Head) -> MeasurementInfo:
+    """One row of the list."""
     identity = found.meta.get("identity")
     serial = identity.get("serial") if isinstance(identity, dict) else None
     return MeasurementInfo(
@@ -74,7 +75,7 @@ def _listed(bench: Bench) -> list[MeasurementInfo]:
     rows = []
     for name in bench.measurements.names():
         try:
-            rows.append(_info(name, bench.measurements.head(name)))
+            rows.append(info_of(name, bench.measurements.head(name)))
         except BadMeasurement as error:
             rows.append(
                 MeasurementInfo(
@@ -92,7 +93,7 @@ async def read_measurement(bench: TheBench, name: str) -> MeasurementContent:
     made = await asyncio.to_thread(evaluate, found)
     settings = found.meta.get("settings")
     return MeasurementContent(
-        info=_info(name, found.head),
+        info=info_of(name, found.head),
         settings=settings if isinstance(settings, dict) else {},
         result=made.result,
         agrees=made.agrees,
@@ -131,7 +132,7 @@ async def upload_measurement(
         )
     whole = name.removesuffix(SUFFIX) + SUFFIX
     stored = await asyncio.to_thread(bench.measurements.store, whole, data)
-    return _info(stored, bench.measurements.head(stored))
+    return info_of(stored, bench.measurements.head(stored))
 
 
 @router.delete("/measurements/{name}", status_code=204)

@@ -10,7 +10,13 @@ import numpy as np
 import numpy.typing as npt
 from fastapi import APIRouter
 
-from backend.api import convert, routes_design, routes_measurements, routes_report
+from backend.api import (
+    convert,
+    routes_design,
+    routes_measurements,
+    routes_report,
+    routes_response_import,
+)
 from backend.api.context import Controlled, TheBench, TheMember
 from backend.api.models import JobInfo
 from backend.api.models_tune import (
@@ -45,7 +51,7 @@ from backend.tools.tune_apply import take_back
 from drivers.errors import DriveError
 
 router = APIRouter()
-for part in (routes_design, routes_measurements, routes_report):
+for part in (routes_design, routes_measurements, routes_report, routes_response_import):
     router.include_router(part.router)
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]

@@ -1884,6 +1884,46 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/measurements/import": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Import Recording
+         * @description Evaluate a recording of another program and store it; the body is the file.
+         */
+        post: operations["import_recording"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/measurements/import/preview": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Preview Recording
+         * @description Columns of a recording of another program; the body is the file. Nothing is stored.
+         */
+        post: operations["preview_recording"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/measurements/{name}": {
         parameters: {
             query?: never;
@@ -6313,6 +6353,48 @@ export interface components {
             value: number | string | null;
         };
         /**
+         * RecordingColumn
+         * @description One column of a recording.
+         */
+        RecordingColumn: {
+            /**
+             * Curve
+             * @description every n-th value
+             */
+            curve: number[];
+            /**
+             * First
+             * @description its first values; null: no number
+             */
+            first: (number | null)[];
+            /** High */
+            high: number;
+            /** Low */
+            low: number;
+            /**
+             * Missing
+             * @description rows without a number
+             */
+            missing: number;
+            /** Name */
+            name: string;
+            /**
+             * Number
+             * @description from 1, as it may be given instead of the name
+             */
+            number: number;
+            /**
+             * Rises
+             * @description whether every value is above the one before, as a time is
+             */
+            rises: boolean;
+            /**
+             * Unit
+             * @description unit of time that its name tells: s, ms, us or ns
+             */
+            unit: string;
+        };
+        /**
          * RecordingDetail
          * @description A recording with its events and the settings of its axes.
          */
@@ -6406,6 +6488,28 @@ export interface components {
              */
             reserve_bytes: number;
             retention: components["schemas"]["RetentionBounds"];
+        };
+        /**
+         * RecordingPreview
+         * @description The table that a file holds.
+         */
+        RecordingPreview: {
+            /** Columns */
+            columns: components["schemas"]["RecordingColumn"][];
+            /**
+             * Facts
+             * @description pairs that stand before the table
+             */
+            facts: string[][];
+            /**
+             * First Line
+             * @description line of the file with the first row; 0: no text
+             */
+            first_line: number;
+            /** Form */
+            form: string;
+            /** Rows */
+            rows: number;
         };
         /**
          * Refused
@@ -8071,10 +8175,12 @@ export type RecordTrigger = components['schemas']['RecordTrigger'];
 export type RecordedAxis = components['schemas']['RecordedAxis'];
 export type RecordedChannel = components['schemas']['RecordedChannel'];
 export type RecordedParameter = components['schemas']['RecordedParameter'];
+export type RecordingColumn = components['schemas']['RecordingColumn'];
 export type RecordingDetail = components['schemas']['RecordingDetail'];
 export type RecordingEvent = components['schemas']['RecordingEvent'];
 export type RecordingInfo = components['schemas']['RecordingInfo'];
 export type RecordingList = components['schemas']['RecordingList'];
+export type RecordingPreview = components['schemas']['RecordingPreview'];
 export type Refused = components['schemas']['Refused'];
 export type Regeneration = components['schemas']['Regeneration'];
 export type ReportInfo = components['schemas']['ReportInfo'];
@@ -23529,6 +23635,302 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MeasurementInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    import_recording: {
+        parameters: {
+            query: {
+                /** @description name of the file, for messages */
+                name: string;
+                time?: string | null;
+                input: string;
+                output: string;
+                time_unit?: ("s" | "ms" | "us" | "ns") | null;
+                /** @description instead of a time column */
+                sample_rate_hz?: number | null;
+                input_unit?: "Nm" | "mNm" | "A" | "mA" | "rated" | "percent" | "permille" | "rad/s" | "rpm" | "1";
+                output_unit?: "rad/s" | "rpm" | "rev/s" | "deg/s" | "m/s" | "rad" | "rev" | "deg" | "1";
+                rated_torque_nm?: number | null;
+                torque_constant_nm_a?: number | null;
+                structure?: "unknown" | "motor_speed" | "load_speed" | "speed_loop";
+                f_min_hz?: number | null;
+                f_max_hz?: number | null;
+                output_filter_hz?: number | null;
+                current_bandwidth_hz?: number | null;
+                loop_delay_s?: number | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MeasurementInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    preview_recording: {
+        parameters: {
+            query: {
+                /** @description name of the file, for messages */
+                name: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RecordingPreview"];
                 };
             };
             /** @description Not a request of this interface */

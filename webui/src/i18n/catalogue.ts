@@ -9,6 +9,8 @@ import { parameters } from './texts/parameters'
 import { people } from './texts/people'
 import { recordings } from './texts/recordings'
 import { saidTexts } from './texts/said'
+import { imported } from './texts/imported'
+import { saidOfImports } from './texts/said-import'
 import { saidOfTuning } from './texts/said-tuning'
 import { scene } from './texts/scene'
 import { scope } from './texts/scope'
@@ -34,6 +36,8 @@ export const catalogue = {
   ...scope,
   ...segment,
   ...tuning,
+  ...imported,
+  ...saidOfImports,
   ...unwatched,
 }
 export type Key = keyof typeof catalogue

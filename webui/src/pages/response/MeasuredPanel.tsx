@@ -9,6 +9,7 @@ import { type Curve, filtered, measuredCurve, notchFor } from './bode'
 import { BodePlot, type Marker } from './BodePlot'
 import { ExportButtons } from './ExportButtons'
 import { Legend } from './Legend'
+import { ImportedFacts } from './ImportedFacts'
 import { guide, LOOP_VIEWS, type LoopView, loopView } from './loops'
 import { MarkerChips } from './MarkerChips'
 import { Origin } from './Origin'
@@ -109,6 +110,7 @@ export function MeasuredPanel({
         })}
       </p>
       <CursorTable sweep={now} over={before} cursors={cursors} />
+      <ImportedFacts sweep={sweep} />
       {mechanics && <Mechanics sweep={sweep} over={over} notches={notches} />}
       {Object.keys(sweep.margins).length > 0 && (
         <>

@@ -9,6 +9,7 @@ import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { comparable } from './useMeasurements'
 
 /** Stored responses: show one, lay another over it, take in, hand out, delete. */
 export function MeasurementList({
@@ -90,8 +91,12 @@ export function MeasurementList({
                 <Button
                   aria-pressed={over === each.file}
                   variant={over === each.file ? 'filled' : 'default'}
-                  disabled={shown === null || shown === each.file || each.kind !== kind}
-                  title={shown !== null && each.kind !== kind ? t('measured.otherKind') : undefined}
+                  disabled={shown === null || shown === each.file || !comparable(kind, each.kind)}
+                  title={
+                    shown !== null && !comparable(kind, each.kind)
+                      ? t('measured.otherKind')
+                      : undefined
+                  }
                   onClick={() => onOver(over === each.file ? null : each.file)}
                 >
                   {t('measured.compare')}

@@ -6,6 +6,7 @@ import { dateTime } from '../../widgets/format'
 import { JobNote, useJobEnd } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { TRACE_COLORS } from '../scope/channels'
+import { ImportPanel } from './ImportPanel'
 import { useMeasurable } from './useMeasurable'
 import { MeasuredPanel } from './MeasuredPanel'
 import { MeasurementList } from './MeasurementList'
@@ -67,6 +68,13 @@ export function ResponsePage({ drive }: { drive: string }) {
             onOver={setOver}
             onChange={measured.refresh}
           />
+          <ImportPanel
+            onStored={(file) => {
+              if (shown !== null) setOver(shown)
+              setShown(file)
+              void measured.refresh()
+            }}
+          />
         </div>
         <div className="stack">
           <ProblemNote problem={problem ?? other.problem} />
@@ -88,7 +96,7 @@ export function ResponsePage({ drive }: { drive: string }) {
             />
           )}
           <NotchEditor drive={drive} notches={notches} />
-          {mechanics && sweep.trusted && shown !== null && gains && (
+          {mechanics && sweep.trusted && !sweep.imported && shown !== null && gains && (
             <PredictionPanel
               drive={drive}
               file={shown}

@@ -30,6 +30,30 @@ export interface Sweep {
   motion_s: number
   saturated_share: number
   warnings: string[]
+  periods_used?: number
+  /** Of recordings of other programs only. */
+  imported?: ImportedFacts
+  axis?: ImportedAxis | null
+}
+
+/** How a recording of another program was evaluated (backend/response_import/evaluation.py). */
+export interface ImportedFacts {
+  excitation: 'periodic' | 'chirp' | 'noise'
+  method: string
+  period_s: number | null
+  transient_periods: number
+  structure: string
+}
+
+/** What was concluded where the structure was stated; figures only where the verdict is sound. */
+export interface ImportedAxis {
+  verdict: 'sound' | 'not-collocated' | 'no-rigid-part'
+  inertia?: number
+  inertia_ci95?: [number, number]
+  inertia_unit?: string
+  viscous?: number
+  viscous_unit?: string
+  candidates?: Candidate[]
 }
 
 export interface Inertia {

@@ -4,6 +4,13 @@ import type { MeasurementContent, MeasurementInfo, Problem } from '../../api/sch
 import { useLink } from '../../live/store'
 import { asSweep } from './results'
 
+/** Kind of what came from another program; compares with measurements of the mechanics. */
+export const IMPORTED = 'imported-response'
+export const comparable = (one: string | undefined, other: string): boolean =>
+  one === other ||
+  (one === IMPORTED && other === 'sweep-mechanics') ||
+  (one === 'sweep-mechanics' && other === IMPORTED)
+
 /**
  * Stored measurements (of a kind), newest first; those that cannot be used are among them.
  * `asked`: the list, or the problem, is an answer.
@@ -16,7 +23,14 @@ export function useMeasurements(kind: 'sweep-' | '' = 'sweep-') {
   const refresh = useCallback(async () => {
     try {
       const all = await ask(api.GET('/api/v1/measurements'))
-      setList(all.filter((each) => each.kind.startsWith(kind) || each.problem !== ''))
+      setList(
+        all.filter(
+          (each) =>
+            each.kind.startsWith(kind) ||
+            each.problem !== '' ||
+            (kind === 'sweep-' && each.kind === IMPORTED),
+        ),
+      )
       setProblem(null)
     } catch (error) {
       setProblem(problemOf(error))

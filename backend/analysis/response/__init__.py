@@ -1,0 +1,1 @@
+"""Frequency response of recordings that other programs made: excitation, estimate, modes, band."""

@@ -1,0 +1,168 @@
+"""What a response says of an axis where torque and speed are of one shaft.
+
+From a torque to the speed of the same shaft a passive mechanism stays within ±90° at every
+frequency (positive real); a recorded speed that lags more was filtered, or is another shaft's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from backend.analysis.arrays import FloatArray
+from backend.analysis.frf import Frf
+from backend.analysis.mechanical_model import MechanicalModel, Mode
+from backend.analysis.response.foreign import ForeignResponse
+from backend.analysis.response.product_model import TURN, ProductModel
+
+#: Lines beyond ±90° by more than this and their band contradict; so many in a row are no chance.
+_TOLERATED_DEG, _IN_A_ROW = 12.0, 4
+_CI95 = 1.96
+#: A friction pole above this share of the lowest line leaves the inertia to a guess.
+_HIGHEST_POLE = 4.0
+
+
+@dataclass(frozen=True)
+class RigidPart:
+    """``inertia`` of the whole axis and ``viscous`` friction in units of the input, with intervals.
+
+    The viscous part holds what Coulomb friction amounts to at this level.
+    """
+
+    inertia: float
+    inertia_ci95: tuple[float, float]
+    viscous: float
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """Where the response lags or leads more than a collocated one can."""
+
+    phase_deg: float
+    frequency_hz: float
+    filter_hz: float | None
+    """A real pole that the fit found beside friction: the output may be filtered there."""
+
+
+def without_filter(found: ForeignResponse, filter_hz: float | None) -> ForeignResponse:
+    """The response without a first-order low-pass of the recorded output."""
+    if filter_hz is None:
+        return found
+    from dataclasses import replace
+
+    lag = 1.0 + 1j * found.frequency_hz / filter_hz
+    return replace(found, response=np.asarray(found.response * lag))
+
+
+def contradiction(
+    found: ForeignResponse, filter_hz: float | None, delay_s: float
+) -> Contradiction | None:
+    """Whether the lines refute that torque and speed are of one shaft."""
+    bare = without_filter(found, filter_hz)
+    f = bare.frequency_hz
+    turned = np.degrees(np.angle(bare.response * np.exp(2j * np.pi * f * delay_s)))
+    over = np.abs(turned) - 90.0 - _TOLERATED_DEG - _CI95 * found.std_deg
+    run = 0
+    for i, value in enumerate(over):
+        run = run + 1 if value > 0 else 0
+        if run >= _IN_A_ROW:
+            worst = int(np.argmax(over))
+            poles = sorted(found.fit.model.poles_hz) if found.fit else []
+            other = poles[1] if filter_hz is None and len(poles) > 1 else None
+            return Contradiction(float(turned[worst]), float(f[worst]), other)
+        del i
+    return None
+
+
+def rigid_part(found: ForeignResponse, filter_hz: float | None) -> RigidPart | None:
+    """Inertia and friction of the fitted model; nothing where no friction pole is told."""
+    fit = found.fit
+    if fit is None:
+        return None
+    pole = _friction_pole(fit.model, filter_hz)
+    if pole is None or fit.model.poles_hz[pole] > _HIGHEST_POLE * found.frequency_hz[0]:
+        return None
+    corner = fit.model.poles_hz[pole]
+    gain = abs(fit.model.gain) * TURN * corner
+    pick = np.zeros(fit.covariance.shape[0])
+    pick[0] = pick[2 + pole] = 1.0
+    spread = float(np.sqrt(max(pick @ fit.covariance @ pick, 0.0)))
+    # What is common to all lines, as the band counts it.
+    common = float(np.median(found.band.level))
+    factor = float(np.exp(_CI95 * np.hypot(spread, common)))
+    return RigidPart(1.0 / gain, (1.0 / (gain * factor), factor / gain), 1.0 / abs(fit.model.gain))
+
+
+def _friction_pole(model: ProductModel, filter_hz: float | None) -> int | None:
+    """Number of the lowest real pole that is not the filter's."""
+    rows = [(corner, i) for i, corner in enumerate(model.poles_hz)]
+    if filter_hz is not None and len(rows) > 1:
+        away = [abs(float(np.log(corner / filter_hz))) for corner, _ in rows]
+        rows.pop(int(np.argmin(away)))
+    return min(rows)[1] if rows else None
+
+
+def mechanical_model(found: ForeignResponse, filter_hz: float | None) -> MechanicalModel | None:
+    """Sum of a rigid part and modes, from the product of the pairs that are modes.
+
+    Nothing where the pairs do not alternate as those of a collocated response do.
+    """
+    fit = found.fit
+    rigid = rigid_part(found, filter_hz)
+    if fit is None or rigid is None:
+        return None
+    pole = _friction_pole(fit.model, filter_hz)
+    assert pole is not None
+    rate = TURN * fit.model.poles_hz[pole]
+    pairs = [fit.model.pairs[mode.pair] for mode in found.modes]
+    poles = [p for p in pairs if p.kind == "resonance"]
+    zeros = [p for p in pairs if p.kind == "antiresonance"][: len(poles)]
+    order = [p.kind for p in sorted([*poles, *zeros], key=lambda p: p.frequency_hz)]
+    if any(a == b for a, b in pairwise(order)) or (order and order[0] != "antiresonance"):
+        return None
+
+    def value(s: complex, skip: int) -> complex:
+        out: complex = complex(1.0 / (rigid.inertia * rate))
+        for zero in zeros:
+            w = TURN * zero.frequency_hz
+            out *= (s * s + 2 * zero.damping * w * s + w * w) / w**2
+        for i, other in enumerate(poles):
+            w = TURN * other.frequency_hz
+            root = _root(other.frequency_hz, other.damping)
+            factor = (s - root.conjugate()) if i == skip else (
+                s * s + 2 * other.damping * w * s + w * w
+            )  # fmt: skip
+            out *= w**2 / factor
+        return out
+
+    modes = []
+    for i, each in enumerate(poles):
+        root = _root(each.frequency_hz, each.damping)
+        residue = value(root, i) * rate / (root + rate)
+        alpha = 2.0 * residue.real
+        beta = -2.0 * (residue * root.conjugate()).real / alpha
+        modes.append(Mode(each.frequency_hz, each.damping, alpha, beta))
+    gain = (value(complex(-rate), -1) * rate).real
+    if gain <= 0 or any(m.residue <= 0 for m in modes):
+        return None
+    return MechanicalModel(gain, rate, tuple(modes))
+
+
+def _root(frequency_hz: float, damping: float) -> complex:
+    w = TURN * frequency_hz
+    return complex(-damping * w, w * float(np.sqrt(max(1.0 - damping**2, 0.0))))
+
+
+def as_frf(found: ForeignResponse, filter_hz: float | None, delay_s: float, rate: float) -> Frf:
+    """The form that designs take: without the output's filter and the delay of the path."""
+    bare = without_filter(found, filter_hz)
+    f: FloatArray = bare.frequency_hz
+    return Frf(
+        frequency_hz=f,
+        response=np.asarray(bare.response * np.exp(2j * np.pi * f * delay_s)),
+        std_db=found.std_db, std_deg=found.std_deg, coherence=found.coherence,
+        noise=found.noise, distortion=found.distortion, sample_rate_hz=rate,
+        valid_band_hz=found.valid_band_hz, periods_used=found.periods_used, periods_dropped=0,
+    )  # fmt: skip

@@ -1,0 +1,283 @@
+"""From an input and an output that another program recorded to a response with its band. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from backend.analysis.arrays import (
+    ComplexArray,
+    FloatArray,
+    magnitude_db,
+    neighbour_mean,
+    phase_deg,
+)
+from backend.analysis.response.excitation_found import (
+    Excited,
+    excited_lines,
+    find_excitation,
+    transient_periods,
+)
+from backend.analysis.response.local_polynomial import local_polynomial
+from backend.analysis.response.modes_found import FoundMode, modes_of
+from backend.analysis.response.product_model import ProductFit, fit_product
+from backend.analysis.response.repeat_band import RepeatBand, line_scatter, repeat_band
+
+Method = Literal["periods", "local polynomial"]
+
+#: Fewer lines, or samples, are no frequency response.
+LEAST_LINES, LEAST_SAMPLES = 12, 256
+#: Lines of a record without periods; more say nothing more.
+_LINES = 400
+#: Of an input without periods, frequencies that carry this share of the strongest are excited.
+_EXCITED_DB = -30.0
+#: Lines less coherent than this are left out of the fit, and end the band.
+_COHERENT = 0.5
+#: Empty lines that tell distortion, at least.
+_FEWEST_EMPTY = 8
+_CLIPPED = 0.01
+
+
+class NoResponse(ValueError):
+    """The recording supports no answer. ``code`` says which rule it breaks, ``facts`` by what."""
+
+    def __init__(self, code: str, **facts: float) -> None:
+        super().__init__(code)
+        self.code = code
+        self.facts = facts
+
+
+@dataclass(frozen=True)
+class ForeignResponse:
+    """Response [lines] with ``band``; ``noise``, ``distortion`` relative to the line, one sigma.
+
+    ``excitation`` was found in the input, ``method`` follows from it. ``empty`` is the relative
+    motion on lines that are not excited, even and odd ones, where there are such.
+    """
+
+    frequency_hz: FloatArray
+    response: ComplexArray
+    coherence: FloatArray
+    noise: FloatArray
+    distortion: FloatArray
+    band: RepeatBand
+    fit: ProductFit | None
+    modes: tuple[FoundMode, ...]
+    excitation: Excited
+    method: Method
+    period_s: float | None
+    periods_used: int
+    transient_periods: int
+    valid_band_hz: tuple[float, float]
+    clipped_share: float
+    empty: tuple[float | None, float | None] = (None, None)
+
+    @property
+    def std_db(self) -> FloatArray:
+        """One deviation in dB of what another run shows; 1.96 of it to each side are the band."""
+        return np.asarray(20.0 / np.log(10.0) * self.band.real)
+
+    @property
+    def std_deg(self) -> FloatArray:
+        """The same of the phase in degrees."""
+        return np.asarray(np.degrees(self.band.imag))
+
+    @property
+    def magnitude_db(self) -> FloatArray:
+        """Magnitude in dB."""
+        return magnitude_db(self.response)
+
+    @property
+    def phase_deg(self) -> FloatArray:
+        """Unwrapped phase in degrees."""
+        return phase_deg(self.response)
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """An estimate before its band: ``noise`` relative, one component."""
+
+    frequency_hz: FloatArray
+    response: ComplexArray
+    coherence: FloatArray
+    noise: FloatArray
+    period_s: float | None = None
+    used: int = 0
+    dropped: int = 0
+    empty: tuple[float | None, float | None] = (None, None)
+    independent: bool = True
+
+
+def evaluate(
+    signal_in: FloatArray, signal_out: FloatArray, sample_rate_hz: float,
+    band_hz: tuple[float, float] | None = None,
+) -> ForeignResponse:  # fmt: skip
+    """Response from input to output, both [n], evenly sampled.
+
+    Raises:
+        NoResponse: too short, constant, or nothing coherent in it.
+    """
+    n = signal_in.size
+    if n < LEAST_SAMPLES:
+        raise NoResponse("too-short", samples=n, least=LEAST_SAMPLES)
+    for code, signal in (("input-constant", signal_in), ("output-constant", signal_out)):
+        if float(np.ptp(signal)) <= 1e-9 * float(np.max(np.abs(signal)) + 1e-300):
+            raise NoResponse(code, value=float(signal[0]))
+    found = find_excitation(signal_in)
+    if found.kind == "periodic":
+        lines = _by_periods(signal_in, signal_out, sample_rate_hz, found.period_samples)
+    else:
+        lines = _by_window(signal_in, signal_out, sample_rate_hz)
+    lines = _cut(lines, band_hz)
+    result = _with_band(lines)
+    return replace(
+        result,
+        excitation=found.kind,
+        method="periods" if found.kind == "periodic" else "local polynomial",
+        clipped_share=_clipped(signal_in),
+    )
+
+
+def _cut(lines: _Lines, band_hz: tuple[float, float] | None) -> _Lines:
+    use = np.ones(lines.frequency_hz.size, dtype=bool)
+    if band_hz is not None:
+        use = (lines.frequency_hz >= band_hz[0]) & (lines.frequency_hz <= band_hz[1])
+    count = int(np.count_nonzero(use))
+    if count < LEAST_LINES:
+        raise NoResponse("few-lines", lines=count, least=LEAST_LINES)
+    return replace(
+        lines, frequency_hz=lines.frequency_hz[use], response=lines.response[use],
+        coherence=lines.coherence[use], noise=lines.noise[use],
+    )  # fmt: skip
+
+
+def _by_periods(u: FloatArray, y: FloatArray, rate: float, period: int) -> _Lines:
+    """Mean over the settled periods; noise by how they differ."""
+    count = u.size // period
+    rows_u, rows_y = (x[x.size - count * period :].reshape(count, period) for x in (u, y))
+    dropped = transient_periods(rows_u, rows_y)
+    # A drift between the periods is no motion of the axis at its lines.
+    spectra_u, spectra_y = (_spectra(rows[dropped:]) for rows in (rows_u, rows_y))
+    mean_u, mean_y = spectra_u.mean(axis=0), spectra_y.mean(axis=0)
+    used = count - dropped
+    deviation = np.std(spectra_u, axis=0, ddof=1) / np.sqrt(used)
+    lines = excited_lines(np.abs(mean_u), deviation)
+    if lines.size < LEAST_LINES:
+        raise NoResponse("few-lines", lines=lines.size, least=LEAST_LINES)
+    g = mean_y[lines] / mean_u[lines]
+    error = spectra_y[:, lines] - g * spectra_u[:, lines]
+    variance = np.sum(np.abs(error) ** 2, axis=0) / max(used - 1, 1) / used
+    relative = np.sqrt(neighbour_mean(variance / np.abs(mean_y[lines]) ** 2, 2) / 2.0)
+    return _Lines(
+        lines * (rate / period), np.asarray(g), np.ones(lines.size), np.asarray(relative),
+        period / rate, used, dropped, _on_empty(mean_u, mean_y, lines, g),
+    )  # fmt: skip
+
+
+def _spectra(rows: FloatArray) -> ComplexArray:
+    steps = np.linspace(-0.5, 0.5, rows.shape[1], endpoint=False)
+    drift = rows[:, -1] - rows[:, 0]
+    slope = np.median(drift) if rows.shape[0] > 1 else 0.0
+    # Only what all periods share, and only where it is a drift and not the signal itself.
+    means = rows.mean(axis=1)
+    slope = float(np.polyfit(np.arange(means.size), means, 1)[0]) if means.size > 1 else slope
+    level = rows - means[:, None] - slope * steps
+    return np.asarray(np.fft.rfft(level, axis=1))
+
+
+def _on_empty(
+    mean_u: ComplexArray, mean_y: ComplexArray, lines: np.ndarray, g: ComplexArray
+) -> tuple[float | None, float | None]:
+    """Motion on empty bins between the lines relative to that on lines around, even and odd."""
+    empty = np.setdiff1d(np.arange(lines[0], lines[-1] + 1), lines)
+    found: list[float | None] = []
+    for parity in (0, 1):
+        bins = empty[empty % 2 == parity]
+        if bins.size < _FEWEST_EMPTY:
+            found.append(None)
+            continue
+        near = np.asarray(np.interp(bins, lines, g.real) + 1j * np.interp(bins, lines, g.imag))
+        around = np.interp(bins, lines, np.abs(mean_y[lines]))
+        left = np.abs(mean_y[bins] - near * mean_u[bins]) / around
+        found.append(float(np.sqrt(np.mean(left**2))))
+    return found[0], found[1]
+
+
+def _by_window(u: FloatArray, y: FloatArray, rate: float) -> _Lines:
+    """Local polynomials on the spectrum of the whole record: no window, transient estimated."""
+    n = u.size
+    spectra = [np.fft.rfft(x - np.mean(x)) for x in (u, y)]
+    power = np.abs(spectra[0]) ** 2
+    reach = max(round(n / rate), 8)
+    level = 10.0 * np.log10(neighbour_mean(power, reach) + 1e-300)
+    usable = np.arange(8, power.size - 8)
+    strong = usable[level[usable] > np.max(level[usable]) + _EXCITED_DB]
+    if strong.size < LEAST_LINES:
+        raise NoResponse("few-lines", lines=strong.size, least=LEAST_LINES)
+    step = max((strong[-1] - strong[0]) // _LINES, 1)
+    half = max(8, int(step))
+    centres = np.arange(max(strong[0], half), strong[-1] + 1, step)
+    centres = centres[np.isin(centres, strong)]
+    if centres.size < LEAST_LINES:
+        raise NoResponse("few-lines", lines=centres.size, least=LEAST_LINES)
+    found = local_polynomial(spectra[0], spectra[1], np.asarray(centres), half)
+    relative = np.sqrt(found.variance / 2.0) / np.maximum(np.abs(found.response), 1e-300)
+    return _Lines(
+        centres * (rate / n), found.response, found.coherence, np.asarray(relative),
+        independent=False,
+    )  # fmt: skip
+
+
+def _with_band(lines: _Lines) -> ForeignResponse:
+    f, g = lines.frequency_hz, lines.response
+    fit = _fitted(lines)
+    modes = modes_of(fit, f) if fit is not None else ()
+    left = fit.residual if fit is not None else np.log(g / np.abs(g).max())
+    if fit is None:
+        left = np.asarray(np.log(np.abs(g)) + 1j * np.unwrap(np.angle(g)))
+    scatter = line_scatter(left, lines.noise)
+    known = [e for e in lines.empty if e is not None]
+    if known:
+        # What lies on the empty lines lies on the excited ones, too.
+        scatter = np.maximum(scatter, max(known) / np.sqrt(2.0))
+    band = repeat_band(f, scatter, fit.model if fit is not None else None, modes)
+    coherence = lines.coherence
+    if lines.independent:
+        # What one run's line is made of: the linear part against noise and distortion.
+        coherence = 1.0 / (1.0 + 2.0 * scatter**2)
+    return ForeignResponse(
+        f, g, np.asarray(coherence), lines.noise,
+        np.sqrt(np.maximum(scatter**2 - lines.noise**2, 0.0)), band, fit, modes, "noise",
+        "local polynomial", lines.period_s, lines.used, lines.dropped, _band_hz(f, coherence),
+        0.0, lines.empty,
+    )  # fmt: skip
+
+
+def _fitted(lines: _Lines) -> ProductFit | None:
+    use = (lines.coherence > _COHERENT) & (lines.noise < 0.5) & (np.abs(lines.response) > 0)
+    if np.count_nonzero(use) < LEAST_LINES:
+        raise NoResponse("incoherent", coherence=float(np.median(lines.coherence)))
+    weight = 1.0 / np.hypot(lines.noise, 0.03)
+    found = fit_product(lines.frequency_hz[use], lines.response[use], weight[use])
+    if found is None:
+        return None
+    model = found.model
+    left = np.log(lines.response / model.response(lines.frequency_hz))
+    return replace(found, residual=np.asarray(left))
+
+
+def _band_hz(f: FloatArray, coherence: FloatArray) -> tuple[float, float]:
+    """From the first to the last coherent line."""
+    good = np.flatnonzero(coherence > _COHERENT)
+    if good.size < LEAST_LINES:
+        raise NoResponse("incoherent", coherence=float(np.median(coherence)))
+    return float(f[good[0]]), float(f[good[-1]])
+
+
+def _clipped(u: FloatArray) -> float:
+    """Share of samples at the very highest or lowest value of the input."""
+    low, high = float(np.min(u)), float(np.max(u))
+    near = 1e-6 * (high - low)
+    return float(np.mean((u >= high - near) | (u <= low + near)))

@@ -1,0 +1,73 @@
+"""Resonances and antiresonances that a fitted response shows, with intervals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from backend.analysis.arrays import FloatArray
+from backend.analysis.resonance import Resonance
+from backend.analysis.response.product_model import ProductFit
+
+#: A peak or valley stands out so much from the curve, without its slope.
+_LEAST_DB = 3.0
+#: A pair belongs to an extremum that is nearer than this share.
+_NEAR = 0.06
+_CI95 = 1.96
+#: No frequency is known better than the clock and the structure of the model allow.
+_FLOOR = 1e-3
+#: Nor a damping, which friction and backlash change with the level (logarithm, one deviation).
+_DAMPING_FLOOR = 0.15
+
+
+@dataclass(frozen=True)
+class FoundMode:
+    """``pair`` is its number in the model; ``row`` what is told of it."""
+
+    pair: int
+    row: Resonance
+
+
+def modes_of(fit: ProductFit, f: FloatArray) -> tuple[FoundMode, ...]:
+    """Modes ascending; only those that are a peak or a valley of the curve inside the lines."""
+    model = fit.model
+    dense = np.geomspace(f[0], f[-1], 4000)
+    db = 20.0 * np.log10(np.maximum(np.abs(model.response(dense)), 1e-300))
+    x = np.log(dense)
+    flat = db - np.polyval(np.polyfit(x, db, 1), x)
+    deviations = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    first = 2 + len(model.poles_hz)
+    found: list[FoundMode] = []
+    for kind, curve in (("resonance", flat), ("antiresonance", -flat)):
+        places, facts = find_peaks(curve, prominence=_LEAST_DB)
+        for place, height in zip(places, facts["prominences"], strict=True):
+            near = [
+                (abs(np.log(p.frequency_hz / dense[place])) + 0.1 * p.damping, i)
+                for i, p in enumerate(model.pairs)
+                if p.kind == kind and abs(np.log(p.frequency_hz / dense[place])) < _NEAR
+            ]
+            if not near:
+                continue
+            i = min(near)[1]
+            pair = model.pairs[i]
+            spread = float(np.hypot(deviations[first + 2 * i], _FLOOR))
+            of_damping = float(np.hypot(deviations[first + 2 * i + 1], _DAMPING_FLOOR))
+            signed = float(height) if kind == "resonance" else -float(height)
+            found.append(
+                FoundMode(
+                    i,
+                    Resonance(
+                        "resonance" if kind == "resonance" else "antiresonance",
+                        pair.frequency_hz, pair.damping, signed,
+                        _around(pair.frequency_hz, spread), _around(pair.damping, of_damping),
+                    ),
+                )
+            )  # fmt: skip
+    return tuple(sorted(found, key=lambda mode: mode.row.frequency_hz))
+
+
+def _around(value: float, deviation: float) -> tuple[float, float]:
+    factor = float(np.exp(_CI95 * min(deviation, 3.0)))
+    return value / factor, value * factor

@@ -1,0 +1,91 @@
+"""The band of a response: where another run of the same machine puts each line.
+
+Noise between periods is the least part of it. Friction, backlash, ripple and the measured current
+distort each line by what depends on the excitation's phases (stochastic nonlinear contribution,
+Pintelon & Schoukens 2012, section 3.4): seen from one excitation as roughness from line to line,
+and on lines that are not excited. A second run has its own distortion, whose variance adds.
+What changes with the level is smooth over the lines and not seen in one run at all; it is charged
+by what friction and backlash can move: the pole that friction makes, and frequency and damping of
+modes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray, neighbour_mean
+from backend.analysis.response.local_polynomial import smooth_residual
+from backend.analysis.response.modes_found import FoundMode
+from backend.analysis.response.product_model import ProductModel, jacobian
+
+#: Lines to each side of the local parabola, and of the mean of what it leaves.
+_REACH, _POOL = 6, 8
+#: One deviation each, fitted to simulated benches (two masses with Coulomb and Stribeck friction,
+#: backlash, ripple; 0.5 to 2 times the level): `benchmarks/import_accuracy.py` prints the coverage.
+MODE_SHIFT, DAMPING_SHIFT, FRICTION_SHIFT = 0.004, 0.25, 0.35
+#: A pole is friction's, not a filter's, up to so many times the lowest line.
+_FRICTION_BELOW = 2.0
+#: Gain by temperature of magnets and amplifier, phase by sampling: of any two runs.
+_GAIN, _TURN = 0.01, 0.01
+#: Two runs differ by the variances of both; the other one's may be twice this one's, as at 0.7
+#: times the level, where friction distorts more.
+_BOTH = 3.0
+
+
+@dataclass(frozen=True)
+class RepeatBand:
+    """Deviations [lines] of the logarithm: ``real`` (size) and ``imag`` (phase, radians).
+
+    ``scatter`` is what one run's line is off by stochastically, one component;
+    ``level`` what another level may move, both components.
+    """
+
+    real: FloatArray
+    imag: FloatArray
+    scatter: FloatArray
+    level: FloatArray
+
+
+def line_scatter(left: ComplexArray, known: FloatArray) -> FloatArray:
+    """Scatter [lines] of one component, from the logarithm's residual of a model.
+
+    ``known`` [lines] is the part that noise explains; the roughness is never less.
+    """
+    rough, kept = smooth_residual(left, _REACH)
+    variance = neighbour_mean(np.abs(rough) ** 2 / (2.0 * np.maximum(kept, 0.2)), _POOL)
+    return np.asarray(np.sqrt(np.maximum(variance, known**2)))
+
+
+def repeat_band(
+    f: FloatArray, scatter: FloatArray, model: ProductModel | None, modes: tuple[FoundMode, ...]
+) -> RepeatBand:
+    """Band from the scatter of the lines and from what another level may move."""
+    real = np.full(f.size, _GAIN**2)
+    imag = np.full(f.size, _TURN**2)
+    if model is not None:
+        for change in _level_changes(f, model, modes):
+            real = real + change.real**2
+            imag = imag + change.imag**2
+    both = _BOTH * scatter**2
+    return RepeatBand(
+        np.sqrt(both + real), np.sqrt(both + imag), scatter, np.sqrt(0.5 * (real + imag))
+    )
+
+
+def _level_changes(
+    f: FloatArray, model: ProductModel, modes: tuple[FoundMode, ...]
+) -> list[ComplexArray]:
+    slopes = jacobian(model, f)
+    first = 2 + len(model.poles_hz)
+    changes: list[ComplexArray] = []
+    for mode in modes:
+        column = first + 2 * mode.pair
+        changes.append(np.asarray(MODE_SHIFT * slopes[:, column]))
+        changes.append(np.asarray(DAMPING_SHIFT * slopes[:, column + 1]))
+    lowest = min(model.poles_hz, default=np.inf)
+    if lowest < _FRICTION_BELOW * f[0]:
+        # The pole moves while the inertia, and so the gain well above it, stays.
+        changes.append(np.asarray(-FRICTION_SHIFT / (1.0 + 1j * f / lowest)))
+    return changes

@@ -1,0 +1,1 @@
+"""Recordings of other programs as responses: reading the file, units, evaluation, stored form."""

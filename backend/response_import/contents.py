@@ -1,0 +1,323 @@
+"""From a file's bytes to its table: named columns of numbers. Nothing in it is believed.
+
+Text: comma, semicolon, tab or blanks between the columns, decimal point or comma, any lines before
+the table (makers' scopes write several), UTF-8, UTF-16 or Latin-1, and gzip around it. MATLAB: v4
+to v7. A file is refused by its size before it is unpacked in memory.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import re
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.analysis.arrays import FloatArray
+from backend.response_import.errors import BadRecording
+from backend.response_import.matlab import read_matlab
+
+#: Bytes as they come, and unpacked; rows and columns of a table.
+MAX_FILE_BYTES = 64 << 20
+MAX_UNPACKED_BYTES = 256 << 20
+MAX_ROWS, MAX_COLUMNS = 4_000_000, 256
+#: The table begins within so many lines.
+_HEAD_LINES = 400
+_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?$")
+_MISSING = {"", "nan", "-nan", "inf", "-inf", "+inf", "null", "n/a", "#n/a", "none", "-", "1.#qnan"}
+
+
+@dataclass(frozen=True)
+class Table:
+    """``columns`` by number as in the file, ``names`` beside them; NaN where nothing stands.
+
+    ``first_line`` is the line of the file that holds the first row, 0 where there are no lines.
+    ``facts`` are pairs that stood before the table, such as a sample time.
+    """
+
+    names: tuple[str, ...]
+    columns: tuple[FloatArray, ...]
+    first_line: int
+    form: str
+    facts: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def rows(self) -> int:
+        """Length of the longest column."""
+        return max((c.size for c in self.columns), default=0)
+
+
+def read_table(data: bytes, name: str) -> Table:
+    """The table of a file.
+
+    Raises:
+        BadRecording: no table in it, too large, or a format that is not read.
+    """
+    if len(data) > MAX_FILE_BYTES:
+        raise BadRecording(
+            f"{name} has {len(data)} bytes", value=len(data), limit=f"{MAX_FILE_BYTES} bytes",
+            remedy="export a shorter part, or fewer columns",
+        )  # fmt: skip
+    if not data:
+        raise BadRecording(f"{name} is empty", value=0, remedy="export the recording again")
+    data = _unpacked(data, name)
+    if (found := read_matlab(data, name)) is not None:
+        names, columns = found
+        return Table(names, columns, 0, "MAT")
+    _refuse_known(data, name)
+    return _from_text(_decoded(data, name), name)
+
+
+def _unpacked(data: bytes, name: str) -> bytes:
+    """Without gzip; an end of what is unpacked is set before anything is."""
+    if data[:2] != b"\x1f\x8b":
+        return data
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(data)) as packed:
+            plain = packed.read(MAX_UNPACKED_BYTES + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise BadRecording(
+            f"{name} is a damaged gzip file: {error}", value=name, remedy="copy the file again"
+        ) from error
+    if len(plain) > MAX_UNPACKED_BYTES:
+        raise BadRecording(
+            f"{name} unpacks to more than {MAX_UNPACKED_BYTES} bytes",
+            value=name, limit=f"{MAX_UNPACKED_BYTES} bytes",
+            remedy="export a shorter part, or fewer columns",
+        )  # fmt: skip
+    return plain
+
+
+_KNOWN = (
+    (b"PK\x03\x04", "a zip archive or an Excel workbook", "unpack it, or save it as CSV"),
+    (b"\xd0\xcf\x11\xe0", "an old Excel workbook", "save it as CSV"),
+    (b"%PDF", "a PDF", "export the recording as CSV"),
+    (b"TDSm", "a TDMS file", "export it as CSV or MAT"),
+    (b"\x89PNG", "a picture", "export the recording's numbers as CSV"),
+    (b"<?xml", "an XML file", "export the recording as CSV (TwinCAT Scope: Export, CSV)"),
+)
+
+
+def _refuse_known(data: bytes, name: str) -> None:
+    for begin, what, remedy in _KNOWN:
+        if data.lstrip(b"\xef\xbb\xbf").startswith(begin):
+            raise BadRecording(f"{name} is {what}, not a table of numbers", value=name,
+                               remedy=remedy)  # fmt: skip
+
+
+def _decoded(data: bytes, name: str) -> str:
+    for mark, encoding in ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16"),
+                           (b"\xfe\xff", "utf-16")):  # fmt: skip
+        if data.startswith(mark):
+            return _as(data, encoding, name).lstrip("\ufeff")
+    sample = data[:4096]
+    half = max(len(sample) // 2, 1)
+    if sample[1::2].count(0) > 0.4 * half:
+        return _as(data, "utf-16-le", name)
+    if sample[0::2].count(0) > 0.4 * half:
+        return _as(data, "utf-16-be", name)
+    if b"\0" in data[: 1 << 20]:
+        raise BadRecording(
+            f"{name} holds binary data (a zero byte at {data.index(0)})", value=name,
+            remedy="export the recording as CSV or as MATLAB MAT (version 7 or older)",
+        )  # fmt: skip
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        # Every byte is a letter in Latin-1; degree and micro signs of older programs are.
+        return data.decode("latin-1")
+
+
+def _as(data: bytes, encoding: str, name: str) -> str:
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError as error:
+        raise BadRecording(
+            f"{name} is damaged: it begins as {encoding} text and is none at byte {error.start}",
+            value=name, remedy="export it again, as UTF-8",
+        ) from error  # fmt: skip
+
+
+def _split(line: str, separator: str | None) -> list[str]:
+    cells = line.split(separator) if separator is not None else line.split()
+    return [cell.strip().strip('"').strip() for cell in cells]
+
+
+def _is_number(cell: str, comma: bool) -> bool:
+    if comma and "." in cell:
+        return False
+    return bool(_NUMBER.match(cell)) and (comma or "," not in cell)
+
+
+@dataclass(frozen=True)
+class _Layout:
+    separator: str | None
+    comma: bool
+    first: int
+    width: int
+
+
+def _layout(lines: list[str], name: str) -> _Layout:
+    """Separator and decimal sign by which the most lines are rows of as many numbers.
+
+    A row begins the table where the following ones have its width, too.
+    """
+    best: tuple[int, int, _Layout] | None = None
+    for separator, comma in (
+        ("\t", False), ("\t", True), (";", False), (";", True), (",", False), (None, False),
+        (None, True), ("|", False),
+    ):  # fmt: skip
+        run = _longest_run(lines, separator, comma)
+        if run is None:
+            continue
+        count, layout = run
+        score = (count, layout.width)
+        if layout.width >= 2 and (best is None or score > best[:2]):
+            best = (*score, layout)
+    if best is None:
+        first = next((line for line in lines if line.strip()), "")[:60]
+        raise BadRecording(
+            f"{name} holds no table of numbers within its first {_HEAD_LINES} lines; it begins "
+            f"{first!r}", value=name,
+            remedy="export at least two columns of numbers, separated by comma, semicolon or tab",
+        )  # fmt: skip
+    return best[2]
+
+
+def _longest_run(
+    lines: list[str], separator: str | None, comma: bool
+) -> tuple[int, _Layout] | None:
+    """Rows of numbers of one width, at least half of each filled."""
+    best: tuple[int, _Layout] | None = None
+    start, width, count = 0, 0, 0
+    for i, line in enumerate(lines):
+        cells = _split(line, separator)
+        while len(cells) > 1 and cells[-1] == "":
+            cells.pop()
+        numbers = sum(_is_number(c, comma) for c in cells)
+        missing = sum(c.lower() in _MISSING for c in cells)
+        row = bool(cells) and numbers >= 1 and numbers + missing == len(cells)
+        row = row and 2 * numbers >= len(cells)
+        # Rows may end in empty cells, where one channel of several has ended.
+        if row and (count == 0 or abs(len(cells) - width) <= width // 2):
+            if count == 0:
+                start, width = i, len(cells)
+            width, count = max(width, len(cells)), count + 1
+            if best is None or count > best[0]:
+                best = (count, _Layout(separator, comma, start, width))
+        else:
+            count = 0
+            if row:
+                start, width, count = i, len(cells), 1
+    return best
+
+
+def _from_text(text: str, name: str) -> Table:
+    # Only line ends: other characters that Python splits at occur inside units.
+    lines = re.split(r"\r\n|\n|\r", text)
+    if len(lines) > MAX_ROWS + _HEAD_LINES:
+        raise BadRecording(
+            f"{name} has {len(lines)} lines", value=len(lines), limit=f"{MAX_ROWS} lines",
+            remedy="export a shorter part",
+        )  # fmt: skip
+    layout = _layout(lines[:_HEAD_LINES], name)
+    if layout.width > MAX_COLUMNS:
+        raise BadRecording(
+            f"{name} has {layout.width} columns", value=layout.width, limit=str(MAX_COLUMNS),
+            remedy="export fewer columns",
+        )  # fmt: skip
+    rows = lines[layout.first :]
+    while rows and not rows[-1].strip():
+        rows.pop()
+    columns = _numbers(rows, layout, name)
+    names = _names(lines[: layout.first], layout)
+    return Table(names, columns, layout.first + 1, _form(layout), _facts(lines[: layout.first]))
+
+
+def _form(layout: _Layout) -> str:
+    signs = {"\t": "tab", ";": "semicolon", ",": "comma", None: "blanks", "|": "bar"}
+    return f"text, {signs[layout.separator]}" + (", decimal comma" if layout.comma else "")
+
+
+def _numbers(rows: list[str], layout: _Layout, name: str) -> tuple[FloatArray, ...]:
+    fast = _fast(rows, layout)
+    if fast is not None:
+        return tuple(np.ascontiguousarray(c) for c in fast.T)
+    out = np.full((len(rows), layout.width), np.nan)
+    for i, line in enumerate(rows):
+        cells = _split(line, layout.separator)
+        while len(cells) > layout.width and cells[-1] == "":
+            cells.pop()
+        if len(cells) > layout.width:
+            raise BadRecording(
+                f"{name}, line {layout.first + 1 + i}: {len(cells)} columns where the table has "
+                f"{layout.width}", value=line[:80], limit=f"{layout.width} columns",
+                remedy="remove that line, or export the recording again",
+            )  # fmt: skip
+        for j, cell in enumerate(cells):
+            if cell.lower() in _MISSING:
+                continue
+            if not _is_number(cell, layout.comma):
+                raise BadRecording(
+                    f"{name}, line {layout.first + 1 + i}, column {j + 1}: {cell[:40]!r} is no "
+                    "number", value=cell[:40],
+                    remedy="remove that line, or export the recording again",
+                )  # fmt: skip
+            out[i, j] = float(re.sub("[dD]", "e", cell.replace(",", ".")))
+    return tuple(np.ascontiguousarray(c) for c in out.T)
+
+
+def _fast(rows: list[str], layout: _Layout) -> FloatArray | None:
+    """Whole regular tables at once; nothing where any row is irregular."""
+    text = "\n".join(rows)
+    if layout.comma:
+        text = text.replace(",", ".")
+    if '"' in text or "#" in text:
+        return None
+    try:
+        found = np.loadtxt(io.StringIO(text), delimiter=layout.separator, comments=None, ndmin=2)
+    except ValueError:
+        return None
+    return found if found.shape == (len(rows), layout.width) else None
+
+
+def _names(head: list[str], layout: _Layout) -> tuple[str, ...]:
+    """The last line before the table that names its columns, with units of a line below it."""
+    rows = []
+    for line in head:
+        cells = _split(line.lstrip("#%").strip() if layout.separator is None else line.lstrip("#%"),
+                       layout.separator)  # fmt: skip
+        while len(cells) > layout.width and cells[-1] == "":
+            cells.pop()
+        rows.append(cells)
+    fitting = [
+        cells for cells in rows[-12:]
+        if len(cells) == layout.width and sum(bool(c) for c in cells) * 2 >= layout.width
+    ]  # fmt: skip
+    if not fitting:
+        return tuple(f"column {i + 1}" for i in range(layout.width))
+    named = next((cells for cells in fitting if _tells(cells)), fitting[-1])
+    units = fitting[-1] if fitting[-1] is not named else None
+    names = []
+    for i, cell in enumerate(named):
+        unit = units[i] if units else ""
+        short = unit and len(unit) <= 12 and not _is_number(unit, layout.comma)
+        names.append((cell or f"column {i + 1}") + (f" [{unit.strip('[]()')}]" if short else ""))
+    return tuple(names)
+
+
+def _tells(cells: list[str]) -> bool:
+    """A line of names: words, and not twice the same one throughout."""
+    words = [c for c in cells if re.search(r"[^\W\d]", c)]
+    return 2 * len(words) >= len(cells) and len(set(words)) > 1
+
+
+def _facts(head: list[str]) -> tuple[tuple[str, str], ...]:
+    found = []
+    for line in head:
+        cells = [c.strip().strip('"') for c in re.split(r"[\t;:=]|,(?=\s)", line, maxsplit=1)]
+        if len(cells) == 2 and all(cells):
+            found.append((cells[0].lstrip("#% ")[:80], cells[1][:200]))
+    return tuple(found[:60])

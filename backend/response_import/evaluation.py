@@ -1,0 +1,303 @@
+"""From a table and what somebody says of it to the answer that a sweep has."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+import numpy as np
+
+from backend.analysis.arrays import FloatArray
+from backend.analysis.design import design
+from backend.analysis.loop_goals import LoadClass
+from backend.analysis.loop_structure import DriveLoops
+from backend.analysis.measured_plant import measured_plant
+from backend.analysis.response.collocated import (
+    Contradiction,
+    RigidPart,
+    as_frf,
+    contradiction,
+    mechanical_model,
+    rigid_part,
+)
+from backend.analysis.response.foreign import ForeignResponse, NoResponse, evaluate
+from backend.response_import.contents import Table, read_table
+from backend.response_import.errors import BadRecording
+from backend.response_import.signals import Signals, signals_of
+from backend.response_import.units import Scale, scale_of
+
+Structure = Literal["unknown", "motor_speed", "load_speed", "speed_loop"]
+#: Between where a load counts as compliant, medium and stiff, as for measurements of our own.
+_COMPLIANT_HZ, _MEDIUM_HZ = 80.0, 300.0
+_CLIPPED = 0.01
+
+
+@dataclass(frozen=True)
+class ImportSettings:
+    """What somebody says of a recording.
+
+    ``structure``: *motor_speed* is torque or current to the speed of the same shaft, which alone
+    allows inertia, notches and gains; *load_speed* the speed behind the coupling; *speed_loop*
+    speed reference to speed. ``output_filter_hz`` is a first-order low-pass that the recorded
+    output went through; ``current_bandwidth_hz`` and ``loop_delay_s`` are the drive's, for gains.
+    """
+
+    time: str | None
+    signal_in: str
+    signal_out: str
+    time_unit: str | None = None
+    sample_rate_hz: float | None = None
+    input_unit: str = "1"
+    output_unit: str = "1"
+    unit: str | None = None
+    rated_torque_nm: float | None = None
+    torque_constant_nm_a: float | None = None
+    structure: Structure = "unknown"
+    band_hz: tuple[float, float] | None = None
+    output_filter_hz: float | None = None
+    current_bandwidth_hz: float | None = None
+    loop_delay_s: float | None = None
+
+
+def evaluate_file(data: bytes, name: str, settings: ImportSettings) -> dict[str, object]:
+    """The answer for a file's bytes.
+
+    Raises:
+        BadRecording: what is wrong with the file, or with what is said of it.
+    """
+    return evaluate_signals(prepared(read_table(data, name), name, settings), name, settings)
+
+
+def prepared(table: Table, name: str, settings: ImportSettings) -> Signals:
+    """Input and output of a table, checked, in the units of the file."""
+    return signals_of(
+        table, name, time=settings.time, signal_in=settings.signal_in,
+        signal_out=settings.signal_out, time_unit=settings.time_unit,
+        sample_rate_hz=settings.sample_rate_hz,
+    )  # fmt: skip
+
+
+def evaluate_signals(signals: Signals, name: str, settings: ImportSettings) -> dict[str, object]:
+    """The JSON form of a sweep, with what an import says beside it.
+
+    Raises:
+        BadRecording: the recording supports no answer.
+    """
+    scale = scale_of(
+        settings.input_unit, settings.output_unit, settings.rated_torque_nm,
+        settings.torque_constant_nm_a, settings.unit,
+    )  # fmt: skip
+    _check(settings, scale)
+    try:
+        found = evaluate(
+            scale.factor_in * signals.signal_in, scale.factor_out * signals.signal_out,
+            signals.sample_rate_hz, settings.band_hz,
+        )  # fmt: skip
+    except NoResponse as error:
+        raise _told(error, name, signals) from error
+    return _as_json(found, signals, settings, scale)
+
+
+def _check(settings: ImportSettings, scale: Scale) -> None:
+    if settings.structure == "motor_speed" and not scale.speed:
+        raise BadRecording(
+            f"the structure motor_speed needs a speed as output, not {settings.output_unit}",
+            parameter="output-unit", value=settings.output_unit, limit="rad/s, rpm, rev/s, deg/s",
+            remedy="give the output's unit",
+        )  # fmt: skip
+    for what, value in (
+        ("output filter", settings.output_filter_hz),
+        ("current bandwidth", settings.current_bandwidth_hz),
+    ):
+        if value is not None and not 0.1 <= value <= 1e5:
+            raise BadRecording(f"the {what} is {value:g} Hz", parameter=what, value=value,
+                               limit="0.1 Hz to 100 kHz", remedy="give it in Hz")  # fmt: skip
+    if settings.loop_delay_s is not None and not 0.0 <= settings.loop_delay_s <= 0.1:
+        raise BadRecording(
+            f"the loop delay is {settings.loop_delay_s:g} s", parameter="loop delay",
+            value=settings.loop_delay_s, limit="0 to 0.1 s", remedy="give it in seconds",
+        )  # fmt: skip
+    low, high = settings.band_hz or (1.0, 2.0)
+    if not 0.0 <= low < high:
+        raise BadRecording(f"the band is {low:g} to {high:g} Hz", parameter="band", value=low,
+                           limit=f"below {high:g}", remedy="give the lower end first")  # fmt: skip
+
+
+def _told(error: NoResponse, name: str, signals: Signals) -> BadRecording:
+    """One message for each reason that the analysis has."""
+    facts = error.facts
+    if error.code == "few-lines":
+        return BadRecording(
+            f"{name}: the input {signals.input_name!r} excites {facts['lines']:.0f} frequencies",
+            parameter=signals.input_name, value=facts["lines"], limit=f"{facts['least']:.0f}",
+            remedy="record a multisine, a chirp or noise, or widen the band that is evaluated",
+        )  # fmt: skip
+    if error.code == "incoherent":
+        return BadRecording(
+            f"{name}: {signals.output_name!r} does not follow {signals.input_name!r} "
+            f"(coherence {facts['coherence']:.2f})", parameter=signals.output_name,
+            value=facts["coherence"], limit="0.5",
+            remedy="check which columns are input and output, or excite more strongly",
+        )  # fmt: skip
+    if error.code == "too-short":
+        return BadRecording(
+            f"{name} has {facts['samples']:.0f} samples", value=facts["samples"],
+            limit=f"at least {facts['least']:.0f}", remedy="record longer",
+        )  # fmt: skip
+    column = signals.input_name if error.code == "input-constant" else signals.output_name
+    return BadRecording(f"{name}: the column {column!r} is constant", parameter=column,
+                        value=facts["value"], remedy="give another column")  # fmt: skip
+
+
+def _as_json(
+    found: ForeignResponse, signals: Signals, settings: ImportSettings, scale: Scale
+) -> dict[str, object]:
+    axis = _axis(found, signals, settings, scale)
+    model = found.fit.model if found.fit is not None else None
+    return {
+        "kind": "speed_loop" if settings.structure == "speed_loop" else "mechanics",
+        "loop": "unknown",
+        "sample_rate_hz": signals.sample_rate_hz,
+        "valid_band_hz": list(found.valid_band_hz),
+        "frequency_hz": found.frequency_hz.tolist(),
+        "magnitude_db": found.magnitude_db.tolist(),
+        "phase_deg": found.phase_deg.tolist(),
+        "coherence": found.coherence.tolist(),
+        "std_db": _numbers(found.std_db),
+        "std_deg": _numbers(found.std_deg),
+        "resonances": [asdict(mode.row) for mode in found.modes],
+        "margins": {},
+        "unit": scale.unit,
+        "trusted": found.fit is not None,
+        "delay_s": model.delay_s if model is not None else None,
+        "motion_s": signals.signal_in.size / signals.sample_rate_hz,
+        "saturated_share": 0.0,
+        "noise": _numbers(found.noise),
+        "distortion": _numbers(found.distortion),
+        "periods_used": found.periods_used,
+        "periods_dropped": found.transient_periods,
+        "imported": {
+            "excitation": found.excitation,
+            "method": found.method,
+            "period_s": found.period_s,
+            "transient_periods": found.transient_periods,
+            "samples": int(signals.signal_in.size),
+            "input": signals.input_name,
+            "output": signals.output_name,
+            "input_unit": settings.input_unit,
+            "output_unit": settings.output_unit,
+            "structure": settings.structure,
+            "time_unit": signals.time_unit,
+            "repeated_rows": signals.repeated_rows,
+            "band_means": "another run of the same machine, 0.7 to 2 times the level",
+            "empty_even": found.empty[0],
+            "empty_odd": found.empty[1],
+            "real_poles_hz": sorted(model.poles_hz) if model is not None else [],
+        },
+        "axis": axis,
+        "warnings": _warnings(found, axis),
+    }
+
+
+def _axis(
+    found: ForeignResponse, signals: Signals, settings: ImportSettings, scale: Scale
+) -> dict[str, object] | None:
+    """Inertia, friction, notches and gains; only where the structure is stated."""
+    if settings.structure != "motor_speed" or found.fit is None:
+        return None
+    delay = found.fit.model.delay_s
+    wrong = contradiction(found, settings.output_filter_hz, delay)
+    if wrong is not None:
+        return {"verdict": "not-collocated", "contradiction": asdict(wrong)}
+    rigid = rigid_part(found, settings.output_filter_hz)
+    if rigid is None:
+        return {"verdict": "no-rigid-part"}
+    unit = _input_kind(scale)
+    answer: dict[str, object] = {
+        "verdict": "sound",
+        "inertia": rigid.inertia, "inertia_ci95": list(rigid.inertia_ci95),
+        "inertia_unit": "kg·m²" if scale.torque else f"{unit}·s²/rad",
+        "viscous": rigid.viscous, "viscous_unit": f"{unit}·s/rad",
+        "candidates": [],
+    }  # fmt: skip
+    answer["candidates"] = _candidates(found, signals, settings, rigid)
+    return answer
+
+
+def _input_kind(scale: Scale) -> str:
+    return "Nm" if scale.torque else scale.unit.rpartition(")/")[2] or "1"
+
+
+def _candidates(
+    found: ForeignResponse, signals: Signals, settings: ImportSettings, rigid: RigidPart
+) -> list[dict[str, object]]:
+    """Notches and gains for a PI speed loop, gains in units of the input per rad/s."""
+    model = mechanical_model(found, settings.output_filter_hz)
+    if model is None or found.fit is None or settings.current_bandwidth_hz is None:
+        return []
+    if settings.loop_delay_s is None:
+        return []
+    frf = as_frf(found, settings.output_filter_hz, found.fit.model.delay_s, signals.sample_rate_hz)
+    loops = DriveLoops(
+        settings.current_bandwidth_hz, settings.loop_delay_s,
+        highest_speed_bandwidth_hz=0.25 * found.valid_band_hz[1],
+    )  # fmt: skip
+    table = design(measured_plant(frf, model), rigid.inertia, loops, _load(found), slots=2)
+    return [asdict(row) for row in table if row.marks]
+
+
+def _load(found: ForeignResponse) -> LoadClass:
+    first = min(
+        (m.row.frequency_hz for m in found.modes if m.row.kind == "antiresonance"), default=np.inf
+    )
+    if first < _COMPLIANT_HZ:
+        return "compliant"
+    return "medium" if first < _MEDIUM_HZ else "stiff"
+
+
+def _warnings(found: ForeignResponse, axis: dict[str, object] | None) -> list[str]:
+    words = []
+    if found.excitation != "periodic":
+        words.append(
+            "the excitation does not repeat itself: what friction and backlash distort is told "
+            "from noise in part only; record at least four periods of a multisine for more"
+        )
+    elif found.periods_used < 4:
+        words.append(
+            f"only {found.periods_used} settled periods: the noise is known roughly; record four "
+            "or more"
+        )
+    if found.clipped_share > _CLIPPED:
+        words.append(
+            f"the input stands at its highest or lowest value for {found.clipped_share:.0%} of "
+            "the time: it is limited, or a sequence of two levels"
+        )
+    if axis is not None and isinstance(wrong := axis.get("contradiction"), dict):
+        words.append(_refuted(Contradiction(**wrong)))
+    if axis is not None and axis.get("verdict") == "no-rigid-part":
+        words.append(
+            "no inertia: the lowest frequencies do not show how friction and inertia share the "
+            "torque; excite lower frequencies"
+        )
+    if found.fit is None:
+        words.append("no model explains the response: no modes are told")
+    return words
+
+
+def _refuted(wrong: Contradiction) -> str:
+    filtered = (
+        f" A first-order filter at {wrong.filter_hz:.3g} Hz in the recorded speed would explain "
+        "it: if the recording has one, give it as output filter."
+        if wrong.filter_hz is not None
+        else ""
+    )
+    return (
+        f"the phase is {wrong.phase_deg:.0f}° at {wrong.frequency_hz:.0f} Hz; from a torque to the "
+        "speed of the same shaft it stays within ±90°. The output is filtered, late, or another "
+        f"shaft's: no inertia, notch or gain is concluded.{filtered}"
+    )
+
+
+def _numbers(values: FloatArray) -> list[float | None]:
+    """JSON knows no NaN."""
+    return [float(v) if np.isfinite(v) else None for v in values]

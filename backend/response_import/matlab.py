@@ -1,0 +1,106 @@
+"""Columns of a MATLAB file of version 4 to 7; the newer HDF5 form is named and refused."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis.arrays import FloatArray
+from backend.response_import.errors import BadRecording
+
+_MAX_UNPACKED = 512 << 20
+_MOST = 256
+
+
+def read_matlab(data: bytes, name: str) -> tuple[tuple[str, ...], tuple[FloatArray, ...]] | None:
+    """Vectors and columns of matrices by name; nothing where it is no MATLAB file.
+
+    Fields of a structure are ``structure.field``, columns of a matrix ``matrix(:,3)``.
+
+    Raises:
+        BadRecording: version 7.3, damaged, or no numbers in it.
+    """
+    if data[:8] == b"\x89HDF\r\n\x1a\n" or data[512:520] == b"\x89HDF\r\n\x1a\n":
+        raise BadRecording(
+            f"{name} is a MATLAB file of version 7.3 (HDF5)", value="7.3", limit="version 7",
+            remedy="in MATLAB: save('file.mat', 'a', 'b', '-v7'); or writematrix to a CSV",
+        )  # fmt: skip
+    five = data[:6] == b"MATLAB" or (len(data) > 128 and data[126:128] in {b"IM", b"MI"})
+    if not five:
+        return None
+    _refuse_bomb(data, name)
+    from scipy.io import loadmat
+
+    try:
+        file: Any = io.BytesIO(data)
+        found = loadmat(file, squeeze_me=False, struct_as_record=True,
+                        chars_as_strings=True)  # fmt: skip
+    except Exception as error:
+        # A damaged file makes this reader raise nearly anything; it runs in a process of its own.
+        raise BadRecording(
+            f"{name} is a damaged MATLAB file: {error}", value=name,
+            remedy="save it again with save(…, '-v7')",
+        ) from error  # fmt: skip
+    names: list[str] = []
+    columns: list[FloatArray] = []
+    for key, value in found.items():
+        if not key.startswith("__"):
+            _collect(key, value, names, columns, 0)
+    if not columns:
+        raise BadRecording(f"{name} holds no vectors of numbers", value=name,
+                           remedy="save time, input and output as vectors")  # fmt: skip
+    return tuple(names), tuple(columns)
+
+
+def _refuse_bomb(data: bytes, name: str) -> None:
+    """Compressed elements (type 15) are counted unpacked, before they are unpacked as a whole."""
+    order = "<" if data[126:128] == b"IM" else ">"
+    place, total = 128, 0
+    while place + 8 <= len(data):
+        kind, size = struct.unpack(order + "II", data[place : place + 8])
+        part = data[place + 8 : place + 8 + size]
+        if kind == 15:
+            packed = zlib.decompressobj()
+            rest = part
+            while rest and total <= _MAX_UNPACKED:
+                try:
+                    total += len(packed.decompress(rest, 1 << 24))
+                except zlib.error as error:
+                    raise BadRecording(f"{name} is a damaged MATLAB file: {error}", value=name,
+                                       remedy="copy the file again") from error  # fmt: skip
+                rest = packed.unconsumed_tail
+        else:
+            total += size
+        if total > _MAX_UNPACKED:
+            raise BadRecording(
+                f"{name} unpacks to more than {_MAX_UNPACKED} bytes", value=name,
+                limit=f"{_MAX_UNPACKED} bytes", remedy="save fewer variables",
+            )  # fmt: skip
+        place += 8 + size
+
+
+def _collect(
+    key: str, value: npt.NDArray[Any], names: list[str], columns: list[FloatArray], depth: int
+) -> None:
+    if len(names) >= _MOST or not isinstance(value, np.ndarray) or depth > 6:
+        return
+    if value.dtype.names and value.size == 1:
+        for field in value.dtype.names:
+            _collect(f"{key}.{field}", value.flat[0][field], names, columns, depth + 1)
+    elif value.dtype == object and value.size == 1:
+        _collect(key, value.flat[0], names, columns, depth + 1)
+    elif value.dtype.kind in "iufb" and value.ndim == 2 and value.size > 1:
+        numbers = np.asarray(value, dtype=np.float64)
+        if 1 in numbers.shape:
+            names.append(key)
+            columns.append(numbers.ravel())
+            return
+        rows = numbers if numbers.shape[0] >= numbers.shape[1] else numbers.T
+        for i in range(min(rows.shape[1], _MOST)):
+            names.append(f"{key}(:,{i + 1})" if rows is numbers else f"{key}({i + 1},:)")
+            columns.append(np.ascontiguousarray(rows[:, i]))

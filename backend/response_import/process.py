@@ -1,0 +1,119 @@
+"""Imports in a process of their own: ``python -m backend.response_import.process``.
+
+A file of somebody else may take seconds and much memory, and nobody knows what is in it. Here it
+holds up no motion and whoever started it can end it. One task comes pickled on the standard input,
+from our own parent only; one JSON object goes to the standard output.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import contextlib
+import json
+import pickle
+import sys
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from backend.response_import.contents import read_table
+from backend.response_import.errors import BadRecording
+from backend.response_import.evaluation import ImportSettings, evaluate_signals, prepared
+from backend.response_import.preview import preview
+from backend.response_import.stored import pack_import
+
+#: An evaluation that takes longer is ended: the largest file takes a fraction of it.
+LIMIT_S = 120.0
+#: More memory than any file within the limits needs.
+_MEMORY_BYTES = 6 << 30
+
+
+@dataclass(frozen=True, slots=True)
+class ImportTask:
+    """A file's bytes and what is said of them; without ``settings`` only its columns are shown."""
+
+    data: bytes
+    name: str
+    settings: ImportSettings | None
+
+    def run(self) -> dict[str, object]:
+        """The preview, or the packed measurement."""
+        if self.settings is None:
+            return preview(self.data, self.name)
+        signals = prepared(read_table(self.data, self.name), self.name, self.settings)
+        result = evaluate_signals(signals, self.name, self.settings)
+        packed = pack_import(self.name, signals, self.settings, result, datetime.now(UTC))
+        return {"packed": base64.b64encode(packed).decode()}
+
+
+async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[str, Any]:
+    """Carry out a task in a process of its own, which ends with the caller's task.
+
+    Raises:
+        BadRecording: what is wrong with the file, or it takes too long.
+    """
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "backend.response_import.process",
+        stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        async with asyncio.timeout(limit_s):
+            out, said = await process.communicate(pickle.dumps(task))
+    except TimeoutError:
+        raise BadRecording(
+            f"{task.name}: the evaluation was ended after {limit_s:g} s", value=task.name,
+            limit=f"{limit_s:g} s", remedy="export a shorter part of the recording",
+        ) from None  # fmt: skip
+    finally:
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await asyncio.shield(process.wait())
+    try:
+        answer: dict[str, Any] = json.loads(out)
+    except ValueError:
+        last = said.decode("utf-8", "replace").strip().splitlines()[-1:] or ["it said nothing"]
+        raise BadRecording(
+            f"{task.name}: the evaluation failed (exit code {process.returncode}): {last[0]}",
+            value=task.name, remedy="this is a defect of servodeck; report it with the file",
+        ) from None  # fmt: skip
+    if "error" in answer:
+        raise BadRecording(**answer["error"])
+    result: dict[str, Any] = answer["ok"]
+    return result
+
+
+def _limit_memory() -> None:
+    """Where the system can: a file made to exhaust the memory ends this process alone."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
+
+
+def main() -> None:
+    """Carry out the one task of this process."""
+    _limit_memory()
+    task: ImportTask = pickle.load(sys.stdin.buffer)  # noqa: S301 - from our own parent
+    answer: dict[str, object]
+    try:
+        answer = {"ok": task.run()}
+    except BadRecording as error:
+        answer = {"error": {
+            "message": error.message, "parameter": error.parameter, "value": error.value,
+            "limit": error.limit, "remedy": error.remedy,
+        }}  # fmt: skip
+    except MemoryError:
+        answer = {"error": {
+            "message": f"{task.name} needs more memory than is given to an import",
+            "value": task.name, "limit": f"{_MEMORY_BYTES >> 30} GiB",
+            "remedy": "export a shorter part of the recording, or fewer columns",
+        }}  # fmt: skip
+    json.dump(answer, sys.stdout, default=float)
+
+
+if __name__ == "__main__":
+    main()

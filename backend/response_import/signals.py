@@ -1,0 +1,227 @@
+"""Time, input and output of a table: which columns they are, and that they can be evaluated."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.analysis.arrays import FloatArray
+from backend.analysis.response.foreign import LEAST_SAMPLES
+from backend.response_import.contents import Table
+from backend.response_import.errors import BadRecording
+
+#: Steps of time may differ from their median by this share: a clock that is written in few digits.
+_JITTER = 0.1
+#: Rates between which a recording of an axis lies.
+_SLOWEST_HZ, _FASTEST_HZ = 10.0, 10e6
+#: Factors to seconds.
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_TIME_UNIT = re.compile(r"[\[(/_ ]\s*(s|sec|ms|us|µs|μs|ns)\s*[\])]?\s*$", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Input and output [n], evenly sampled. ``time_unit`` is what the column was taken to hold."""
+
+    signal_in: FloatArray
+    signal_out: FloatArray
+    sample_rate_hz: float
+    input_name: str
+    output_name: str
+    time_unit: str
+    repeated_rows: int = 0
+
+
+def column_of(table: Table, wanted: str, use: str, name: str) -> int:
+    """Number of a column by its name, by its name without unit, or by its number from 1.
+
+    Raises:
+        BadRecording: none, or several.
+    """
+    key = wanted.strip()
+    lower = [n.lower() for n in table.names]
+    for fits in (
+        [i for i, n in enumerate(table.names) if n == key],
+        [i for i, n in enumerate(lower) if n == key.lower()],
+        [i for i, n in enumerate(lower) if _bare(n) == _bare(key.lower())],
+    ):
+        if len(fits) == 1:
+            return fits[0]
+        if fits:
+            numbers = ", ".join(str(i + 1) for i in fits)
+            raise BadRecording(
+                f"{name}: the {use} column {wanted!r} is there {len(fits)} times",
+                parameter=use, value=wanted, limit=f"one of the columns {numbers}",
+                remedy="give the column's number",
+            )  # fmt: skip
+    if key.isdigit() and 1 <= int(key) <= len(table.columns):
+        return int(key) - 1
+    listed = ", ".join(f"{i + 1} {n}" for i, n in enumerate(table.names[:24]))
+    raise BadRecording(
+        f"{name} has no {use} column {wanted!r}; it has {listed}",
+        parameter=use, value=wanted, limit=f"1 to {len(table.columns)}",
+        remedy="give a column's name or number",
+    )  # fmt: skip
+
+
+def _bare(name: str) -> str:
+    return re.sub(r"\s*[\[(].*?[\])]\s*$", "", name).strip()
+
+
+def signals_of(
+    table: Table, name: str, *, time: str | None, signal_in: str, signal_out: str,
+    time_unit: str | None = None, sample_rate_hz: float | None = None,
+) -> Signals:  # fmt: skip
+    """Checked signals; ``sample_rate_hz`` instead of a time column where there is none.
+
+    Raises:
+        BadRecording: what is wrong, with column, row and value.
+    """
+    first, second = (
+        column_of(table, signal_in, "input", name), column_of(table, signal_out, "output", name),
+    )  # fmt: skip
+    if first == second:
+        raise BadRecording(
+            f"{name}: input and output are the same column {table.names[first]!r}",
+            parameter="output", value=signal_out, remedy="give two columns",
+        )  # fmt: skip
+    if (time is None) == (sample_rate_hz is None):
+        raise BadRecording(f"{name}: give either the time column or the sample rate",
+                           parameter="time", remedy="give one of the two")  # fmt: skip
+    at = None if time is None else column_of(table, time, "time", name)
+    if at is not None and at in (first, second):
+        raise BadRecording(
+            f"{name}: {table.names[at]!r} is given as time and as a signal",
+            parameter="time", value=time, remedy="give three columns",
+        )  # fmt: skip
+    used = [i for i in (at, first, second) if i is not None]
+    columns = _complete(table, used, name)
+    u, y = columns[-2], columns[-1]
+    for use, values, column in (("input", u, first), ("output", y, second)):
+        if float(np.ptp(values)) == 0.0:
+            raise BadRecording(
+                f"{name}: the {use} column {table.names[column]!r} is constant",
+                parameter=use, value=float(values[0]),
+                remedy=f"give the column of the {'excitation' if use == 'input' else 'motion'}",
+            )  # fmt: skip
+    if at is None:
+        assert sample_rate_hz is not None
+        _check_rate(sample_rate_hz, name, "sample rate")
+        return Signals(u, y, sample_rate_hz, table.names[first], table.names[second], "rate")
+    unit = time_unit or unit_in(table.names[at])
+    rate, kept = _clock(columns[0] * TIME_UNITS[unit], name, table, at, unit)
+    return Signals(
+        u[kept], y[kept], rate, table.names[first], table.names[second], unit,
+        int(columns[0].size - np.count_nonzero(kept)),
+    )  # fmt: skip
+
+
+def unit_in(name: str) -> str:
+    """Unit that a time column's name ends with; seconds without one."""
+    found = _TIME_UNIT.search(name)
+    text = found.group(1).lower().replace("µ", "u").replace("μ", "u") if found else "s"
+    return "s" if text == "sec" else text
+
+
+def _complete(table: Table, used: list[int], name: str) -> list[FloatArray]:
+    """The columns up to where the first of them ends; no gaps inside."""
+    columns = [table.columns[i] for i in used]
+    ends = []
+    for i, values in zip(used, columns, strict=True):
+        good = np.flatnonzero(np.isfinite(values))
+        if not good.size:
+            raise BadRecording(f"{name}: column {table.names[i]!r} holds no numbers",
+                               value=table.names[i], remedy="give another column")  # fmt: skip
+        ends.append(int(good[-1]) + 1)
+    end = min(ends)
+    if table.form == "MAT" and len({v.size for v in columns}) > 1:
+        sizes = ", ".join(f"{table.names[i]} {table.columns[i].size}" for i in used)
+        raise BadRecording(f"{name}: the vectors differ in length: {sizes}", value=sizes,
+                           remedy="save vectors of one length")  # fmt: skip
+    if end < LEAST_SAMPLES:
+        raise BadRecording(
+            f"{name} has {end} samples", value=end, limit=f"at least {LEAST_SAMPLES}",
+            remedy="record longer; a few seconds at the drive's fastest rate are enough",
+        )  # fmt: skip
+    for i, values in zip(used, columns, strict=True):
+        bad = np.flatnonzero(~np.isfinite(values[:end]))
+        if bad.size:
+            row = int(bad[0])
+            place = f"line {table.first_line + row}" if table.first_line else f"row {row + 1}"
+            raise BadRecording(
+                f"{name}, {place}: column {table.names[i]!r} holds no number "
+                f"({bad.size} such rows)", parameter=table.names[i], value=str(values[row]),
+                remedy="export it again without gaps, or cut the file before that line",
+            )  # fmt: skip
+    return [np.asarray(v[:end], dtype=np.float64) for v in columns]
+
+
+def _check_rate(rate: float, name: str, what: str) -> None:
+    if not (np.isfinite(rate) and _SLOWEST_HZ <= rate <= _FASTEST_HZ):
+        raise BadRecording(
+            f"{name}: the {what} is {rate:g} Hz", parameter="time", value=rate,
+            limit=f"{_SLOWEST_HZ:g} Hz to {_FASTEST_HZ:g} Hz",
+            remedy="give the unit of the time column: s, ms, us or ns",
+        )  # fmt: skip
+
+
+def _clock(
+    t: FloatArray, name: str, table: Table, column: int, unit: str
+) -> tuple[float, np.ndarray]:
+    """Rate, and the rows that count: a row that repeats the time and all values counts once."""
+    head = table.names[column]
+
+    def place(row: int) -> str:
+        return f"line {table.first_line + row}" if table.first_line else f"row {row + 1}"
+
+    kept = np.ones(t.size, dtype=bool)
+    steps = np.diff(t)
+    if np.all(steps <= 0) or float(np.ptp(t)) == 0.0:
+        raise BadRecording(f"{name}: the time column {head!r} does not rise", parameter="time",
+                           value=float(t[0]), remedy="give the column of the time")  # fmt: skip
+    back = np.flatnonzero(steps < 0)
+    if back.size:
+        row = int(back[0]) + 1
+        raise BadRecording(
+            f"{name}, {place(row)}: the time {head!r} goes back from {t[row - 1]:.9g} s to "
+            f"{t[row]:.9g} s", parameter="time", value=float(t[row]),
+            remedy="cut the file there: it holds several recordings, or another column is meant",
+        )  # fmt: skip
+    kept[1:] = steps > 0
+    again = np.flatnonzero(steps == 0)
+    for row in again[:1]:
+        if again.size > 0.01 * t.size:
+            raise BadRecording(
+                f"{name}, {place(int(row) + 1)}: the time {head!r} stands at {t[row]:.9g} s "
+                f"({again.size} rows do)", parameter="time", value=float(t[row]),
+                remedy="export the time with more digits, or give the sample rate instead",
+            )  # fmt: skip
+    steps = np.diff(t[kept])
+    usual = float(np.median(steps))
+    rows = np.flatnonzero(kept)
+    uneven = np.abs(steps - usual) > _JITTER * usual
+    # A clock in few digits steps unevenly and keeps its pace.
+    even = usual * np.arange(steps.size + 1)
+    pace = float(np.polyfit(np.arange(even.size), t[kept], 1)[0])
+    drift = np.abs(t[kept] - np.median(t[kept] - pace * np.arange(even.size))
+                   - pace * np.arange(even.size))  # fmt: skip
+    if np.any(uneven) and float(np.max(drift)) > _JITTER * pace:
+        at = int(np.flatnonzero(uneven)[0])
+        row = int(rows[at + 1])
+        raise BadRecording(
+            f"{name}, {place(row)}: {steps[at] * 1e3:.6g} ms after the row before, where the usual "
+            f"step is {usual * 1e3:.6g} ms ({np.count_nonzero(uneven)} such steps): samples are "
+            "lost, or the clock is not even", parameter="time", value=float(steps[at]),
+            limit=f"within {_JITTER:.0%} of {usual * 1e3:.6g} ms",
+            remedy="record again without gaps, cut the file before that line, or give the sample "
+            "rate instead if the rows are even and only the written time is not",
+        )  # fmt: skip
+    rate = 1.0 / pace
+    _check_rate(rate, name, f"sample rate (time in {unit})")
+    # A written clock of few digits is a whole number of hertz more often than not.
+    nearest = round(rate)
+    if nearest and abs(rate - nearest) < 1e-5 * rate:
+        rate = float(nearest)
+    return rate, kept

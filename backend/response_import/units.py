@@ -1,0 +1,74 @@
+"""Units of input and output: factors to Nm, A and rad/s, and the unit of the response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import Literal
+
+from backend.response_import.errors import BadRecording
+
+InputUnit = Literal["Nm", "mNm", "A", "mA", "rated", "percent", "permille", "rad/s", "rpm", "1"]
+OutputUnit = Literal["rad/s", "rpm", "rev/s", "deg/s", "m/s", "rad", "rev", "deg", "1"]
+
+#: Factor to Nm, A, rated torque or rad/s, and which of these.
+_INPUT: dict[str, tuple[float, str]] = {
+    "Nm": (1.0, "Nm"), "mNm": (1e-3, "Nm"), "A": (1.0, "A"), "mA": (1e-3, "A"),
+    "rated": (1.0, "rated"), "percent": (1e-2, "rated"), "permille": (1e-3, "rated"),
+    "rad/s": (1.0, "rad/s"), "rpm": (2 * pi / 60, "rad/s"), "1": (1.0, "1"),
+}  # fmt: skip
+_OUTPUT: dict[str, tuple[float, str]] = {
+    "rad/s": (1.0, "rad/s"), "rpm": (2 * pi / 60, "rad/s"), "rev/s": (2 * pi, "rad/s"),
+    "deg/s": (pi / 180, "rad/s"), "m/s": (1.0, "m/s"), "rad": (1.0, "rad"), "rev": (2 * pi, "rad"),
+    "deg": (pi / 180, "rad"), "1": (1.0, "1"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Factors of both signals, the unit of the response, and whether the input is a torque."""
+
+    factor_in: float
+    factor_out: float
+    unit: str
+    torque: bool
+    speed: bool
+
+
+def scale_of(
+    input_unit: str, output_unit: str, rated_torque_nm: float | None,
+    torque_constant_nm_a: float | None, unit: str | None,
+) -> Scale:  # fmt: skip
+    """What both signals are multiplied by.
+
+    A current becomes a torque by its constant, a share of the rated torque by that; ``unit``
+    overrides the response's unit as a text.
+
+    Raises:
+        BadRecording: an unknown unit, or a constant that does not fit it.
+    """
+    for use, given, known in (("input", input_unit, _INPUT), ("output", output_unit, _OUTPUT)):
+        if given not in known:
+            raise BadRecording(f"the {use} unit {given!r} is not known", parameter=f"{use}-unit",
+                               value=given, limit=", ".join(known),
+                               remedy="give one of these, or 1")  # fmt: skip
+    factor, kind = _INPUT[input_unit]
+    out, moved = _OUTPUT[output_unit]
+    for what, value, needs in (
+        ("rated torque", rated_torque_nm, "rated"), ("torque constant", torque_constant_nm_a, "A"),
+    ):  # fmt: skip
+        if value is None:
+            continue
+        if not 0.0 < value < 1e6:
+            raise BadRecording(f"the {what} is {value:g}", parameter=what, value=value,
+                               limit="above 0", remedy="take it from the nameplate")  # fmt: skip
+        if kind != needs:
+            raise BadRecording(
+                f"a {what} says nothing of an input in {input_unit}", parameter=what, value=value,
+                limit="rated, percent or permille" if needs == "rated" else "A or mA",
+                remedy="give the input's unit, or leave it out",
+            )  # fmt: skip
+        factor, kind = factor * value, "Nm"
+    text = "1" if kind == moved else f"({moved})/{'rated torque' if kind == 'rated' else kind}"
+    text = text if text != "(rad/s)/1" else "rad/s"
+    return Scale(factor, out, unit or text, kind == "Nm", moved == "rad/s")

@@ -1,0 +1,167 @@
+"""Responses of recordings of others: the excitation found, the truth held, another run held."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import chirp
+
+from backend.analysis.response.excitation_found import find_excitation
+from backend.analysis.response.foreign import ForeignResponse, NoResponse, evaluate
+from tests.support.two_masses import Bench, multisine
+
+RATE = 2500.0
+LINES = np.arange(11, 251)
+REAL = Path(__file__).parents[2] / "data" / "two_mass_bench_a.csv.gz"
+
+
+def real(column_in: int, column_out: int) -> tuple[np.ndarray, np.ndarray]:
+    with gzip.open(REAL, "rt") as file:
+        table = np.loadtxt(file, delimiter=",", skiprows=1)
+    return table[:, column_in], table[:, column_out]
+
+
+@pytest.mark.parametrize("column_in", [1, 2])
+def test_the_real_bench_has_its_modes(column_in: int) -> None:
+    found = evaluate(*real(column_in, 3), RATE)
+    assert found.excitation == "periodic"
+    assert found.period_s == 1.0
+    assert 1 <= found.transient_periods <= 4
+    assert found.frequency_hz.tolist() == LINES.tolist()
+    rows = {m.row.kind: m.row for m in found.modes}
+    assert len(found.modes) == 2
+    assert rows["antiresonance"].frequency_hz == pytest.approx(53.0, abs=1.0)
+    assert rows["resonance"].frequency_hz == pytest.approx(77.0, abs=1.0)
+    for row in rows.values():
+        assert row.frequency_ci95_hz is not None
+        assert row.frequency_ci95_hz[1] - row.frequency_ci95_hz[0] < 2.0
+
+
+def test_the_band_of_the_real_bench_is_neither_noise_alone_nor_idle() -> None:
+    found = evaluate(*real(2, 3), RATE)
+    mid = (found.frequency_hz > 90) & (found.frequency_hz < 200)
+    half = 1.96 * found.std_db[mid]
+    # The spread between the periods alone is 0.03 dB there.
+    assert np.median(half) > 4 * 1.96 * 8.686 * np.median(found.noise[mid])
+    assert np.max(half) < 1.5
+
+
+def test_halves_of_the_real_lines_hold_each_other() -> None:
+    """Odd lines predict the even ones: another excitation of the same bench has those."""
+    u, y = real(2, 3)
+    found = evaluate(u, y, RATE)
+    logs = np.log(found.response[:-1] / found.response[1:])
+    usual = np.abs(logs.real - np.convolve(logs.real, np.ones(5) / 5, "same")) * 8.686
+    assert np.mean(usual < 1.96 * np.hypot(found.std_db[:-1], found.std_db[1:])) > 0.9
+
+
+def test_a_linear_axis_comes_out_as_it_is() -> None:
+    """Truth is analytic: lines by DFT, zero-order hold of the torque put on by hand."""
+    bench = Bench(noise=1e-4)
+    f = LINES.astype(float)
+    one = multisine(RATE, LINES, 1.0, 1, 3)
+    spectrum = np.fft.rfft(one)
+    answer = np.zeros_like(spectrum)
+    answer[LINES] = spectrum[LINES] * bench.response(f)
+    y = np.tile(np.fft.irfft(answer, one.size), 6)
+    noise = np.random.default_rng(1).normal(size=y.size) * 1e-3 * np.std(y)
+    found = evaluate(np.tile(one, 6), y + noise, RATE)
+    error = np.log(found.response / bench.response(f))
+    assert np.median(np.abs(error)) < 0.01
+    truth = {"antiresonance": bench.antiresonance_hz, "resonance": bench.resonance_hz}
+    for mode in found.modes:
+        low, high = mode.row.frequency_ci95_hz or (0.0, 0.0)
+        assert low < truth[mode.row.kind] < high
+        assert mode.row.frequency_hz == pytest.approx(truth[mode.row.kind], rel=2e-3)
+    assert {m.row.kind for m in found.modes} == set(truth)
+
+
+def share_held(
+    found: ForeignResponse, bench: Bench, torque: np.ndarray, lines: np.ndarray
+) -> float:
+    """Share of another run's lines inside the band in size and in phase."""
+    u, y = bench.record(torque, RATE, 77)
+    n = round(RATE)
+    one, two = (np.fft.rfft(x.reshape(-1, n)[5:].mean(axis=0)) for x in (u, y))
+    use = np.isin(found.frequency_hz.round().astype(int), lines)
+    k = found.frequency_hz[use].round().astype(int)
+    left = np.log(two[k] / one[k] / found.response[use])
+    size = np.abs(left.real) * 20 / np.log(10) <= 1.96 * found.std_db[use]
+    turn = np.degrees(np.abs(left.imag)) <= 1.96 * found.std_deg[use]
+    return float(min(np.mean(size), np.mean(turn)))
+
+
+ROUGH = [
+    Bench(friction_nm=0.08, ripple=0.01, distortion=0.05, noise=1e-3, filter_hz=20.0),
+    Bench(motor_kgm2=3e-4, load_kgm2=2e-4, antiresonance_hz=81.0, viscous_nms=1e-3,
+          friction_nm=0.12, distortion=0.03, noise=1e-3),
+    Bench(friction_nm=0.05, backlash_rad=1e-4, ripple=0.02, damping=0.03, noise=1e-3),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("number", range(len(ROUGH)))
+def test_the_band_holds_another_run_of_a_rough_bench(number: int) -> None:
+    bench = ROUGH[number]
+    found = evaluate(*bench.record(multisine(RATE, LINES, 1.0, 8, 1), RATE, 5), RATE)
+    others = {
+        "other phases": (multisine(RATE, LINES, 1.0, 10, 22), LINES),
+        "twice the level": (multisine(RATE, LINES, 2.0, 10, 23), LINES),
+        "odd lines": (multisine(RATE, LINES[::2], 1.0, 10, 24), LINES[::2]),
+    }
+    for name, (torque, lines) in others.items():
+        assert share_held(found, bench, torque, lines) >= 0.9, name
+
+
+def test_noise_and_chirp_are_told_and_hold_the_truth() -> None:
+    bench = Bench(noise=2e-3, damping=0.04)
+    n = round(16 * RATE)
+    t = np.arange(n) / RATE
+    noise = np.random.default_rng(3).normal(size=n)
+    for kind, torque in (("noise", noise), ("chirp", chirp(t, 5.0, t[-1], 400.0))):
+        u, y = bench.record(torque, RATE, 5)
+        found = evaluate(u, y, RATE, (12.0, 250.0))
+        assert found.excitation == kind
+        assert found.method == "local polynomial"
+        f = found.frequency_hz
+        # The recorded value is held for a sample; Euler's steps are part of the bench.
+        held = np.sinc(f / RATE) * np.exp(-1j * np.pi * f / RATE)
+        left = np.log(found.response / (bench.response(f) * held))
+        size = np.abs(left.real) * 20 / np.log(10) <= 1.96 * found.std_db
+        assert np.mean(size) > 0.9, kind
+        kinds = {m.row.kind: m.row.frequency_hz for m in found.modes}
+        assert kinds["antiresonance"] == pytest.approx(53.0, rel=0.01)
+        assert kinds["resonance"] == pytest.approx(bench.resonance_hz, rel=0.01)
+
+
+def test_a_periodic_excitation_with_empty_lines_tells_distortion_by_parity() -> None:
+    bench = Bench(friction_nm=0.15, noise=1e-4)
+    found = evaluate(*bench.record(multisine(RATE, LINES[::2], 1.0, 8, 1), RATE, 5), RATE)
+    even, odd = found.empty
+    # Lines are odd; Coulomb friction is odd and puts nothing on the even ones between them.
+    assert odd is None
+    assert even is not None
+    assert even < 0.2 * float(np.median(found.distortion[:20])) + 0.02
+
+
+def test_periods_of_any_length_and_a_measured_input_are_found() -> None:
+    one = np.random.default_rng(1).normal(size=777)
+    told = np.tile(one, 5)[: 777 * 5 - 100] + 0.02 * np.random.default_rng(2).normal(size=3785)
+    found = find_excitation(told)
+    assert (found.kind, found.period_samples, found.periods) == ("periodic", 777, 4)
+    assert find_excitation(np.random.default_rng(4).normal(size=4000)).kind == "noise"
+
+
+def test_what_supports_no_answer_says_why() -> None:
+    rng = np.random.default_rng(1)
+    with pytest.raises(NoResponse, match="incoherent"):
+        evaluate(rng.normal(size=20000), rng.normal(size=20000), RATE)
+    t = np.arange(5000) / RATE
+    with pytest.raises(NoResponse, match="few-lines"):
+        evaluate(np.sin(2 * np.pi * 50 * t), np.cos(2 * np.pi * 50 * t), RATE)
+    with pytest.raises(NoResponse, match="input-constant"):
+        evaluate(np.ones(5000), rng.normal(size=5000), RATE)
+    with pytest.raises(NoResponse, match="too-short"):
+        evaluate(rng.normal(size=100), rng.normal(size=100), RATE)

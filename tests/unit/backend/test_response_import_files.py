@@ -1,0 +1,208 @@
+"""Recordings as other programs write them: what is read, and what is refused with which reason."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import os
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from backend.response_import.contents import MAX_UNPACKED_BYTES, read_table
+from backend.response_import.errors import BadRecording
+from backend.response_import.signals import signals_of
+from backend.response_import.units import scale_of
+
+N = 400
+T = np.arange(N) / 1000.0
+RNG = np.random.default_rng(1)
+U = np.round(RNG.normal(size=N), 4)
+Y = np.round(np.cumsum(U) / 50.0, 5)
+
+
+def text(
+    separator: str = ",",
+    comma: bool = False,
+    head: str = "time_s{s}in{s}out\n",
+    time: object = None,
+) -> str:
+    times = T if time is None else time
+    rows = [
+        separator.join(f"{v:.6g}" for v in row)
+        for row in zip(times, U, Y, strict=True)  # type: ignore[call-overload]
+    ]
+    body = "\n".join(rows)
+    return head.replace("{s}", separator) + (body.replace(".", ",") if comma else body) + "\n"
+
+
+def read(data: bytes | str, time: str | None = "1", one: str = "2", two: str = "3", **more: object):  # type: ignore[no-untyped-def]
+    raw = data.encode() if isinstance(data, str) else data
+    return signals_of(
+        read_table(raw, "trace.csv"), "trace.csv", time=time, signal_in=one, signal_out=two,
+        **more,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def check(found) -> None:  # type: ignore[no-untyped-def]
+    assert found.sample_rate_hz == 1000.0
+    np.testing.assert_allclose(found.signal_in, U, atol=1e-12)
+    np.testing.assert_allclose(found.signal_out, Y, rtol=1e-5, atol=1e-12)
+
+
+#: TwinCAT Scope View writes pairs of name and value, then one time column for each channel.
+TWINCAT = (
+    "Name\tYT Scope Project\nFile\tC:\\trace.tcscopex\nStarttime of export\t132514\n"
+    "EndTime of export\t132518\n\nName\tTorque\tName\tVelocity\nSymbolComment\t\tSymbolComment\t\n"
+    "Data-Type\tREAL64\tData-Type\tREAL64\nSampleTime[ms]\t1\tSampleTime[ms]\t1\n"
+    "VariableSize\t8\tVariableSize\t8\nUnit\t\tUnit\t\n\n"
+)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        pytest.param(text(), id="comma"),
+        pytest.param(text(";"), id="semicolon"),
+        pytest.param(text("\t"), id="tab"),
+        pytest.param(text(";", comma=True), id="German Excel"),
+        pytest.param(text("\t", comma=True), id="tab, decimal comma"),
+        pytest.param(text(head=""), id="no names"),
+        pytest.param(text(" ", head="# t u y\n"), id="blanks"),
+        pytest.param(text().replace("\n", "\r\n"), id="CRLF"),
+        pytest.param("\ufeff" + text(), id="BOM"),
+        pytest.param(text(";").encode("utf-16"), id="UTF-16"),
+        pytest.param(text(";").encode("utf-16-le"), id="UTF-16 without BOM"),
+        pytest.param(text(head="Zeit [s],Drehmoment [%],Drehzahl [°/s]\n").encode("latin-1"),
+                     id="Latin-1"),
+        pytest.param(gzip.compress(text().encode()), id="gzip"),
+        pytest.param("Recorder 3\nDate: 2024-01-02\nRate = 1000 Hz\n\n" + text(), id="head lines"),
+        pytest.param(text(head="time;in;out\n[s];[A];[rpm]\n".replace(";", ",")), id="units line"),
+        pytest.param(text().replace("\n", ",\n"), id="separator at the end"),
+    ],
+)  # fmt: skip
+def test_text_in_many_forms_is_one_recording(data: str | bytes) -> None:
+    check(read(data))
+
+
+def test_columns_by_name_without_its_unit_and_by_number() -> None:
+    data = text(head="Time (ms),Torque [%],Speed [rpm]\n", time=T * 1e3)
+    found = read(data, "time", "torque", "Speed [rpm]")
+    check(found)
+    assert found.time_unit == "ms"
+
+
+def test_a_twincat_scope_export_has_a_time_for_each_channel() -> None:
+    rows = "".join(f"{t:g}\t{u}\t{t:g}\t{y}\n" for t, u, y in zip(T * 1e3, U, Y, strict=True))
+    table = read_table((TWINCAT + rows).encode(), "scope.csv")
+    assert [n.split(" ")[0] for n in table.names] == ["Name", "Torque", "Name", "Velocity"]
+    found = signals_of(
+        table, "scope.csv", time="1", signal_in="Torque", signal_out="Velocity", time_unit="ms"
+    )
+    check(found)
+
+
+def test_matlab_vectors_structures_and_matrices() -> None:
+    for variables in (
+        {"t": T, "u": U, "y": Y},
+        {"d": {"t": T[:, None], "u": U[:, None], "y": Y[:, None]}},
+        {"m": np.column_stack([T, U, Y])},
+    ):
+        for packed in (False, True):
+            out = io.BytesIO()
+            savemat(out, variables, do_compression=packed)
+            check(read(out.getvalue()))
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"", "is empty"),
+        (b"PK\x03\x04" + b"x" * 90, "Excel workbook"),
+        (b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n", "7.3"),
+        (b"\x89HDF\r\n\x1a\n", "7.3"),
+        (os.urandom(5000) + b"\0", "table of numbers|binary"),
+        (b"<html><body>nothing</body></html>", "no table"),
+        (b"\x1f\x8b\x08\x00garbage", "gzip"),
+        (b"\xff\xfe\x00\xd8\x00", "damaged"),
+        (b"MATLAB 5.0 MAT-file".ljust(126) + b"IM" + b"\x0f\0\0\0\xff\0\0\0" + b"x" * 90, "MATLAB"),
+    ],
+)
+def test_what_is_no_recording_is_refused_by_name(data: bytes, said: str) -> None:
+    with pytest.raises(BadRecording, match=said) as error:
+        read_table(data, "file.csv")
+    assert error.value.remedy
+
+
+def test_a_gzip_bomb_is_refused_before_it_is_unpacked() -> None:
+    bomb = gzip.compress(b"0,0,0\n" * (MAX_UNPACKED_BYTES // 6 + 10), 1)
+    assert len(bomb) < MAX_UNPACKED_BYTES // 50
+    with pytest.raises(BadRecording, match="unpacks to more"):
+        read_table(bomb, "bomb.csv.gz")
+
+
+def _with(row: int, at: int, value: str) -> str:
+    lines = text().splitlines()
+    cells = lines[row + 1].split(",")
+    cells[at] = value
+    lines[row + 1] = ",".join(cells)
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (_with(200, 1, "NaN"), "line 202.*'in' holds no number"),
+        (_with(200, 2, ""), "line 202.*'out' holds no number"),
+        (_with(200, 0, "0.1"), "line 202.*goes back"),
+        (_with(200, 1, "error"), "line 202, column 2: 'error'"),
+        ("\n".join(text().splitlines()[:150] + text().splitlines()[170:]), "line 151.*lost"),
+        ("\n".join(text().splitlines()[:100]), "99 samples"),
+        (text(time=np.zeros(N)), "does not rise"),
+        (text(time=T + np.where(np.arange(N) % 2, 0.0003, 0.0)), "lost, or the clock is not even"),
+        (text(time=np.repeat(T[::2], 2)), "stands at"),
+        (text(time=T * 1e6), "sample rate.*0.001 Hz"),
+        (text().replace("in", "x", 1), "no input column 'in'"),
+    ],
+)
+def test_what_is_wrong_names_column_row_and_remedy(data: str, said: str) -> None:
+    with pytest.raises(BadRecording, match=said) as error:
+        read(data, "time_s", "in", "out")
+    assert error.value.remedy
+
+
+def test_a_constant_input_and_one_column_for_two_are_refused() -> None:
+    flat = "t,u,y\n" + "\n".join(f"{t:g},3.5,{y}" for t, y in zip(T, Y, strict=True))
+    with pytest.raises(BadRecording, match="'u' is constant"):
+        read(flat)
+    with pytest.raises(BadRecording, match="same column"):
+        read(text(), "1", "2", "2")
+    with pytest.raises(BadRecording, match="as time and as a signal"):
+        read(text(), "1", "1", "2")
+    with pytest.raises(BadRecording, match="there 2 times"):
+        read(text(head="t,u,u\n"), "t", "u", "3")
+
+
+def test_a_clock_in_few_digits_keeps_its_rate() -> None:
+    rows = text(time=np.round(T, 3) + 0.0)
+    check(read(rows))
+    coarse = np.floor(np.arange(N) / 2.5) / 1000.0  # 2.5 kHz written in whole milliseconds
+    with pytest.raises(BadRecording, match="stands at"):
+        read(text(time=coarse))
+    found = read(text(time=coarse), None, "2", "3", sample_rate_hz=2500.0)
+    assert found.sample_rate_hz == 2500.0
+
+
+def test_units_make_nm_and_rad_per_second() -> None:
+    scale = scale_of("permille", "rpm", 2.39, None, None)
+    assert scale.factor_in == pytest.approx(0.00239)
+    assert scale.factor_out == pytest.approx(0.104719755)
+    assert scale.unit == "(rad/s)/Nm"
+    assert scale_of("A", "rad/s", None, None, None).unit == "(rad/s)/A"
+    assert scale_of("A", "rad/s", None, 0.4, None).unit == "(rad/s)/Nm"
+    assert scale_of("percent", "rpm", None, None, None).unit == "(rad/s)/rated torque"
+    with pytest.raises(BadRecording, match="says nothing of an input in A"):
+        scale_of("A", "rad/s", 2.39, None, None)
+    with pytest.raises(BadRecording, match="not known"):
+        scale_of("furlong", "rad/s", None, None, None)
