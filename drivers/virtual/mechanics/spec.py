@@ -11,6 +11,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from drivers.virtual.mechanics.rough import RoughTorqueSpec
+
 #: Servo motors give three to three and a half times their rated torque for a moment.
 _PEAK_PER_RATED = 3.5
 
@@ -153,6 +155,7 @@ class MechanicsSpec(_Part):
     switches: SwitchSpec = SwitchSpec()
     supply: SupplySpec = SupplySpec()
     load: tuple[LoadSpec, ...] = ()
+    rough_torque: RoughTorqueSpec = RoughTorqueSpec()
 
     @model_validator(mode="after")
     def _backlash_count(self) -> MechanicsSpec:
