@@ -40,6 +40,7 @@ from backend.tools.tune_candidates import (
 from backend.tools.tune_notches import Learning, learn_notches, learning_s
 from backend.tools.tune_present import Trials
 from backend.tools.tune_time import NOT_AGAIN, TimeLeft
+from backend.tools.tune_verdict import as_json as verdict_json
 from backend.tools.tune_verify import Check, Keep, Verified, otherwise, unseen
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
@@ -400,6 +401,8 @@ def as_json(result: AutotuneResult) -> dict[str, object]:
         "verified": None
         if verified is None
         else {
+            "verdict": verdict_json(verified.verdict) if verified.verdict else None,
+            "gain_steps": asdict(verified.shown) if verified.shown else None,
             "sweep": sweep_evaluation.as_json(verified.sweep),
             "predicted_bandwidth_hz": verified.predicted_bandwidth_hz,
             "measured_bandwidth_hz": verified.measured_bandwidth_hz,

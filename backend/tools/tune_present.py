@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
 from backend.analysis.design import Candidate, described
 from backend.analysis.loop_goals import Goals, stable_with_less_gain, worst_of
 from backend.analysis.loop_structure import Gains, LoopFilters, speed_loop
@@ -31,6 +30,7 @@ from backend.tools.notch_meaning import meaning_of
 from backend.tools.temporary import write_settings
 from backend.tools.tune_apply import Applied, first_kept, nothing_stays, stages, take_back
 from backend.tools.tune_time import TimeLeft
+from backend.tools.tune_verdict import fixed_of
 from backend.tools.tune_verify import Check, Keep, otherwise, verify
 from drivers.errors import DriveError, NotAllowed
 
@@ -127,21 +127,6 @@ def judged(
     return candidate, worst.meets(goals) and stable_with_less_gain(loops)
 
 
-def fixed_of(
-    axis: Axis, facts: AxisFacts, notches: tuple[Notch, ...], filters: LoopFilters, f: FloatArray
-) -> ComplexArray:
-    """All of a drive's loop but its gains and the mechanics, on these lines.
-
-    Raises:
-        NotAllowed, ValueError: a part of the loop has no known meaning.
-    """
-    drive = axis.drive
-    fixed = gain_tool.loops_of(drive, facts).with_filters(filters).response(f)
-    if notches:
-        fixed = fixed * notch_tool.combined(drive.profile, notches, f, meaning_of(drive))
-    return fixed
-
-
 @dataclass
 class Trials:
     """Everything that is verified on one axis, in turn; ``tried`` says why what failed did."""
@@ -165,7 +150,7 @@ class Trials:
         Raises:
             DriveError: the drive has a fault, or the link is lost; nothing stays written.
         """
-        check = self.check
+        self.check = check = replace(self.check, plant=plant)
         self.had = await present(self.axis, check.facts, plant, check.inertia_kgm2, self.promised)
         slower = [c for c in order if self.had.slower(c)]
         applied = await self._designs([c for c in order if c not in slower], plant)

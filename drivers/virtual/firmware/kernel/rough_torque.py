@@ -28,9 +28,8 @@ def rough_command(p, s):  # type: ignore[no-untyped-def]
     s[k.S_ROUGH_DEMAND] = torque
     s[k.S_ROUGH_LAGGED] += p[k.P_ROUGH_LAG] * (torque - s[k.S_ROUGH_LAGGED])
     torque = s[k.S_ROUGH_LAGGED]
-    if p[k.P_ROUGH_DIP_STEPS] > 0.0:
-        if s[k.S_STEP] % p[k.P_ROUGH_DIP_EVERY] < p[k.P_ROUGH_DIP_STEPS]:
-            torque *= 1.0 - p[k.P_ROUGH_DIP_SHARE]
+    if s[k.S_STEP] % p[k.P_ROUGH_DIP_EVERY] < p[k.P_ROUGH_DIP_STEPS]:
+        torque *= 1.0 - p[k.P_ROUGH_DIP_SHARE]
     s[k.S_TORQUE_COMMAND] = torque * p[k.P_ROUGH_CONSTANT]
 
 
