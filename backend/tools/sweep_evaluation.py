@@ -34,6 +34,11 @@ _COMMANDED = (
     "the drive reports the torque that it commands: what its current loop takes is not known, and "
     "is charged to the band"
 )
+_DROPPED = (
+    "the drive reports another torque (6077h) than the one that moves the axis, such as a filtered "
+    "one or a copy of the demand: it was not used, and the path to the axis was found from the "
+    "motion alone"
+)
 #: What is charged to all lines where a speed loop's reference was the excitation, one deviation:
 #: a set-point that is held until it is sampled tells next to nothing of current loop and delay,
 #: which the loop's own torque has to, and that is small on heavy axes.
@@ -131,7 +136,8 @@ def evaluate(
     )
     if settings.kind != "mechanics":
         return _evaluate_loop(records, path, settings, loop)
-    known = settings.hold is not None or facts.interpolates
+    # That the dictionary has 60C2h does not say that torques are interpolated.
+    known = settings.hold is not None
     quantity: Quantity = "torque_mode" if loop == "none" else "torque_injection"
     inertia = _known_inertia(settings) if facts.torque_known else None
     taken = _taken(records)
@@ -146,7 +152,7 @@ def evaluate(
         found = identify_with_path(taken, path, quantity, hold_known=known, inertia=inertia)
     path = found.fit.path
     limit = settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm
-    saturated = _saturated(taken, path, quantity, limit)
+    saturated = _saturated(taken, path, quantity, limit, told=not found.torque_dropped)
     warnings = _warnings(found, saturated, facts)
     if facts.current_bandwidth_hz is None and commanded(path):
         lines = found.direct.frequency_hz
@@ -231,15 +237,19 @@ def completed(facts: AxisFacts, result: SweepResult) -> AxisFacts:
 
 
 def _saturated(
-    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, limit_nm: float
-) -> float:
-    """Share of samples whose torque is at the envelope's limit, or not what was commanded."""
+    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, limit_nm: float, *,
+    told: bool,
+) -> float:  # fmt: skip
+    """Share of samples whose torque is at the envelope's limit, or not what was commanded.
+
+    ``told``: the reported torque is the one that acts, so that a missing one is none of a filter.
+    """
     shares = []
     for r in records:
         if r.torque is None:
             continue
         at_limit = np.abs(r.torque) >= 0.98 * limit_nm
-        if quantity == "torque_mode":
+        if quantity == "torque_mode" and told:
             asked = sampled_command(r.excitation.samples, path)
             size = float(np.max(np.abs(asked)))
             at_limit |= np.abs(asked) - np.abs(r.torque) > 0.1 * size
@@ -268,6 +278,8 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
             f"above {highest:.0f} Hz the response is not known well enough: what is folded back "
             "there hides it. Nothing is concluded from what lies above; a shorter cycle shows it"
         )
+    if found.torque_dropped:
+        words.append(_DROPPED)
     if saturated > 0.02:
         words.append(
             f"the torque was at its limit, or not what was commanded, for {saturated:.0%} of the "
