@@ -49,8 +49,8 @@ from drivers.errors import NotAllowed
 _SATURATED = 0.25
 #: Said where no margins could be verified.
 _BY_STEP = (
-    "verified by its standstill and its step alone: too few lines of the tuned loop stand out of "
-    "the noise for its margins to be read"
+    "too few lines of the tuned loop stand out of the noise for its margins to be read: it was "
+    "verified by its standstill, its step, and steps with a raised gain"
 )
 #: How the loop tells that it has ended a motion for its torque.
 _TOO_MUCH_TORQUE = "is beyond the limit"

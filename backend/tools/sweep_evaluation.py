@@ -15,7 +15,13 @@ from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
 from backend.analysis.identify import Identification, identify_with_path
 from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
 from backend.analysis.mechanical_model import MechanicalModel
-from backend.analysis.reported import charged, commanded, current_doubt, mean_cycles
+from backend.analysis.reported import (
+    charged,
+    commanded,
+    current_doubt,
+    mean_cycles,
+    slow_doubt,
+)
 from backend.analysis.resonance import Resonance
 from backend.analysis.resonance_table import resonance_table
 from backend.analysis.sampling import MODEL_SHARE, STEP_LEAD_S, Hold, SignalPath, sampled_command
@@ -34,6 +40,13 @@ _COMMANDED = (
     "the drive reports the torque that it commands: what its current loop takes is not known, and "
     "is charged to the band"
 )
+_SLOW = (
+    "the torque follows its command more slowly than a current loop: a low-pass of the torque is "
+    "set in the drive (torque filter), which limits every loop. What the response owes to its form "
+    "is charged to the band"
+)
+#: A current loop is not slower than this, nor than this share of what the drive tells.
+_SLOW_HZ, _SLOWER = 450.0, 0.7
 _DROPPED = (
     "the drive reports another torque (6077h) than the one that moves the axis, such as a filtered "
     "one or a copy of the demand: it was not used, and the path to the axis was found from the "
@@ -160,6 +173,13 @@ def evaluate(
         direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
         found = replace(found, direct=direct, corrected=corrected)
         warnings += (_COMMANDED,)
+    corner = path.current_bandwidth_hz
+    if corner is not None and _slow(corner, facts):
+        lines = found.direct.frequency_hz
+        doubt = slow_doubt(lines, corner)
+        direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
+        found = replace(found, direct=direct, corrected=corrected)
+        warnings += (_SLOW,)
     if by_speed:
         lines = found.direct.frequency_hz
         late = 2j * np.pi * lines * _BY_REFERENCE_S
@@ -190,6 +210,12 @@ def evaluate(
         speed_filter_hz=found.fit.path.response_bandwidth_hz,
         hold=path.hold,
     )
+
+
+def _slow(corner_hz: float, facts: AxisFacts) -> bool:
+    """Whether the torque follows more slowly than the drive tells, or than current loops do."""
+    told = facts.current_bandwidth_hz
+    return corner_hz < (_SLOW_HZ if told is None else _SLOWER * told)
 
 
 def _taken(records: Records) -> tuple[Record, ...]:
@@ -306,11 +332,19 @@ def _injection_margins(found: Identification) -> dict[str, float | bool | None]:
 
 
 def margins_of(f: FloatArray, open_loop: ComplexArray) -> dict[str, float | bool | None]:
-    """Margins and bandwidths of an open loop, for files and pages."""
+    """Margins and bandwidths of an open loop, for files and pages.
+
+    They hold from ``from_hz`` to ``to_hz``. ``ms`` is None where |S| stays below 1 there: over all
+    frequencies it cannot (Bode's integral), so that its peak lies outside of the band.
+    """
     closed = closed_from_open(open_loop)
     width = bandwidth(f, closed)
+    found = margins(f, open_loop)
     return {
-        **asdict(margins(f, open_loop)),
+        **asdict(found),
+        **({"ms": None, "ms_hz": None} if found.ms < 1.0 else {}),
+        "from_hz": float(f[0]),
+        "to_hz": float(f[-1]),
         "bandwidth_hz": width.minus_3db_hz,
         "bandwidth_90deg_hz": width.minus_90deg_hz,
     }

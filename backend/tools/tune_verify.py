@@ -312,11 +312,22 @@ def otherwise(verified: Verified) -> str:
 
 
 def unseen(last_hz: float | None, verified: Verified) -> str:
-    """That the last crossover predicted lies above what was verified, in words; else empty.
+    """That the last crossover possible lies above what was verified, in words; else empty.
 
     The motor of a soft axis is alone above its resonances, and lighter: its loop may cross 0 dB
     for the last time where the samples of this exchange tell nothing.
     """
+    verdict = verified.verdict
+    if verdict is not None:
+        if verdict.coverage != "gain_steps" or verdict.shown_gain_db is None:
+            return ""
+        top = 0.0 if verdict.measured is None else verdict.measured.high_hz
+        return (
+            f"the loop may cross 0 dB up to {verdict.last_crossover_hz:.0f} Hz, above the {top:.0f} "
+            "Hz that this cycle time shows: its margins there are predicted, and bounded by the "
+            f"loop being stable with {verdict.shown_gain_db:.1f} dB more gain; a shorter cycle "
+            "measures them"
+        )
     frf = verified.sweep.frf
     lines = frf.frequency_hz[frf.in_band & (frf.coherence > COHERENT)]
     if not verified.sweep.margins or last_hz is None or last_hz <= np.max(lines, initial=0.0):
