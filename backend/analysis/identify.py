@@ -79,19 +79,20 @@ _AVERAGED = 0.5
 #: where torque and motion together put them further off than this share of their deviation, and
 #: by no more than two deviations or this at once.
 _STEP, _SETTLED, _LONGEST_STEP = 0.02, 0.2, 0.1
-#: A path by the motion alone is taken where the criterion is better by so much (as a share of a
-#: line's weight, it is far beyond noise: paths that a torque tells rightly come within 30).
-_BY_MOTION = 60.0
+#: A path by the motion alone is taken where the criterion is better by so much and the misfit is
+#: smaller than this share (fitted to the torques of `benchmarks.rough_campaign`: filtered or copied
+#: ones leave 1.5 to 10 times the misfit, right ones 0.95 to 1.1 times).
+_BY_MOTION, _CLEARLY = 60.0, 0.77
 _MOTION_PASSES = 3
 #: A median misfit (relative) that a path by the motion leaves where it is right.
 _EXPLAINED = 0.0035
 _HOLDS: tuple[Hold, ...] = ("zero", "linear")
 #: Current loops are within these, and one behind a low-pass of the torque begins about here, in Hz.
 _ORDINARY_HZ, _SLOW_HZ = (450.0, 1600.0), 300.0
-#: A torque that is the mechanics' leaves less delay (cycles) than this, and less of itself
+#: A torque that is the mechanics' leaves less delay (s) than this, and less of itself
 #: unexplained by hold, corner and delay (relative RMS; rounding to 0.1 % leaves 0.001 to 0.005 on
 #: the axes of `benchmarks.tune_accuracy`).
-_LEFT_BY_TORQUE, _TORQUE_LEFT = 0.06, 0.02
+_LEFT_BY_TORQUE_S, _TORQUE_LEFT = 60e-6, 0.02
 #: Lines whose phase is beyond ±90° by more than this, and their share, are not those of a passive
 #: axis; lines that take part.
 _PASSIVE_DEG, _PASSIVE_SHARE, _COHERENT, _FEW = 12.0, 0.1, 0.9, 12
@@ -214,7 +215,9 @@ def _by_motion(
         if found[0].fit.error < _EXPLAINED:
             break
     found.sort(key=_rank)
-    if _rank(found[0]) < _rank(trials[0]) - _BY_MOTION:
+    best, by_torque = found[0].fit, trials[0].fit
+    better = best.score < by_torque.score - _BY_MOTION
+    if better and best.error < _CLEARLY * by_torque.error:
         return alone, found, True
     return task, trials, False
 
@@ -226,7 +229,7 @@ def _suspect(task: _Task, trial: _Trial, corner_known: bool) -> bool:
     path, fit = trial.path, trial.fit
     corner = path.current_bandwidth_hz or USUAL_CURRENT_HZ
     odd = not corner_known and not _ORDINARY_HZ[0] < corner < _ORDINARY_HZ[1]
-    late = abs(fit.delay_s) * path.sample_rate_hz > _LEFT_BY_TORQUE
+    late = abs(fit.delay_s) > _LEFT_BY_TORQUE_S
     return (
         odd or late or not at_whole_cycles(path) or _beyond_passive(trial)
         or torque_left(task.records, path) > _TORQUE_LEFT

@@ -192,10 +192,14 @@ def _verified(applied: Answer, verified: Answer) -> list[str]:
         ("Ms, at most", goals["ms"], margins.get("ms"), ""),
     )
     head = f"{'':24}{'predicted':>10}{'verified':>10}"
-    return [head] + [
-        f"{name:24}{_number(promise, '10.2f'):>10}{_number(found, '10.2f'):>10} {unit}".rstrip()
-        for name, promise, found, unit in rows
-    ] + _bands(verdict)
+    return (
+        [head]
+        + [
+            f"{name:24}{_number(promise, '10.2f'):>10}{_number(found, '10.2f'):>10} {unit}".rstrip()
+            for name, promise, found, unit in rows
+        ]
+        + _bands(verdict)
+    )
 
 
 #: How far a verdict reaches.

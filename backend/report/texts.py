@@ -139,6 +139,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "torque_peak": ("Torque peak", "转矩峰值"),
     "torque_rms": ("Torque RMS", "转矩有效值"),
     "not_reached": ("not reached", "未达到"),
+    "window_widened": ("Settling window, ten times the noise", "稳定窗口（噪声的十倍）"),
     "loop.unstable": ("{kind}: not stable.", "{kind}：不稳定。"),
     "loop.unknown": (
         "{kind}: too few lines of the loop could be measured; its margins are not known.",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import asdict, dataclass, replace
+from datetime import datetime
 
 from backend.analysis.design import Candidate
 from backend.analysis.loop_goals import LoadClass, Mark, goals_for
@@ -110,6 +111,8 @@ class AutotuneResult:
     cautious: bool
     again: Again | None = None
     expected: Figures | None = None
+    written: datetime | None = None
+    """When what is in force was written; its verification came after that."""
 
 
 async def autotune(
@@ -333,6 +336,7 @@ async def apply_and_verify(
         return Designing(plant, found.load, mark, found.cautious, 1.0 / cycle_s(session))
 
     how = designing(settings.mark)
+    trials.check = replace(check, plant=how.plant)
     applied, again = await first_that_holds(trials, _order(found, settings.mark), how)
     if applied is None and not found.cautious and clock.verifications() >= 1:
         made = await asyncio.to_thread(
@@ -341,6 +345,7 @@ async def apply_and_verify(
         )  # fmt: skip
         found = _with(found, made)
         how = designing("robust")
+        trials.check = replace(check, plant=how.plant)
         applied, again = await first_that_holds(trials, _order(found, "robust"), how)
     if applied is None:
         raise NotAllowed(
@@ -366,7 +371,7 @@ async def apply_and_verify(
         found, applied=applied.candidate, verified=verified, step=verified.step,
         before=applied.before, tried=tuple(trials.tried), again=again,
         notes=(*found.notes, *(each for each in said if each)),
-        expected=expected(trials, applied, plant),
+        expected=expected(trials, applied, plant), written=applied.written,
     )  # fmt: skip
 
 

@@ -150,7 +150,7 @@ class Trials:
         Raises:
             DriveError: the drive has a fault, or the link is lost; nothing stays written.
         """
-        self.check = check = replace(self.check, plant=plant)
+        check = self.check
         self.had = await present(self.axis, check.facts, plant, check.inertia_kgm2, self.promised)
         slower = [c for c in order if self.had.slower(c)]
         applied = await self._designs([c for c in order if c not in slower], plant)

@@ -55,6 +55,8 @@ LOOKS = 2
 #: So much of a promised gain margin is shown by raising the gain, where the last crossover is above
 #: what was measured: all but this, and no more than that.
 _NOT_SHOWN_DB, _MOST_SHOWN_DB = 1.5, 7.0
+#: A step, unless noise asks for a larger one, which is made where it is this much larger.
+_USUAL_STEP_RPM, _WORTH_A_STEP = 100.0, 1.2
 #: Where there are fewer, a step may overshoot by this.
 _OVERSHOOT_PERCENT = 40.0
 #: A bandwidth this near to the predicted one is as predicted; one that is measured once more is
@@ -168,15 +170,17 @@ async def verify(
     if not why:
         settings_of_step = _step_settings(check, candidate)
         step = await step_tool.step_response(axis, session, settings_of_step, stepping, keep)
+        larger = min(step_tool.significant_size(step), _largest_step(check, candidate))
+        if step.widened and larger > _WORTH_A_STEP * settings_of_step.size:
+            settings_of_step = replace(settings_of_step, size=larger)
+            step = await step_tool.step_response(axis, session, settings_of_step, stepping, keep)
         restless_why = "" if read else restless(step)
         words = [hum(step), restless_why]
         why = _named(candidate, "; ".join(word for word in words if word))
         only_hums = bool(words[0]) and not restless_why
         if not why and not covered:
             wanted_db = min(promised.gain_margin_db - _NOT_SHOWN_DB, _MOST_SHOWN_DB)
-            shown = await gain_steps(
-                axis, session, settings_of_step, step, wanted_db, stepping, keep
-            )
+            shown = await gain_steps(axis, session, settings_of_step, step, wanted_db, stepping)
             verdict = _verdict(axis, check, candidate, swept, shown.shown_db)
             why = _named(candidate, "; ".join(_not_shown(verdict, promised, shown, wanted_db)))
     swept = replace(swept, margins=read)
@@ -323,8 +327,8 @@ def unseen(last_hz: float | None, verified: Verified) -> str:
             return ""
         top = 0.0 if verdict.measured is None else verdict.measured.high_hz
         return (
-            f"the loop may cross 0 dB up to {verdict.last_crossover_hz:.0f} Hz, above the {top:.0f} "
-            "Hz that this cycle time shows: its margins there are predicted, and bounded by the "
+            f"the loop may cross 0 dB up to {verdict.last_crossover_hz:.0f} Hz, above the "
+            f"{top:.0f} Hz that this cycle time shows: its margins there are predicted, and bounded by the "
             f"loop being stable with {verdict.shown_gain_db:.1f} dB more gain; a shorter cycle "
             "measures them"
         )
@@ -360,10 +364,15 @@ def _named(candidate: Candidate, words: str) -> str:
     return f"{candidate.gains.speed_bandwidth_hz:.0f} Hz: {words}" if words else ""
 
 
-def _step_settings(check: Check, candidate: Candidate) -> step_tool.StepSettings:
-    """A step of speed whose first torque, gain times step, leaves half of what is permitted."""
+def _largest_step(check: Check, candidate: Candidate) -> float:
+    """Speed in rpm whose first torque, gain times step, leaves half of what is permitted."""
     envelope = check.envelope
     torque_nm = envelope.torque_percent / 100.0 * check.facts.rated_torque_nm
     gentle = 0.5 * torque_nm / candidate.gains.speed_nms * 60.0 / (2 * np.pi)
-    size = min(100.0, 0.3 * envelope.speed_rpm, 120.0 * envelope.travel_rev, gentle)
-    return step_tool.StepSettings(envelope, size=size, rated_torque_nm=check.rated_torque_nm)
+    return float(min(0.3 * envelope.speed_rpm, 120.0 * envelope.travel_rev, gentle))
+
+
+def _step_settings(check: Check, candidate: Candidate) -> step_tool.StepSettings:
+    """The usual step of speed, or what the axis may do."""
+    size = min(_USUAL_STEP_RPM, _largest_step(check, candidate))
+    return step_tool.StepSettings(check.envelope, size=size, rated_torque_nm=check.rated_torque_nm)

@@ -300,6 +300,11 @@ class VirtualAxis:
             present |= bit if condition else 0
         return present
 
+    @property
+    def loops(self) -> LoopSettings | None:
+        """The loops as they are set now, in SI units."""
+        return self._loops
+
     # --- readings --------------------------------------------------------------------------
     @property
     def angle_rad(self) -> float:

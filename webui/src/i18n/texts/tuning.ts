@@ -569,6 +569,7 @@ export const tuning = {
   'step.actual': ['actual', '实际'],
   'step.before': ['before', '之前'],
   'step.now': ['now', '现在'],
+  'step.windowWidened': ['Settling window, ten times the noise', '稳定窗口（噪声的十倍）'],
   'step.numbers': ['Numbers of the step', '阶跃数值'],
   'step.torque': ['Torque during the step', '阶跃转矩'],
   'step.torqueUnit': ['% of rated', '额定转矩 %'],

@@ -89,6 +89,10 @@ export interface Step {
   demand: number[]
   actual: number[]
   torque_percent: number[]
+  /** Settling window; absent in jobs of an older server. */
+  window?: number | null
+  /** Whether noise asked for a wider window than 2 % of the step. */
+  widened?: boolean
   step: {
     overshoot_percent: number
     rise_s: number | null
