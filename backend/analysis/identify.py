@@ -8,6 +8,7 @@ the ratio between what sampling shows and what is there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -29,12 +30,16 @@ from backend.analysis.path_fit import (
     moved_path,
     path_between,
     path_covariance,
+    torque_left,
 )
 from backend.analysis.reference_gain import ReferenceLoop
 from backend.analysis.reversals import with_balanced_reversals
 from backend.analysis.sampled_model import LoopModel, SampledFit
 from backend.analysis.sampling import (
+    DIRECT_SHARE,
     STEP_LEAD_S,
+    USUAL_CURRENT_HZ,
+    Hold,
     SignalPath,
     delay_response,
     lag_response,
@@ -74,6 +79,23 @@ _AVERAGED = 0.5
 #: where torque and motion together put them further off than this share of their deviation, and
 #: by no more than two deviations or this at once.
 _STEP, _SETTLED, _LONGEST_STEP = 0.02, 0.2, 0.1
+#: A path by the motion alone is taken where the criterion is better by so much and the misfit is
+#: smaller than this share (fitted to the torques of `benchmarks.rough_campaign`: filtered or copied
+#: ones leave 1.5 to 10 times the misfit, right ones 0.95 to 1.1 times).
+_BY_MOTION, _CLEARLY = 60.0, 0.77
+_MOTION_PASSES = 3
+#: A median misfit (relative) that a path by the motion leaves where it is right.
+_EXPLAINED = 0.0035
+_HOLDS: tuple[Hold, ...] = ("zero", "linear")
+#: Current loops are within these, and one behind a low-pass of the torque begins about here, in Hz.
+_ORDINARY_HZ, _SLOW_HZ = (450.0, 1600.0), 300.0
+#: A torque that is the mechanics' leaves less delay (s) than this, and less of itself
+#: unexplained by hold, corner and delay (relative RMS; rounding to 0.1 % leaves 0.001 to 0.005 on
+#: the axes of `benchmarks.tune_accuracy`).
+_LEFT_BY_TORQUE_S, _TORQUE_LEFT = 60e-6, 0.02
+#: Lines whose phase is beyond ±90° by more than this, and their share, are not those of a passive
+#: axis; lines that take part.
+_PASSIVE_DEG, _PASSIVE_SHARE, _COHERENT, _FEW = 12.0, 0.1, 0.9, 12
 #: What half a cycle of delay weighs, in the criterion's units, is half of this; and what a cycle
 #: by which a drive would report too early does.
 _FRACTION, _EARLY = 100.0, 2e3
@@ -97,6 +119,8 @@ class Identification:
     distortion: Distortion | None = None
     modes: tuple[ModeDoubt, ...] = ()
     """How exactly each mode of the model is known; empty where no model is trusted."""
+    torque_dropped: bool = False
+    """Whether the reported torque cannot be the mechanics' input, and was not used as such."""
 
 
 def identify_mechanics(
@@ -142,10 +166,12 @@ def identify_with_path(
         paths = find_paths(task.records, path, loop_closed=closed, hold_known=hold_known)
     else:
         paths = (replace(loop.path, response_bandwidth_hz=path.response_bandwidth_hz),)
-    trials = task.trials(paths)
+    trials, dropped = task.trials(paths), False
+    if not closed:
+        task, trials, dropped = _by_motion(task, trials, path, corner_known)
     best = trials[0]
 
-    def again(fit: SampledFit) -> SignalPath:
+    def again(fit: SampledFit) -> SignalPath:  # only beside a closed loop
         known = replace(path, hold=fit.path.hold)
         return find_paths(
             task.records, known, loop_closed=True, hold_known=True, motion=fit, controller=task.loop
@@ -161,7 +187,67 @@ def identify_with_path(
         doubt = task.doubt(found, corner_known, by_torque)
     found, doubt = task.with_sure_modes(found, doubt, corner_known)
     alike = [t for t in trials[1:] if _rank(t) < _rank(best) + _UNDECIDED]
-    return _undecided(_identification(task, found, doubt), best, alike)
+    made = _undecided(_identification(task, found, doubt), best, alike)
+    return replace(made, torque_dropped=dropped)
+
+
+def _by_motion(
+    task: _Task, trials: list[_Trial], path: SignalPath, corner_known: bool
+) -> tuple[_Task, list[_Trial], bool]:
+    """The same without the reported torque, where that cannot be the mechanics' input.
+
+    A torque that is reported late, or a copy of the demand, tells another path than the one to the
+    mechanics. Collocated mechanics are passive, which the model's are by construction: a lag that
+    is not there leaves them unexplained. So both holds are tried with ordinary paths that the
+    motion alone moves, and taken where that explains the motion clearly better. The last value
+    tells whether they were.
+    """
+    if not _suspect(task, trials[0], corner_known):
+        return task, trials, False
+    alone = replace(task, records=tuple(replace(record, torque=None) for record in task.records))
+    told = path.current_bandwidth_hz if corner_known else None
+    found: list[_Trial] = []
+    for corner in (told or USUAL_CURRENT_HZ, _SLOW_HZ):
+        begun = replace(trials[0].path, current_bandwidth_hz=corner)
+        found += [alone.at_cycles(begun, hold) for hold in _HOLDS]
+        found.sort(key=_rank)
+        found[0] = alone.by_motion(found[0])
+        if found[0].fit.error < _EXPLAINED:
+            break
+    found.sort(key=_rank)
+    best, by_torque = found[0].fit, trials[0].fit
+    better = best.score < by_torque.score - _BY_MOTION
+    if better and best.error < _CLEARLY * by_torque.error:
+        return alone, found, True
+    return task, trials, False
+
+
+def _suspect(task: _Task, trial: _Trial, corner_known: bool) -> bool:
+    """Whether the reported torque may be another one than what drives the mechanics."""
+    if any(record.torque is None for record in task.records):
+        return False
+    path, fit = trial.path, trial.fit
+    corner = path.current_bandwidth_hz or USUAL_CURRENT_HZ
+    odd = not corner_known and not _ORDINARY_HZ[0] < corner < _ORDINARY_HZ[1]
+    late = abs(fit.delay_s) > _LEFT_BY_TORQUE_S
+    return (
+        odd or late or not at_whole_cycles(path) or _beyond_passive(trial)
+        or torque_left(task.records, path) > _TORQUE_LEFT
+    )  # fmt: skip
+
+
+def _beyond_passive(trial: _Trial) -> bool:
+    """Whether lines show a phase that no passive mechanics have between torque and speed.
+
+    Sampling folds a few degrees into the lines below a quarter of its rate.
+    """
+    frf = trial.views.position or trial.views.velocity
+    late = trial.fit.position_delay_s if trial.views.position else trial.fit.delay_s
+    use = (frf.frequency_hz < DIRECT_SHARE * frf.sample_rate_hz) & (frf.coherence > _COHERENT)
+    if np.count_nonzero(use) < _FEW:
+        return False
+    true = frf.response[use] / delay_response(frf.frequency_hz[use], late)
+    return float(np.mean(np.abs(np.degrees(np.angle(true))) > 90.0 + _PASSIVE_DEG)) > _PASSIVE_SHARE
 
 
 @dataclass(frozen=True)
@@ -213,6 +299,34 @@ class _Task:
         if abs(tried[0].fit.delay_s) * paths[0].sample_rate_hz > _LEFT_LATE:
             tried += [self.trial(p) for p in paths if p not in first]
         return sorted(tried, key=_rank)
+
+    def at_cycles(self, path: SignalPath, hold: Hold) -> _Trial:
+        """A fit with this hold and the whole cycles of delay that leave the least of one."""
+        lead_s = STEP_LEAD_S if hold == "linear" else 0.0
+        rate = path.sample_rate_hz
+        # What is too early shows as a delay that is left, what is too late may not.
+        cycles = max(math.floor(path.command_delay_s * rate - 0.25), 0)
+        late_s = max(cycles / rate - lead_s, 0.0)
+        trial = self.trial(replace(path, hold=hold, command_delay_s=late_s))
+        more = round(trial.fit.delay_s * rate)
+        if more == 0 or cycles + more < 0:
+            return trial
+        late_s = max((cycles + more) / rate - lead_s, 0.0)
+        other = self.trial(replace(path, hold=hold, command_delay_s=late_s))
+        return min(trial, other, key=_rank)
+
+    def by_motion(self, trial: _Trial) -> _Trial:
+        """The same with a path that only the motion moves, from where it is usual."""
+        for _ in range(_MOTION_PASSES):
+            doubt = self.doubt(trial, corner_known=False)
+            finite = np.all(np.isfinite(doubt.path_step))
+            if not finite or np.all(np.abs(doubt.path_step) < _SETTLED * doubt.path_std):
+                break
+            moved = self.moved(trial, doubt)
+            if moved.fit.score >= trial.fit.score:
+                break
+            trial = moved
+        return trial
 
     def views(self, path: SignalPath, coulomb_nm: float | None) -> _Views:
         """Estimates from what was recorded."""

@@ -102,6 +102,14 @@ def path_covariance(
     return np.asarray(np.linalg.inv(information + slopes.T @ slopes / noise))
 
 
+def torque_left(records: tuple[Record, ...], path: SignalPath) -> float:
+    """Share of the reported torque that a path does not explain, without a loop (RMS)."""
+    fit = PathFit.of(records, path, False, None)
+    rest = fit.rest(path)
+    whole = fit.torque * fit.weight
+    return float(np.linalg.norm(rest) / np.linalg.norm(whole))
+
+
 def moved_path(path: SignalPath, cycles: float, log_corner: float) -> SignalPath:
     """A path with another delay, and with another corner where there is one."""
     corner = path.current_bandwidth_hz

@@ -64,6 +64,18 @@ def current_doubt(frequency_hz: FloatArray) -> ComplexArray:
     return _without_delay(frequency_hz, np.log(lag_response(frequency_hz, _USUAL_HZ)))
 
 
+def slow_doubt(frequency_hz: FloatArray, corner_hz: float) -> ComplexArray:
+    """Logarithm of what one lag of this corner may be beside two of the same delay.
+
+    A slow torque is an ordinary current loop behind a filter as well as one slow lag.
+    """
+    own_s, usual_s = 1.0 / corner_hz, 1.0 / _USUAL_HZ
+    two = lag_response(frequency_hz, _USUAL_HZ) * lag_response(
+        frequency_hz, 1.0 / max(own_s - usual_s, 1e-6)
+    )
+    return np.asarray(np.log(two / lag_response(frequency_hz, corner_hz)))
+
+
 def charged(frf: Frf, lines_hz: FloatArray, doubt: ComplexArray) -> Frf:
     """A wider band by a doubt that is known on ``lines_hz``."""
     size, turn = (np.interp(frf.frequency_hz, lines_hz, x) for x in (doubt.real, doubt.imag))

@@ -25,6 +25,9 @@ MODEL_SHARE = 0.4
 #: A drive interpolates in the steps of its own loop (50 µs) and so is half a step ahead of a line.
 STEP_LEAD_S = 25e-6
 
+#: An ordinary current loop's corner, where nobody tells one.
+USUAL_CURRENT_HZ = 1000.0
+
 
 @dataclass(frozen=True)
 class SignalPath:

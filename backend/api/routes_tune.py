@@ -210,7 +210,8 @@ async def start_autotune(bench: TheBench, member: Controlled, request: AutotuneR
             raise
         if found.before:
             change_log(bench).add(
-                member.drive.id, Change(datetime.now(UTC), "autotune", found.before, after)
+                member.drive.id,
+                Change(found.written or datetime.now(UTC), "autotune", found.before, after),
             )
         return autotune.as_json(found) | {"after": after}
 

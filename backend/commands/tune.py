@@ -183,7 +183,8 @@ def _row(each: Answer) -> str:
 
 def _verified(applied: Answer, verified: Answer) -> list[str]:
     goals = _map(applied["promised"])
-    margins = _map(_map(verified["sweep"])["margins"])
+    verdict = _map(verified.get("verdict"))
+    margins = _map(verdict.get("stated")) or _map(_map(verified["sweep"])["margins"])
     rows = (
         ("bandwidth", verified["predicted_bandwidth_hz"], verified["measured_bandwidth_hz"], "Hz"),
         ("phase margin, at least", goals["phase_margin_deg"], margins.get("phase_margin_deg"), "°"),
@@ -191,10 +192,50 @@ def _verified(applied: Answer, verified: Answer) -> list[str]:
         ("Ms, at most", goals["ms"], margins.get("ms"), ""),
     )
     head = f"{'':24}{'predicted':>10}{'verified':>10}"
-    return [head] + [
-        f"{name:24}{_number(promise, '10.2f'):>10}{_number(found, '10.2f'):>10} {unit}".rstrip()
-        for name, promise, found, unit in rows
-    ]
+    return (
+        [head]
+        + [
+            f"{name:24}{_number(promise, '10.2f'):>10}{_number(found, '10.2f'):>10} {unit}".rstrip()
+            for name, promise, found, unit in rows
+        ]
+        + _bands(verdict)
+    )
+
+
+#: How far a verdict reaches.
+_COVERAGE = {
+    "measured": "all crossovers lie within the measured band",
+    "gain_steps": "above the measured band bounded by a raised gain",
+    "predicted": "above the measured band predicted only",
+}
+
+
+def _bands(verdict: Answer) -> list[str]:
+    """The margins of each band with their intervals, and which of them are predictions."""
+    lines = []
+    for name in ("measured", "predicted"):
+        band = _map(verdict.get(name))
+        if not band:
+            continue
+        phase, gain = _interval(band["phase_margin_deg"], 0), _interval(band["gain_margin_db"], 1)
+        peak = _interval(band["peak_sensitivity"], 2)
+        lines.append(
+            f"{name} {_number(band['low_hz'], '.0f')} to {_number(band['high_hz'], '.0f')} Hz: "
+            f"phase margin {phase}°, gain margin {gain} dB, largest |S| {peak}"
+        )
+    coverage = verdict.get("coverage")
+    if isinstance(coverage, str):
+        lines.append(_COVERAGE[coverage])
+    return lines
+
+
+def _interval(value: object, digits: int) -> str:
+    """A value with the ends of its 95 % interval."""
+    found = _map(value)
+    if not found:
+        return "–"
+    ends = [_number(found[name], f".{digits}f").strip() for name in ("value", "low", "high")]
+    return f"{ends[0]} ({ends[1]} to {ends[2]})"
 
 
 def _number(value: object, form: str) -> str:

@@ -252,6 +252,8 @@ def _numbers(view: StepView, words: Words) -> tuple[list[str], list[str]]:
             ("rise", milliseconds(view.step.rise_s)),
             ("settling", milliseconds(view.step.settling_s)),
         ]
+        if view.widened and view.window is not None:
+            rows.append(("window_widened", significant(view.window, view.unit)))
     if view.move is not None:
         rows += [
             ("following", significant(view.move.following_peak, view.unit)),

@@ -126,14 +126,18 @@ class _Loop:
     ms: float | None
 
     def within(self, limits: tuple[float, float, float]) -> bool:
-        """A margin that does not exist (no crossing) is no lack; an unknown Ms is."""
+        """What was not seen within the measured band breaks no limit, and keeps none either."""
         phase, gain, ms = limits
         return (
             (self.phase_deg is None or self.phase_deg >= phase)
             and (self.gain_db is None or self.gain_db >= gain)
-            and self.ms is not None
-            and self.ms <= ms
+            and (self.ms is None or self.ms <= ms)
         )
+
+    @property
+    def complete(self) -> bool:
+        """Whether every figure was seen; a missing one never counts as passed."""
+        return None not in (self.phase_deg, self.gain_db, self.ms)
 
 
 def _loop_verdict(view: SweepView, kind: str, words: Words) -> Note:
@@ -143,14 +147,17 @@ def _loop_verdict(view: SweepView, kind: str, words: Words) -> Note:
     loop = _Loop(
         margin(found, "phase_margin_deg"), margin(found, "gain_margin_db"), margin(found, "ms")
     )
-    if loop.ms is None:
+    if loop.phase_deg is None and loop.gain_db is None and loop.ms is None:
         return Note(words("loop.unknown", kind=kind), "warn")
     tone: Tone = "good" if loop.within(_SOUND) else "warn" if loop.within(_POOR) else "fault"
     verdict = words({"good": "sound", "warn": "close"}.get(tone, "poor"))
+    if tone == "good" and not loop.complete:
+        tone, verdict = "warn", words("incomplete")
     text = words(
         "loop.verdict", kind=kind, verdict=verdict, pm=fixed(loop.phase_deg, 0, "°"),
         gm=fixed(loop.gain_db, 1, "dB"), ms=fixed(loop.ms, 2),
-        bw=hertz(margin(found, "bandwidth_hz")),
+        bw=hertz(margin(found, "bandwidth_hz")), low=hertz(margin(found, "from_hz")),
+        high=hertz(margin(found, "to_hz")),
     )  # fmt: skip
     return Note(text, tone)
 

@@ -29,6 +29,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "sound": ("sound", "良好"),
     "close": ("close to the limit", "接近极限"),
     "poor": ("not sound", "不合格"),
+    "incomplete": ("sound as far as it was measured", "在所测频段内良好"),
     "warnings": ("Warnings", "警告"),
     "none": ("None.", "无。"),
     "settings": ("Settings changed", "已更改的设置"),
@@ -138,14 +139,17 @@ TEXTS: dict[str, tuple[str, str]] = {
     "torque_peak": ("Torque peak", "转矩峰值"),
     "torque_rms": ("Torque RMS", "转矩有效值"),
     "not_reached": ("not reached", "未达到"),
+    "window_widened": ("Settling window, ten times the noise", "稳定窗口（噪声的十倍）"),
     "loop.unstable": ("{kind}: not stable.", "{kind}：不稳定。"),
     "loop.unknown": (
         "{kind}: too few lines of the loop could be measured; its margins are not known.",
         "{kind}：可测频点过少，裕度未知。",
     ),
     "loop.verdict": (
-        "{kind}: {verdict}. Phase margin {pm}, gain margin {gm}, Ms {ms}, bandwidth {bw}.",
-        "{kind}：{verdict}。相位裕度 {pm}，增益裕度 {gm}，Ms {ms}，带宽 {bw}。",
+        "{kind}: {verdict}. Measured from {low} to {high}: phase margin {pm}, gain margin {gm}, "
+        "Ms {ms}, bandwidth {bw}. A figure that is missing lies outside of that band.",
+        "{kind}：{verdict}。测量频段 {low} 至 {high}：相位裕度 {pm}，增益裕度 {gm}，Ms {ms}，带宽 {bw}。"
+        "缺少的数值位于该频段之外。",
     ),
     "loop.rule": (
         "Sound: phase margin 45° or more, gain margin 8 dB or more, Ms below 2. "

@@ -93,6 +93,8 @@ class StepView(View):
     move: MoveNumbers | None
     torque_peak_percent: float
     torque_rms_percent: float
+    window: float | None = None
+    widened: bool = False
 
 
 AnyView = SweepView | InertiaView | StepView

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import asdict, dataclass, replace
+from datetime import datetime
 
 from backend.analysis.design import Candidate
 from backend.analysis.loop_goals import LoadClass, Mark, goals_for
@@ -40,6 +41,7 @@ from backend.tools.tune_candidates import (
 from backend.tools.tune_notches import Learning, learn_notches, learning_s
 from backend.tools.tune_present import Trials
 from backend.tools.tune_time import NOT_AGAIN, TimeLeft
+from backend.tools.tune_verdict import as_json as verdict_json
 from backend.tools.tune_verify import Check, Keep, Verified, otherwise, unseen
 from drivers.cia402 import State
 from drivers.errors import EnvelopeExceeded, NotAllowed
@@ -48,8 +50,8 @@ from drivers.errors import EnvelopeExceeded, NotAllowed
 _SATURATED = 0.25
 #: Said where no margins could be verified.
 _BY_STEP = (
-    "verified by its standstill and its step alone: too few lines of the tuned loop stand out of "
-    "the noise for its margins to be read"
+    "too few lines of the tuned loop stand out of the noise for its margins to be read: it was "
+    "verified by its standstill, its step, and steps with a raised gain"
 )
 #: Gains that hardly any axis oscillates with, for measuring one that does with its own.
 #: With the inertia that the drive holds, and with that of the motor alone.
@@ -107,6 +109,8 @@ class AutotuneResult:
     cautious: bool
     again: Again | None = None
     expected: Figures | None = None
+    written: datetime | None = None
+    """When what is in force was written; its verification came after that."""
 
 
 async def autotune(
@@ -329,6 +333,7 @@ async def apply_and_verify(
         return Designing(plant, found.load, mark, found.cautious, 1.0 / cycle_s(session))
 
     how = designing(settings.mark)
+    trials.check = replace(check, plant=how.plant)
     applied, again = await first_that_holds(trials, _order(found, settings.mark), how)
     if applied is None and not found.cautious and clock.verifications() >= 1:
         made = await asyncio.to_thread(
@@ -337,6 +342,7 @@ async def apply_and_verify(
         )  # fmt: skip
         found = _with(found, made)
         how = designing("robust")
+        trials.check = replace(check, plant=how.plant)
         applied, again = await first_that_holds(trials, _order(found, "robust"), how)
     if applied is None:
         raise NotAllowed(
@@ -362,7 +368,7 @@ async def apply_and_verify(
         found, applied=applied.candidate, verified=verified, step=verified.step,
         before=applied.before, tried=tuple(trials.tried), again=again,
         notes=(*found.notes, *(each for each in said if each)),
-        expected=expected(trials, applied, plant),
+        expected=expected(trials, applied, plant), written=applied.written,
     )  # fmt: skip
 
 
@@ -397,6 +403,8 @@ def as_json(result: AutotuneResult) -> dict[str, object]:
         "verified": None
         if verified is None
         else {
+            "verdict": verdict_json(verified.verdict) if verified.verdict else None,
+            "gain_steps": asdict(verified.shown) if verified.shown else None,
             "sweep": sweep_evaluation.as_json(verified.sweep),
             "predicted_bandwidth_hz": verified.predicted_bandwidth_hz,
             "measured_bandwidth_hz": verified.measured_bandwidth_hz,

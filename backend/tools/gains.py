@@ -149,6 +149,13 @@ def plan_gains(
     return {key: _within(drive, key, value) for key, value in raw.items()}
 
 
+def raised(drive: Drive, key: str, raw: int, factor: float) -> int:
+    """A gain's raw value times a factor, as far as the parameter holds it."""
+    parameter = drive.parameter(key)
+    value = _engineering(drive, key, raw)
+    return _within(drive, key, round(parameter.to_raw(value * factor)))
+
+
 def filter_choices(drive: Drive, now: LoopFilters) -> tuple[LoopFilters, ...]:
     """Wider filters that the drive can be given in place of those that it has now."""
     spec = spec_of(drive)

@@ -33,6 +33,8 @@ from drivers.errors import OutOfRange
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 _TURN = 2 * np.pi
+#: A settling window is so many times the noise at least: what leaves a narrower one is noise.
+_NOISES = 10.0
 #: Rest before the step.
 LEAD_S = 0.05
 
@@ -65,6 +67,12 @@ class StepResult:
     move: MoveMetrics | None
     torque_peak_percent: float
     torque_rms_percent: float
+    noise: float = 0.0
+    """Of a speed that is held: its standard deviation about its trend, in rpm; 0 for a move."""
+    window: float | None = None
+    """The settling window, in rpm or rev."""
+    widened: bool = False
+    """Whether noise is more than a tenth of the usual window, so that a wider one was taken."""
 
 
 async def step_response(
@@ -148,23 +156,39 @@ def evaluate(
     torque = recording.torque_nm / rated_torque_nm * 100.0
     begin = round(LEAD_S * rate)
     step = move = None
+    noise, widened, window = 0.0, False, settings.window
     if settings.kind == "speed":
         actual = recording.velocity_rad_s * 60.0 / _TURN
         end = begin + round(settings.hold_s * rate)
+        noise = _noise(actual[begin + (end - begin) // 2 : end])
+        if window is None:
+            usual = 0.02 * abs(settings.size)
+            window, widened = max(usual, _NOISES * noise), _NOISES * noise > usual
         step = step_metrics(
-            time[begin:end], actual[begin:end], target=settings.size, initial=0.0,
-            window=settings.window,
+            time[begin:end], actual[begin:end], target=settings.size, initial=0.0, window=window
         )  # fmt: skip
     else:
         actual = (recording.position_rad - recording.position_rad[0]) / _TURN
-        move = move_metrics(
-            time, demand, actual, window=settings.window or 0.02 * abs(settings.size),
-            torque=torque,
-        )  # fmt: skip
+        window = window or 0.02 * abs(settings.size)
+        move = move_metrics(time, demand, actual, window=window, torque=torque)
     return StepResult(
         settings.kind, time, demand, actual, torque, step, move,
         float(np.max(np.abs(torque))), float(np.sqrt(np.mean(torque**2))),
+        noise, window, widened,
     )  # fmt: skip
+
+
+def _noise(part: npt.NDArray[np.float64]) -> float:
+    """Standard deviation about a parabola, in the unit of the signal; 0 for too few samples."""
+    if part.size < 8:
+        return 0.0
+    x = np.linspace(-1.0, 1.0, part.size)
+    return float(np.std(part - np.polynomial.Legendre.fit(x, part, 2)(x)))
+
+
+def significant_size(result: StepResult) -> float:
+    """The size in rpm whose usual settling window is ten times the noise that this step shows."""
+    return _NOISES * result.noise / 0.02
 
 
 def as_json(result: StepResult) -> dict[str, object]:
@@ -178,6 +202,9 @@ def as_json(result: StepResult) -> dict[str, object]:
         "torque_percent": result.torque_percent.tolist(),
         "step": asdict(result.step) if result.step else None,
         "move": asdict(result.move) if result.move else None,
+        "noise": result.noise,
+        "window": result.window,
+        "widened": result.widened,
         "torque_peak_percent": result.torque_peak_percent,
         "torque_rms_percent": result.torque_rms_percent,
     }

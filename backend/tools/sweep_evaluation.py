@@ -15,7 +15,13 @@ from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
 from backend.analysis.identify import Identification, identify_with_path
 from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
 from backend.analysis.mechanical_model import MechanicalModel
-from backend.analysis.reported import charged, commanded, current_doubt, mean_cycles
+from backend.analysis.reported import (
+    charged,
+    commanded,
+    current_doubt,
+    mean_cycles,
+    slow_doubt,
+)
 from backend.analysis.resonance import Resonance
 from backend.analysis.resonance_table import resonance_table
 from backend.analysis.sampling import MODEL_SHARE, STEP_LEAD_S, Hold, SignalPath, sampled_command
@@ -33,6 +39,18 @@ Loop = Literal["auto", "none", "speed", "position"]
 _COMMANDED = (
     "the drive reports the torque that it commands: what its current loop takes is not known, and "
     "is charged to the band"
+)
+_SLOW = (
+    "the torque follows its command more slowly than a current loop: a low-pass of the torque is "
+    "set in the drive (torque filter), which limits every loop. What the response owes to its form "
+    "is charged to the band"
+)
+#: A current loop is not slower than this, nor than this share of what the drive tells.
+_SLOW_HZ, _SLOWER = 450.0, 0.7
+_DROPPED = (
+    "the drive reports another torque (6077h) than the one that moves the axis, such as a filtered "
+    "one or a copy of the demand: it was not used, and the path to the axis was found from the "
+    "motion alone"
 )
 #: What is charged to all lines where a speed loop's reference was the excitation, one deviation:
 #: a set-point that is held until it is sampled tells next to nothing of current loop and delay,
@@ -131,7 +149,8 @@ def evaluate(
     )
     if settings.kind != "mechanics":
         return _evaluate_loop(records, path, settings, loop)
-    known = settings.hold is not None or facts.interpolates
+    # That the dictionary has 60C2h does not say that torques are interpolated.
+    known = settings.hold is not None
     quantity: Quantity = "torque_mode" if loop == "none" else "torque_injection"
     inertia = _known_inertia(settings) if facts.torque_known else None
     taken = _taken(records)
@@ -146,7 +165,7 @@ def evaluate(
         found = identify_with_path(taken, path, quantity, hold_known=known, inertia=inertia)
     path = found.fit.path
     limit = settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm
-    saturated = _saturated(taken, path, quantity, limit)
+    saturated = _saturated(taken, path, quantity, limit, told=not found.torque_dropped)
     warnings = _warnings(found, saturated, facts)
     if facts.current_bandwidth_hz is None and commanded(path):
         lines = found.direct.frequency_hz
@@ -154,6 +173,13 @@ def evaluate(
         direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
         found = replace(found, direct=direct, corrected=corrected)
         warnings += (_COMMANDED,)
+    corner = path.current_bandwidth_hz
+    if corner is not None and _slow(corner, facts):
+        lines = found.direct.frequency_hz
+        doubt = slow_doubt(lines, corner)
+        direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
+        found = replace(found, direct=direct, corrected=corrected)
+        warnings += (_SLOW,)
     if by_speed:
         lines = found.direct.frequency_hz
         late = 2j * np.pi * lines * _BY_REFERENCE_S
@@ -184,6 +210,12 @@ def evaluate(
         speed_filter_hz=found.fit.path.response_bandwidth_hz,
         hold=path.hold,
     )
+
+
+def _slow(corner_hz: float, facts: AxisFacts) -> bool:
+    """Whether the torque follows more slowly than the drive tells, or than current loops do."""
+    told = facts.current_bandwidth_hz
+    return corner_hz < (_SLOW_HZ if told is None else _SLOWER * told)
 
 
 def _taken(records: Records) -> tuple[Record, ...]:
@@ -231,15 +263,19 @@ def completed(facts: AxisFacts, result: SweepResult) -> AxisFacts:
 
 
 def _saturated(
-    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, limit_nm: float
-) -> float:
-    """Share of samples whose torque is at the envelope's limit, or not what was commanded."""
+    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, limit_nm: float, *,
+    told: bool,
+) -> float:  # fmt: skip
+    """Share of samples whose torque is at the envelope's limit, or not what was commanded.
+
+    ``told``: the reported torque is the one that acts, so that a missing one is none of a filter.
+    """
     shares = []
     for r in records:
         if r.torque is None:
             continue
         at_limit = np.abs(r.torque) >= 0.98 * limit_nm
-        if quantity == "torque_mode":
+        if quantity == "torque_mode" and told:
             asked = sampled_command(r.excitation.samples, path)
             size = float(np.max(np.abs(asked)))
             at_limit |= np.abs(asked) - np.abs(r.torque) > 0.1 * size
@@ -268,6 +304,8 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
             f"above {highest:.0f} Hz the response is not known well enough: what is folded back "
             "there hides it. Nothing is concluded from what lies above; a shorter cycle shows it"
         )
+    if found.torque_dropped:
+        words.append(_DROPPED)
     if saturated > 0.02:
         words.append(
             f"the torque was at its limit, or not what was commanded, for {saturated:.0%} of the "
@@ -294,11 +332,19 @@ def _injection_margins(found: Identification) -> dict[str, float | bool | None]:
 
 
 def margins_of(f: FloatArray, open_loop: ComplexArray) -> dict[str, float | bool | None]:
-    """Margins and bandwidths of an open loop, for files and pages."""
+    """Margins and bandwidths of an open loop, for files and pages.
+
+    They hold from ``from_hz`` to ``to_hz``. ``ms`` is None where |S| stays below 1 there: over all
+    frequencies it cannot (Bode's integral), so that its peak lies outside of the band.
+    """
     closed = closed_from_open(open_loop)
     width = bandwidth(f, closed)
+    found = margins(f, open_loop)
     return {
-        **asdict(margins(f, open_loop)),
+        **asdict(found),
+        **({"ms": None, "ms_hz": None} if found.ms < 1.0 else {}),
+        "from_hz": float(f[0]),
+        "to_hz": float(f[-1]),
         "bandwidth_hz": width.minus_3db_hz,
         "bandwidth_90deg_hz": width.minus_90deg_hz,
     }

@@ -26,7 +26,8 @@ from backend.analysis.measured_plant import MeasuredPlant
 from backend.tools.temporary import write_settings
 from backend.tools.tune_apply import Applied, first_kept, nothing_stays, take_back
 from backend.tools.tune_candidates import candidates_for
-from backend.tools.tune_present import Trials, fixed_of, judged
+from backend.tools.tune_present import Trials, judged
+from backend.tools.tune_verdict import fixed_of
 from backend.tools.tune_verify import LOOKS, MOST_PAIRS, Verified, sharp_margins
 
 #: A prediction stands within these: share of the -3 dB point, dB and degrees. The aims are 10 %,
@@ -201,7 +202,7 @@ async def again(
         return first, replace(told, outcome="none")
     told = replace(told, gain_ratio=second.gains.speed_nms / candidate.gains.speed_nms)
     same = _alike(candidate, second)
-    applied = await _in_place_of(trials, first, second, fall_back=not same)
+    applied = await _in_place_of(trials, first, second, plant, fall_back=not same)
     if applied is None or applied.candidate is candidate:
         return applied, replace(told, outcome="not kept")
     f = lines.frequency_hz
@@ -313,7 +314,7 @@ def _designed(
 
 
 async def _in_place_of(
-    trials: Trials, first: Applied, second: Candidate, *, fall_back: bool
+    trials: Trials, first: Applied, second: Candidate, plant: MeasuredPlant, *, fall_back: bool
 ) -> Applied | None:
     """The second one where it keeps the promise, else the first one again, which did; or nothing.
 
@@ -323,7 +324,7 @@ async def _in_place_of(
     async with nothing_stays(axis, first.before):
         raw = {key: await axis.drive.raw(key) for key in first.before}
     await take_back(axis, first.before)
-    check = replace(trials.check, pairs_before=MOST_PAIRS)
+    check = replace(trials.check, pairs_before=MOST_PAIRS, plant=plant)
     applied = await first_kept(
         axis, trials.session, check, [second], trials.promised, trials.tried, trials.progress,
         trials.keep, None, trials.time_left,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
 from backend.analysis.design import Candidate
 from backend.analysis.loop_goals import Goals
@@ -31,6 +32,8 @@ class Applied:
     candidate: Candidate
     verified: Verified
     before: dict[str, int]
+    written: datetime | None = None
+    """When that was; None where nothing was written."""
 
 
 async def first_kept(
@@ -66,6 +69,7 @@ async def first_kept(
         # Noted for the next server: killed here, this one would leave what nobody has verified.
         with axis.drive.owed.lent(earlier):
             before = await write_settings(axis, raw)
+            written = datetime.now(UTC)
             try:
                 with clock.verifying():
                     verified = await verify(
@@ -81,7 +85,7 @@ async def first_kept(
                 await take_back(axis, before)
                 raise
             if verified.kept:
-                return Applied(candidate, verified, before)
+                return Applied(candidate, verified, before, written)
             tried.append(verified.why)
             await take_back(axis, before)
         if softer is not None and verified.hum_percent is not None and softened < _SOFTENED:

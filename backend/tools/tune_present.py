@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
 from backend.analysis.design import Candidate, described
 from backend.analysis.loop_goals import Goals, stable_with_less_gain, worst_of
 from backend.analysis.loop_structure import Gains, LoopFilters, speed_loop
@@ -31,6 +30,7 @@ from backend.tools.notch_meaning import meaning_of
 from backend.tools.temporary import write_settings
 from backend.tools.tune_apply import Applied, first_kept, nothing_stays, stages, take_back
 from backend.tools.tune_time import TimeLeft
+from backend.tools.tune_verdict import fixed_of
 from backend.tools.tune_verify import Check, Keep, otherwise, verify
 from drivers.errors import DriveError, NotAllowed
 
@@ -125,21 +125,6 @@ def judged(
         f, plant.response(), fixed, gains, worst.promised, notches=notches, filters=filters
     )
     return candidate, worst.meets(goals) and stable_with_less_gain(loops)
-
-
-def fixed_of(
-    axis: Axis, facts: AxisFacts, notches: tuple[Notch, ...], filters: LoopFilters, f: FloatArray
-) -> ComplexArray:
-    """All of a drive's loop but its gains and the mechanics, on these lines.
-
-    Raises:
-        NotAllowed, ValueError: a part of the loop has no known meaning.
-    """
-    drive = axis.drive
-    fixed = gain_tool.loops_of(drive, facts).with_filters(filters).response(f)
-    if notches:
-        fixed = fixed * notch_tool.combined(drive.profile, notches, f, meaning_of(drive))
-    return fixed
 
 
 @dataclass

@@ -12,7 +12,9 @@ import numpy.typing as npt
 from backend.analysis.design import Candidate
 from backend.analysis.frf import Frf
 from backend.analysis.loop_goals import Goals
+from backend.analysis.loop_verdict import LoopVerdict
 from backend.analysis.margins import bandwidth, open_from_closed
+from backend.analysis.measured_plant import MeasuredPlant
 from backend.analysis.sampling import Hold
 from backend.axis import Axis, Envelope
 from backend.cyclic import CyclicSession
@@ -24,18 +26,25 @@ from backend.tools.axis_facts import AxisFacts
 from backend.tools.go_back import go_back
 from backend.tools.probe import holding_torque
 from backend.tools.recording import quiet
+from backend.tools.tune_gain_steps import GainSteps, gain_steps
 from backend.tools.tune_time import NOT_AGAIN, TimeLeft
+from backend.tools.tune_verdict import (
+    BLURRED_DEG,
+    COHERENT,
+    LINES,
+    MARGIN_DB,
+    MARGIN_DEG,
+    MS_RATIO,
+    WITHIN,
+    in_words,
+    misses,
+    verdict_of,
+)
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
-#: What a measured margin is known to; the designs keep more than this in reserve.
-MARGIN_DB, MARGIN_DEG, MS_RATIO = 1.0, 1.0, 1.03
-#: Lines that margins are read from: coherence, standard deviation of the phase, how many at least.
-_COHERENT, _BLURRED_DEG, _LINES = 0.9, 4.0, 12
 #: Coherence of lines that a bandwidth is read from where those do not hold it.
 _SEEN = 0.8
-#: A loop is seen where its lines begin within its bandwidth: its crossover may else be missed.
-_WITHIN = 10 ** (-3.0103 / 20.0)
 #: Pairs of realisations that are measured at most where the first one tells too little: friction
 #: and noise of a heavy or a coarse axis average out, and so does the distortion of play, which a
 #: single pair cannot tell from the response.
@@ -43,6 +52,11 @@ MOST_PAIRS = 4
 #: A loop that contradicts its prediction is verified once more where there is time for so many:
 #: that one, and a more careful design.
 LOOKS = 2
+#: So much of a promised gain margin is shown by raising the gain, where the last crossover is above
+#: what was measured: all but this, and no more than that.
+_NOT_SHOWN_DB, _MOST_SHOWN_DB = 1.5, 7.0
+#: A step, unless noise asks for a larger one, which is made where it is this much larger.
+_USUAL_STEP_RPM, _WORTH_A_STEP = 100.0, 1.2
 #: Where there are fewer, a step may overshoot by this.
 _OVERSHOOT_PERCENT = 40.0
 #: A bandwidth this near to the predicted one is as predicted; one that is measured once more is
@@ -69,6 +83,10 @@ class Verified:
     hum_percent: float | None = None
     every: Frf | None = None
     """The response of all realisations together, where the loop was measured again."""
+    verdict: LoopVerdict | None = None
+    """What is known of the margins and in which band; None without a plant to predict from."""
+    shown: GainSteps | None = None
+    """What raising the gain showed, where the measured band does not reach the last crossover."""
 
     @property
     def seen(self) -> Frf:
@@ -91,6 +109,8 @@ class Check:
     """Where each verification begins, whatever ended the one before."""
     pairs_before: int = 0
     """Realisations that a prediction rests on, which are not to verify it."""
+    plant: MeasuredPlant | None = None
+    """What the design was made for; what is not measured of a loop is predicted from it."""
 
 
 async def verify(
@@ -139,22 +159,64 @@ async def verify(
     if again.left_out:
         clock.give_up(NOT_AGAIN)
     measured = _width_of(read)
+    verdict = _verdict(axis, check, candidate, swept, None)
+    beyond = () if verdict is None else misses(verdict, promised)
+    covered = all(each.what != "coverage" for each in beyond)
+    missed = missed or in_words(tuple(each for each in beyond if each.what != "coverage"))
     why = _named(candidate, "; ".join(missed))
+    shown: GainSteps | None = None
     step: step_tool.StepResult | None = None
     only_hums = False
     if not why:
-        step = await step_tool.step_response(
-            axis, session, _step_settings(check, candidate), stepping, keep
-        )
+        settings_of_step = _step_settings(check, candidate)
+        step = await step_tool.step_response(axis, session, settings_of_step, stepping, keep)
+        larger = min(step_tool.significant_size(step), _largest_step(check, candidate))
+        if step.widened and larger > _WORTH_A_STEP * settings_of_step.size:
+            settings_of_step = replace(settings_of_step, size=larger)
+            step = await step_tool.step_response(axis, session, settings_of_step, stepping, keep)
         restless_why = "" if read else restless(step)
         words = [hum(step), restless_why]
         why = _named(candidate, "; ".join(word for word in words if word))
         only_hums = bool(words[0]) and not restless_why
+        if not why and not covered:
+            wanted_db = min(promised.gain_margin_db - _NOT_SHOWN_DB, _MOST_SHOWN_DB)
+            shown = await gain_steps(axis, session, settings_of_step, step, wanted_db, stepping)
+            verdict = _verdict(axis, check, candidate, swept, shown.shown_db)
+            why = _named(candidate, "; ".join(_not_shown(verdict, promised, shown, wanted_db)))
     swept = replace(swept, margins=read)
     return Verified(
         swept, step, promised, candidate.bandwidth_hz, measured, not why, why,
-        hum_percent_of(step) if step is not None and only_hums else None, every,
+        hum_percent_of(step) if step is not None and only_hums else None, every, verdict, shown,
     )  # fmt: skip
+
+
+def _verdict(
+    axis: Axis, check: Check, candidate: Candidate, swept: sweep_evaluation.SweepResult,
+    shown_db: float | None,
+) -> LoopVerdict | None:  # fmt: skip
+    """None where there is no plant to predict from: a design always has one."""
+    if check.plant is None:
+        return None
+    return verdict_of(
+        axis, check.facts, check.plant, candidate, swept.frf, check.hold, shown_db
+    )  # fmt: skip
+
+
+def _not_shown(
+    verdict: LoopVerdict | None, promised: Goals, shown: GainSteps, wanted_db: float
+) -> list[str]:
+    """What raising the gain leaves open above the measured band, in words; empty where nothing."""
+    if verdict is None:
+        return []
+    words = in_words(misses(verdict, promised))
+    if shown.shown_db < wanted_db - MARGIN_DB:
+        top = 0.0 if verdict.measured is None else verdict.measured.high_hz
+        words.append(
+            f"the loop crosses 0 dB at {verdict.last_crossover_hz:.0f} Hz, above the {top:.0f} Hz "
+            f"that were measured, and was stable with {shown.shown_db:.1f} dB more gain only, "
+            f"instead of {wanted_db:.1f} dB"
+        )
+    return words
 
 
 def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool | None]:
@@ -164,11 +226,11 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
     where only lines above its bandwidth do, its crossover is none of them.
     """
     frf = swept.frf
-    use = frf.in_band & (frf.coherence > _COHERENT) & ~(frf.std_deg > _BLURRED_DEG)
-    if np.count_nonzero(use) < _LINES:
+    use = frf.in_band & (frf.coherence > COHERENT) & ~(frf.std_deg > BLURRED_DEG)
+    if np.count_nonzero(use) < LINES:
         return {}
     f, closed = frf.frequency_hz[use], frf.response[use]
-    if np.abs(closed[0]) < _WITHIN:
+    if np.abs(closed[0]) < WITHIN:
         return {}
     found = sweep_evaluation.margins_of(f, open_from_closed(closed))
     if found["phase_margin_deg"] is None:
@@ -254,13 +316,24 @@ def otherwise(verified: Verified) -> str:
 
 
 def unseen(last_hz: float | None, verified: Verified) -> str:
-    """That the last crossover predicted lies above what was verified, in words; else empty.
+    """That the last crossover possible lies above what was verified, in words; else empty.
 
     The motor of a soft axis is alone above its resonances, and lighter: its loop may cross 0 dB
     for the last time where the samples of this exchange tell nothing.
     """
+    verdict = verified.verdict
+    if verdict is not None:
+        if verdict.coverage != "gain_steps" or verdict.shown_gain_db is None:
+            return ""
+        top = 0.0 if verdict.measured is None else verdict.measured.high_hz
+        return (
+            f"the loop may cross 0 dB up to {verdict.last_crossover_hz:.0f} Hz, above the "
+            f"{top:.0f} Hz that this cycle time shows: its margins there are predicted, and bounded by the "
+            f"loop being stable with {verdict.shown_gain_db:.1f} dB more gain; a shorter cycle "
+            "measures them"
+        )
     frf = verified.sweep.frf
-    lines = frf.frequency_hz[frf.in_band & (frf.coherence > _COHERENT)]
+    lines = frf.frequency_hz[frf.in_band & (frf.coherence > COHERENT)]
     if not verified.sweep.margins or last_hz is None or last_hz <= np.max(lines, initial=0.0):
         return ""
     return (
@@ -291,10 +364,15 @@ def _named(candidate: Candidate, words: str) -> str:
     return f"{candidate.gains.speed_bandwidth_hz:.0f} Hz: {words}" if words else ""
 
 
-def _step_settings(check: Check, candidate: Candidate) -> step_tool.StepSettings:
-    """A step of speed whose first torque, gain times step, leaves half of what is permitted."""
+def _largest_step(check: Check, candidate: Candidate) -> float:
+    """Speed in rpm whose first torque, gain times step, leaves half of what is permitted."""
     envelope = check.envelope
     torque_nm = envelope.torque_percent / 100.0 * check.facts.rated_torque_nm
     gentle = 0.5 * torque_nm / candidate.gains.speed_nms * 60.0 / (2 * np.pi)
-    size = min(100.0, 0.3 * envelope.speed_rpm, 120.0 * envelope.travel_rev, gentle)
-    return step_tool.StepSettings(envelope, size=size, rated_torque_nm=check.rated_torque_nm)
+    return float(min(0.3 * envelope.speed_rpm, 120.0 * envelope.travel_rev, gentle))
+
+
+def _step_settings(check: Check, candidate: Candidate) -> step_tool.StepSettings:
+    """The usual step of speed, or what the axis may do."""
+    size = min(_USUAL_STEP_RPM, _largest_step(check, candidate))
+    return step_tool.StepSettings(check.envelope, size=size, rated_torque_nm=check.rated_torque_nm)

@@ -91,7 +91,7 @@ class Admission:
         while len(self._buckets) > _KEEP:
             self._buckets.popitem(last=False)
         if not bucket.take():
-            raise TooOften("too many requests of nobody in particular", 1.0)
+            raise TooOften("too many requests without login", 1.0)
 
     @contextmanager
     def running(self, address: str, *, known: bool, stop: bool) -> Iterator[None]:
@@ -109,7 +109,7 @@ class Admission:
         if not known and (
             self._strangers[place] >= MOST_OF_PLACE or self._strangers.total() >= MOST_OF_STRANGERS
         ):
-            raise TooOften("too many requests of nobody in particular run at once", 1.0)
+            raise TooOften("too many requests without login run at once", 1.0)
         self._running += 1
         if not known:
             self._strangers[place] += 1

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from drivers.virtual.firmware import loop_parameters
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.kernel.loop import run
+from drivers.virtual.firmware.rough_torque import write_rough_torque
 from drivers.virtual.firmware.settings import (
     GainSet,
     ImpedanceSettings,
@@ -41,6 +42,8 @@ class VirtualAxis:
         self._homing = False
         self._braked = self._brake_released = False
         loop_parameters.write_physics(self.p, spec, self.motor)
+        write_rough_torque(self.p, spec)
+        self._jitter = np.random.default_rng(seed)
         self.p[k.P_EVENT_MASK] = k.EV_FAULT | k.EV_STOPPED
         self.s[k.S_VOLTAGE] = spec.supply.voltage_v
         self.s[k.S_TEMPERATURE] = spec.supply.ambient_c
@@ -234,6 +237,15 @@ class VirtualAxis:
         s[k.S_IP_SPEED_INC] = (speed - item(k.S_IP_SPEED)) / steps
         s[k.S_IP_TORQUE_INC] = (torque_nm - item(k.S_IP_TORQUE)) / steps
         s[k.S_IP_LEFT] = float(steps)
+        p = self.p
+        if p[k.P_ROUGH_ON] == 0.0:
+            return
+        if p[k.P_ROUGH_HOLDS_TORQUE] > 0.0:
+            s[k.S_IP_TORQUE], s[k.S_IP_TORQUE_INC] = torque_nm, 0.0
+        if p[k.P_ROUGH_HOLDS_SPEED] > 0.0:
+            s[k.S_IP_SPEED], s[k.S_IP_SPEED_INC] = speed, 0.0
+        if p[k.P_ROUGH_JITTER_STEPS] > 0.0:
+            s[k.S_ROUGH_WAIT] = float(self._jitter.integers(0, int(p[k.P_ROUGH_JITTER_STEPS]) + 1))
 
     def stop_ramp(self, braking: float) -> None:
         """Brake to rest at this deceleration; EV_STOPPED tells when."""
@@ -287,6 +299,11 @@ class VirtualAxis:
         ):
             present |= bit if condition else 0
         return present
+
+    @property
+    def loops(self) -> LoopSettings | None:
+        """The loops as they are set now, in SI units."""
+        return self._loops
 
     # --- readings --------------------------------------------------------------------------
     @property

@@ -46,7 +46,7 @@ def live_values(
         return round(item(k.S_OMEGA) * core.units.speed_per_rad_s)
 
     def torque() -> int:
-        return round(item(k.S_TORQUE) * core.units.torque_per_nm)
+        return round(item(k.S_TORQUE_REPORTED) * core.units.torque_per_nm)
 
     def digital_inputs() -> int:
         if isinstance(panel, Panel):

@@ -1,6 +1,7 @@
 """The machine that a virtual drive turns: an inertia chain with friction, gravity and stops."""
 
 from drivers.virtual.mechanics.chain import analytic_response
+from drivers.virtual.mechanics.rough import RoughTorqueSpec
 from drivers.virtual.mechanics.spec import (
     EncoderSpec,
     FrictionSpec,
@@ -22,6 +23,7 @@ __all__ = [
     "MechanicsSpec",
     "MotorSpec",
     "PlaceSpec",
+    "RoughTorqueSpec",
     "SupplySpec",
     "SwitchSpec",
     "TravelSpec",

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from drivers.virtual.mechanics.rough import RoughTorqueSpec
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec
 
 #: Servo motors give three to three and a half times their rated torque for a moment.
@@ -156,6 +157,7 @@ class MechanicsSpec(_Part):
     supply: SupplySpec = SupplySpec()
     load: tuple[LoadSpec, ...] = ()
     rough_feedback: RoughFeedbackSpec = RoughFeedbackSpec()
+    rough_torque: RoughTorqueSpec = RoughTorqueSpec()
 
     @model_validator(mode="after")
     def _backlash_count(self) -> MechanicsSpec:

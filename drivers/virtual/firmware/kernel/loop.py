@@ -18,6 +18,11 @@ from drivers.virtual.firmware.kernel.generate import generate
 from drivers.virtual.firmware.kernel.measure import measure
 from drivers.virtual.firmware.kernel.plant import step_plant
 from drivers.virtual.firmware.kernel.protect import monitor, protect
+from drivers.virtual.firmware.kernel.rough_torque import (
+    rough_command,
+    rough_machine,
+    rough_report,
+)
 from drivers.virtual.firmware.kernel.supply import supply
 
 
@@ -54,9 +59,16 @@ def compiled(source_digest: str):  # type: ignore[no-untyped-def]
         """
         _ = source_digest
         for done in range(steps):
-            generate(p, s)
+            if s[k.S_ROUGH_WAIT] > 0.0:
+                s[k.S_ROUGH_WAIT] -= 1.0
+            else:
+                generate(p, s)
             control(p, s)
+            rough_command(p, s)
+            omega = x[1]
+            rough_machine(p, s, x, b)
             step_plant(p, s, x, a, b, gap_state, half_gap, scratch)
+            rough_report(p, s, x, omega)
             supply(p, s, x)
             measure(p, s, x, random)
             protect(p, s)

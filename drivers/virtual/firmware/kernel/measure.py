@@ -9,6 +9,7 @@ from numba import njit
 
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.kernel.basics import raise_event
+from drivers.virtual.firmware.kernel.rough_torque import interpolation_error
 
 
 @njit(nogil=True)
@@ -42,7 +43,7 @@ def _normal(s, random):  # type: ignore[no-untyped-def]
 @njit(nogil=True)
 def measure(p, s, x, random):  # type: ignore[no-untyped-def]
     """Encoder, feedback filters and switches."""
-    counts = x[0] * p[k.P_COUNTS_PER_RAD]
+    counts = (x[0] + interpolation_error(p, x[0])) * p[k.P_COUNTS_PER_RAD]
     if p[k.P_NOISE] > 0.0:
         counts += p[k.P_NOISE] * _normal(s, random)
     theta = math.floor(counts) / p[k.P_COUNTS_PER_RAD]

@@ -234,8 +234,8 @@ export const saidOfTuning = {
   ],
   'said.tShorter': ['a shorter cycle allows more', '更短的周期可测得更高'],
   'said.tByStep': [
-    'verified by its standstill and its step alone: too few lines of the tuned loop stand out of the noise for its margins to be read',
-    '仅通过静止和阶跃进行了验证：整定后回路高于噪声的谱线太少，无法读出裕度',
+    'too few lines of the tuned loop stand out of the noise for its margins to be read: it was verified by its standstill, its step, and steps with a raised gain',
+    '整定后回路高于噪声的谱线太少，无法读出裕度：已通过静止、阶跃和提高增益后的阶跃进行验证',
   ],
   'said.tCaution': [
     'tuned with caution, without notches and slower',
@@ -303,6 +303,26 @@ export const saidOfTuning = {
   'said.tUnseen': [
     'the loop crosses 0 dB for the last time at {hz} Hz, above the {highest} Hz that were verified with this cycle time: its margins there are predicted, and seen by the standstill and the step alone; a shorter cycle shows them',
     '回路最后一次穿越 0 dB 在 {hz} Hz，高于当前周期下已验证的 {highest} Hz：该处裕度为预测值，仅由静止和阶跃检验；更短的周期可测得',
+  ],
+  'said.tBounded': [
+    'the loop may cross 0 dB up to {hz} Hz, above the {highest} Hz that this cycle time shows: its margins there are predicted, and bounded by the loop being stable with {gain} dB more gain; a shorter cycle measures them',
+    '回路最高可能在 {hz} Hz 穿越 0 dB，高于当前周期可测的 {highest} Hz：该处裕度为预测值，并由增益提高 {gain} dB 时仍稳定所限定；更短的周期可测得',
+  ],
+  'said.tNotShown': [
+    'the loop crosses 0 dB at {hz} Hz, above the {highest} Hz that were measured, and was stable with {gain} dB more gain only, instead of {wanted} dB',
+    '回路在 {hz} Hz 穿越 0 dB，高于所测的 {highest} Hz，且仅在增益提高 {gain} dB 时稳定，应为 {wanted} dB',
+  ],
+  'said.tUnstable': [
+    'not stable for everything that the axis may be',
+    '对轴可能的所有情况并不都稳定',
+  ],
+  'said.tDropped': [
+    'the drive reports another torque (6077h) than the one that moves the axis, such as a filtered one or a copy of the demand: it was not used, and the path to the axis was found from the motion alone',
+    '驱动器报告的转矩（6077h）不是驱动轴的转矩，例如经过滤波或为指令的副本：未使用该转矩，仅由运动求得到轴的通路',
+  ],
+  'said.tSlow': [
+    'the torque follows its command more slowly than a current loop: a low-pass of the torque is set in the drive (torque filter), which limits every loop. What the response owes to its form is charged to the band',
+    '转矩跟随指令比电流环慢：驱动器中设置了转矩低通（转矩滤波器），它限制所有回路。其形式的影响已计入误差带',
   ],
   'said.tHum': [
     'the torque hums with {rms} % of the rated while it stands',

@@ -535,6 +535,22 @@ export const tuning = {
     'Before that: {predicted} predicted, {measured} measured. The axis was then taken as its loop showed it.',
     '此前：预测 {predicted}，测得 {measured}。随后以回路中测得的特性作为该轴的依据。',
   ],
+  'verdict.band': ['Margins by band', '各频段裕度'],
+  'verdict.measured': ['measured', '测得'],
+  'verdict.predicted': ['predicted', '预测'],
+  'verdict.peak': ['Largest |S|', '最大 |S|'],
+  'verdict.coverage.measured': [
+    'All crossovers lie within the measured band.',
+    '所有穿越频率均在所测频段内。',
+  ],
+  'verdict.coverage.gain_steps': [
+    'The loop may cross 0 dB up to {last}, above the measured band: it was stable with {gain} more gain, which bounds the margins there.',
+    '回路最高可能在 {last} 穿越 0 dB，高于所测频段：增益提高 {gain} 时仍稳定，由此限定该处的裕度。',
+  ],
+  'verdict.coverage.predicted': [
+    'The loop may cross 0 dB up to {last}, above the measured band: its margins there are predicted only.',
+    '回路最高可能在 {last} 穿越 0 dB，高于所测频段：该处的裕度仅为预测。',
+  ],
   'autotune.bandwidths': [
     'Bandwidth: {predicted} predicted, {measured} measured.',
     '带宽：预测 {predicted}，测得 {measured}。',
@@ -553,6 +569,7 @@ export const tuning = {
   'step.actual': ['actual', '实际'],
   'step.before': ['before', '之前'],
   'step.now': ['now', '现在'],
+  'step.windowWidened': ['Settling window, ten times the noise', '稳定窗口（噪声的十倍）'],
   'step.numbers': ['Numbers of the step', '阶跃数值'],
   'step.torque': ['Torque during the step', '阶跃转矩'],
   'step.torqueUnit': ['% of rated', '额定转矩 %'],

@@ -113,6 +113,10 @@ export interface Step {
   demand: number[]
   actual: number[]
   torque_percent: number[]
+  /** Settling window; absent in jobs of an older server. */
+  window?: number | null
+  /** Whether noise asked for a wider window than 2 % of the step. */
+  widened?: boolean
   step: {
     overshoot_percent: number
     rise_s: number | null
@@ -146,6 +150,31 @@ interface LoopFigures {
   gain_margin_db: number | null
 }
 
+/** A value with the ends of its 95 % interval. */
+export interface Interval {
+  value: number
+  low: number
+  high: number
+}
+
+/** Margins over one band; null where nothing crosses there. */
+export interface BandVerdict {
+  low_hz: number
+  high_hz: number
+  phase_margin_deg: Interval | null
+  gain_margin_db: Interval | null
+  peak_sensitivity: Interval | null
+}
+
+/** What is known of a tuned loop: measured over a band, predicted beyond it. */
+export interface Verdict {
+  measured: BandVerdict | null
+  predicted: BandVerdict | null
+  last_crossover_hz: number
+  coverage: 'measured' | 'gain_steps' | 'predicted'
+  shown_gain_db: number | null
+}
+
 export interface Autotune {
   inertia: Inertia
   mechanics: Sweep
@@ -156,6 +185,8 @@ export interface Autotune {
     sweep: Sweep
     predicted_bandwidth_hz: number | null
     measured_bandwidth_hz: number | null
+    /** Absent in jobs of an older server. */
+    verdict?: Verdict | null
   } | null
   /** What was made of a loop that answered otherwise than predicted; absent or null without. */
   again?: Again | null

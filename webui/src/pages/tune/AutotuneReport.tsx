@@ -17,6 +17,7 @@ import { CandidateTable } from './CandidateTable'
 import { forceOf } from './force'
 import { InertiaResult } from './InertiaPanel'
 import { StepNumbers } from './StepNumbers'
+import { VerdictTable } from './VerdictTable'
 
 const undone = new Set<string>()
 
@@ -188,6 +189,7 @@ function Verification({ drive, result }: { drive: string; result: Autotune }) {
         onMarker={() => {}}
       />
       <MarginList margins={verified.sweep.margins} />
+      {verified.verdict && <VerdictTable verdict={verified.verdict} />}
     </>
   )
 }

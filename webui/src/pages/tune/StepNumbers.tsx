@@ -90,6 +90,10 @@ const ROWS: Row[] = [
     text: 'candidate.settling',
     read: ({ step, move }) => ms((step ?? move)?.settling_s ?? null),
   },
+  {
+    text: 'step.windowWidened',
+    read: ({ widened, window, unit }) => (widened && window ? fixed(window, 2, unit) : null),
+  },
   { text: 'step.torquePeak', read: (each) => fixed(each.torque_peak_percent, 0, '%') },
   { text: 'step.torqueRms', read: (each) => fixed(each.torque_rms_percent, 0, '%') },
 ]

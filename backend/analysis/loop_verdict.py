@@ -1,0 +1,284 @@
+"""What is known of a tuned loop's margins, where they were measured and where they are predicted.
+
+A closed loop is measured up to a frequency; its last crossover may lie above it. Within the band
+margins are read from the lines, with the interval that the lines' deviations give. Beyond it they
+are those of a set of loops: every plant that the design counts on, moved by what the measured lines
+say of the prediction (gain and delay, with their deviations). A loop is judged by the worst of
+both. A measurement that shows a gain margin directly (the loop is stable with so much more gain)
+takes those members out of the set that it contradicts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray
+from backend.analysis.loop_goals import Goals, sensitivity_peak, stable, worst_of
+
+#: Deviations to either side that hold 95 of 100 cases.
+_CI95 = 1.96
+#: Gains that no crossing of the negative real axis limits are stated up to this.
+_MOST_DB = 60.0
+#: A prediction is not known better than this where it is not measured: logarithm of its size, and
+#: seconds of delay (half of the shortest loop period in use, 62.5 µs).
+_SIZE, _LATE_S = 0.05, 30e-6
+#: Where no line tells it: loop periods of 62.5 to 250 µs, where 50 µs are assumed, and 1.5 dB.
+_UNSEEN, _UNSEEN_S = 0.17, 200e-6
+#: Fewer lines say nothing of margins.
+_FEW = 6
+
+Coverage = Literal["measured", "gain_steps", "predicted"]
+Missing = Literal["phase_margin", "gain_margin", "peak_sensitivity", "stability", "coverage"]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value and the limits that hold the truth in 95 of 100 cases."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class BandVerdict:
+    """Margins over one band, in degrees and dB; None where nothing crosses there.
+
+    ``peak_sensitivity`` is the largest |S| within the band: it may be below 1 there, and is no
+    peak sensitivity of the loop then (Bode's integral puts that above 1).
+    """
+
+    low_hz: float
+    high_hz: float
+    phase_margin_deg: Interval | None
+    gain_margin_db: Interval | None
+    peak_sensitivity: Interval | None
+
+
+@dataclass(frozen=True)
+class Missed:
+    """One figure that is worse than asked for."""
+
+    what: Missing
+    value: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class LoopVerdict:
+    """``measured`` over its band, ``predicted`` beyond it, and the worst case of both.
+
+    ``last_crossover_hz`` is the highest of all loops that are possible. ``coverage``: all crossings
+    are measured; or those beyond the band are bounded by a gain that was raised by
+    ``shown_gain_db``; or they are predicted, which keeps no design. ``stated`` are the worst
+    figures of both bands, ``worst`` the ends of their intervals; None where no crossing is known.
+    ``delay_s`` and ``gain_db`` are what the measured lines add to the prediction.
+    """
+
+    measured: BandVerdict | None
+    predicted: BandVerdict | None
+    last_crossover_hz: float
+    coverage: Coverage
+    shown_gain_db: float | None
+    stated: Goals
+    worst: Goals
+    stable: bool
+    delay_s: Interval
+    gain_db: Interval
+
+    def missed(
+        self, promised: Goals, margin_deg: float, margin_db: float, ms_ratio: float
+    ) -> tuple[Missed, ...]:
+        """What is worse than promised, less what a margin may be off by; empty where all is kept.
+
+        The stated figures must reach the promise, the ends of their intervals twice as far below.
+        """
+        found = []
+        if not self.stable:
+            found.append(Missed("stability", 0.0, 1.0))
+        if self.coverage == "predicted":
+            band = self.measured.high_hz if self.measured is not None else 0.0
+            found.append(Missed("coverage", self.last_crossover_hz, band))
+        pairs: tuple[tuple[Missing, float, float, float], ...] = (
+            ("phase_margin", self.stated.phase_margin_deg, promised.phase_margin_deg, margin_deg),
+            ("gain_margin", self.stated.gain_margin_db, promised.gain_margin_db, margin_db),
+        )
+        for what, value, limit, slack in pairs:
+            if value < limit - slack:
+                found.append(Missed(what, value, limit))
+        if self.stated.ms > promised.ms * ms_ratio:
+            found.append(Missed("peak_sensitivity", self.stated.ms, promised.ms))
+        return tuple(found)
+
+
+@dataclass(frozen=True)
+class Lines:
+    """A measured closed loop [n]; ``deviation`` (one) is that of its logarithm, per component."""
+
+    frequency_hz: FloatArray
+    closed: ComplexArray
+    deviation: FloatArray
+
+
+def judge(
+    lines: Lines | None,
+    frequency_hz: FloatArray,
+    loops: ComplexArray,
+    nominal: ComplexArray,
+    *,
+    shown_gain_db: float | None = None,
+    late_s: tuple[float, float] | None = None,
+    size: tuple[float, float] | None = None,
+) -> LoopVerdict:
+    """The verdict on a loop.
+
+    ``loops`` [m, n] on the dense grid ``frequency_hz`` are all that the loop may be, ``nominal``
+    [n] the one that was measured as predicted. ``lines`` None: nothing was measured. ``late_s`` and
+    ``size`` (logarithm) are what the measured lines show the loop to have beyond its prediction,
+    each with its deviation; None where they tell nothing.
+    """
+    measured, top = None, 0.0
+    if lines is not None and lines.frequency_hz.size >= _FEW:
+        measured, top = _measured(lines), float(lines.frequency_hz[-1])
+    delay, gain = _known(late_s, _LATE_S, _UNSEEN_S), _known(size, _SIZE, _UNSEEN)
+    # What is measured makes a prediction worse where it is, and never better beyond it.
+    delay = Interval(max(delay.value, 0.0), max(delay.low, 0.0), max(delay.high, _LATE_S))
+    possible = _moved(frequency_hz, loops, gain, delay)
+    if shown_gain_db is not None:
+        more = possible * 10 ** (shown_gain_db / 20.0)
+        left = possible[np.asarray(stable(more))]
+        # Where nothing in the set explains what was seen, the set is wrong: it says nothing less.
+        possible = left if left.size else possible
+    over = np.abs(possible) > 1.0
+    crossing = np.flatnonzero(np.any(over[:, 1:] != over[:, :-1], axis=0))
+    last = float(frequency_hz[crossing[-1] + 1]) if crossing.size else 0.0
+    coverage: Coverage = "measured" if last <= top else "predicted"
+    if coverage == "predicted" and shown_gain_db is not None:
+        coverage = "gain_steps"
+    beyond = _beyond(frequency_hz, possible, _moved_once(frequency_hz, nominal, gain, delay), top)
+    sound = bool(np.all(stable(possible)))
+    stated, worst = _worst(measured, beyond)
+    return LoopVerdict(
+        measured, beyond, last, coverage, shown_gain_db, stated, worst, sound,
+        delay, _in_db(gain),
+    )  # fmt: skip
+
+
+def _in_db(size: Interval) -> Interval:
+    factor = 20.0 / np.log(10.0)
+    return Interval(factor * size.value, factor * size.low, factor * size.high)
+
+
+def _measured(lines: Lines) -> BandVerdict:
+    """Margins of the measured lines; S = 1 - T is known to |T| times what T's logarithm is."""
+    f, closed = lines.frequency_hz, lines.closed
+    loop = closed / (1.0 - closed)
+    apart = lines.deviation * np.abs(closed)
+    steep = lines.deviation / np.maximum(np.abs(1.0 - closed), 1e-9)
+    s = np.abs(1.0 - closed)
+    top = int(np.argmax(s))
+    peak = Interval(
+        float(s[top]), float(np.max(s - _CI95 * apart)), float(s[top] + _CI95 * apart[top])
+    )
+    over = np.abs(loop) > 1.0
+    at = np.flatnonzero(over[1:] != over[:-1])
+    margins = []
+    for i in at:
+        share = _share(np.log(np.abs(loop[i])), np.log(np.abs(loop[i + 1])))
+        turn = np.unwrap(np.angle(-loop[i : i + 2]))
+        value = float(np.degrees(abs(turn[0] * (1 - share) + turn[1] * share)))
+        off = _CI95 * float(np.degrees(max(steep[i], steep[i + 1])))
+        margins.append(Interval(value, value - off, value + off))
+    phase = min(margins, key=lambda m: m.value, default=None)
+    gains = []
+    flips = (loop.imag[1:] > 0) != (loop.imag[:-1] > 0)
+    for i in np.flatnonzero(flips & (loop.real[1:] < 0) & (loop.real[:-1] < 0)):
+        share = _share(float(loop.imag[i]), float(loop.imag[i + 1]))
+        level = -(loop.real[i] * (1 - share) + loop.real[i + 1] * share)
+        if 0.0 < level < 1.0:
+            value = float(-20.0 * np.log10(level))
+            off = _CI95 * 20.0 / np.log(10.0) * float(max(steep[i], steep[i + 1]))
+            gains.append(Interval(value, value - off, value + off))
+    gain = min(gains, key=lambda m: m.value, default=None)
+    return BandVerdict(float(f[0]), float(f[-1]), phase, gain, peak)
+
+
+def _share(before: float, after: float) -> float:
+    """Where between two values of opposite sign zero lies, 0 to 1."""
+    return 0.5 if before == after else float(np.clip(before / (before - after), 0.0, 1.0))
+
+
+def _known(found: tuple[float, float] | None, least: float, unseen: float) -> Interval:
+    """A value by its deviation, but never better known than ``least``; else within ``unseen``."""
+    if found is None:
+        return Interval(0.0, -least, unseen)
+    value, std = found
+    off = float(np.hypot(_CI95 * std, least))
+    return Interval(value, value - off, value + off)
+
+
+def _moved(
+    frequency_hz: FloatArray, loops: ComplexArray, size: Interval, late_s: Interval
+) -> ComplexArray:
+    """Every loop with every size and delay at the ends of what they may be."""
+    turn = -2j * np.pi * frequency_hz
+    rows = [
+        loops * np.exp(a + turn * d)
+        for a in (size.low, size.high)
+        for d in (late_s.low, late_s.high)
+    ]
+    return np.concatenate(rows)
+
+
+def _moved_once(
+    frequency_hz: FloatArray, loop: ComplexArray, size: Interval, late_s: Interval
+) -> ComplexArray:
+    """The nominal loop as the measured lines say."""
+    moved = loop * np.exp(size.value - 2j * np.pi * frequency_hz * late_s.value)
+    return np.asarray(moved)[None, :]
+
+
+def _beyond(
+    frequency_hz: FloatArray, possible: ComplexArray, nominal: ComplexArray, from_hz: float
+) -> BandVerdict | None:
+    """Margins above what was measured: of the nominal loop, and the worst that is possible."""
+    use: BoolArray = frequency_hz >= from_hz
+    if np.count_nonzero(use) < 2:
+        return None
+    f = frequency_hz[use]
+    worst, mean = worst_of(possible[:, use]), worst_of(nominal[:, use])
+    peak = sensitivity_peak(nominal[:, use])
+    over = np.abs(possible[:, use]) > 1.0
+    crosses = bool(np.any(over[:, 1:] != over[:, :-1]))
+    phase = (
+        Interval(mean.phase_margin_deg, worst.phase_margin_deg, mean.phase_margin_deg)
+        if crosses
+        else None
+    )
+    gain = Interval(mean.gain_margin_db, worst.gain_margin_db, mean.gain_margin_db)
+    return BandVerdict(
+        float(f[0]), float(f[-1]), phase, gain if worst.gain_margin_db < _MOST_DB else None,
+        Interval(peak, peak, max(worst.ms, peak)),
+    )  # fmt: skip
+
+
+def _worst(measured: BandVerdict | None, beyond: BandVerdict | None) -> tuple[Goals, Goals]:
+    """The worst stated figures of both bands, and the worst ends of their intervals."""
+    bands = [band for band in (measured, beyond) if band is not None]
+    phase = [b.phase_margin_deg for b in bands if b.phase_margin_deg is not None]
+    gain = [b.gain_margin_db for b in bands if b.gain_margin_db is not None]
+    peak = [b.peak_sensitivity for b in bands if b.peak_sensitivity is not None]
+
+    def goals(end: Literal["value", "worst"]) -> Goals:
+        low = "value" if end == "value" else "low"
+        high = "value" if end == "value" else "high"
+        return Goals(
+            min((getattr(i, low) for i in gain), default=_MOST_DB),
+            min((getattr(i, low) for i in phase), default=90.0),
+            max([1.0, *(getattr(i, high) for i in peak)]),
+        )
+
+    return goals("value"), goals("worst")

@@ -1,0 +1,100 @@
+"""How a closed loop's reference reached it: hold and delay, tested on the measured loop itself.
+
+A closed loop T is the measured response over what hold and delay make of the reference. Where the
+open loop is large T is 1 whatever the plant is, so that a phase left there is the reference's and
+none of the loop's; an error of the plant shows in T by its sensitivity S = 1 - T. Delay of the
+reference, size and delay of the loop are therefore told apart by least squares, for each hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.sampling import Hold, hold_response
+
+#: What a line may be off by, whatever its scatter says (logarithm).
+_OFF = 0.02
+#: A drive in step with the bus takes references at its cycles: one deviation, in cycles. Where the
+#: path that the mechanics showed is the one that explains the loop, nothing else is looked for.
+_STEADY_CYCLES = 0.3
+#: What a loop's delay and size may differ by from the prediction, one deviation: loop periods of
+#: 62.5 to 250 µs where 50 µs are assumed.
+_LOOP_LATE_S, _LOOP_SIZE = 100e-6, 0.3
+#: A delay is put right where it is so many deviations from the assumed one.
+_SURE = 3.0
+#: Holds whose misfit differs by less than this share are both possible.
+_ALIKE = 1.25
+_FEW = 12
+
+
+@dataclass(frozen=True)
+class ReferencePath:
+    """One hold with what makes the measured loop most like the predicted one.
+
+    ``late_s`` is the reference's delay beyond the assumed one with its deviation; ``misfit`` the
+    root mean square of what is left, in deviations.
+    """
+
+    hold: Hold
+    late_s: float
+    late_std_s: float
+    misfit: float
+    closed: ComplexArray
+    """The closed loop with this hold and, where it is sure, this delay taken out."""
+    loop_late_s: tuple[float, float] = (0.0, _LOOP_LATE_S)
+    loop_size: tuple[float, float] = (0.0, _LOOP_SIZE)
+    """Delay and size (logarithm) of the loop beyond the predicted, each with its deviation."""
+
+
+def reference_paths(
+    frequency_hz: FloatArray, closed: ComplexArray, deviation: FloatArray, predicted: ComplexArray,
+    *, rate_hz: float, hold: Hold, holds: Sequence[Hold] = ("zero", "linear"),
+) -> tuple[ReferencePath, ...]:  # fmt: skip
+    """The holds that may be, most likely first.
+
+    ``closed`` was evaluated with ``hold``; ``predicted`` is the open loop expected on the lines.
+    """
+    f = frequency_hz
+    if f.size < _FEW:
+        return (ReferencePath(hold, 0.0, np.inf, np.inf, closed),)
+    expected = predicted / (1.0 + predicted)
+    s = 1.0 / (1.0 + predicted)
+    weight = 1.0 / np.hypot(deviation, _OFF)
+    found = []
+    for each in holds:
+        given = closed * hold_response(f, rate_hz, hold) / hold_response(f, rate_hz, each)
+        found.append(_fitted(each, f, given, expected, s, weight, rate_hz))
+    found.sort(key=lambda p: p.misfit)
+    return tuple(p for p in found if p.misfit <= _ALIKE * found[0].misfit)
+
+
+def _fitted(
+    hold: Hold, f: FloatArray, closed: ComplexArray, expected: ComplexArray, s: ComplexArray,
+    weight: FloatArray, rate_hz: float,
+) -> ReferencePath:  # fmt: skip
+    """Delay of the reference beside delay and size of the loop, by robust linear least squares."""
+    rows = np.log(closed / expected)
+    turn = -2j * np.pi * f
+    columns = np.column_stack([turn, s * turn, s])
+    prior = np.diag([rate_hz / _STEADY_CYCLES, 1.0 / _LOOP_LATE_S, 1.0 / _LOOP_SIZE])
+    w = weight.copy()
+    x, left, covariance = np.zeros(3), rows, np.eye(3)
+    for _ in range(4):
+        a = columns * w[:, None]
+        matrix = np.concatenate([a.real, a.imag, prior])
+        target = np.concatenate([(rows * w).real, (rows * w).imag, np.zeros(3)])
+        x = np.linalg.lstsq(matrix, target, rcond=None)[0]
+        left = rows - columns @ x
+        covariance = np.linalg.inv(matrix.T @ matrix)
+        w = weight / np.sqrt(1.0 + (np.abs(left) * weight / 3.0) ** 2)
+    misfit = float(np.sqrt(np.mean((np.abs(left) * w) ** 2)))
+    stds = np.sqrt(np.diag(covariance)) * max(misfit, 1.0)
+    late = float(x[0]) if abs(x[0]) > _SURE * stds[0] else 0.0
+    return ReferencePath(
+        hold, float(x[0]), float(stds[0]), misfit, np.asarray(closed * np.exp(-turn * late)),
+        (float(x[1]), float(stds[1])), (float(x[2]), float(stds[2])),
+    )  # fmt: skip
