@@ -203,10 +203,11 @@ def _debt(value: _Value) -> Debt:
 
 
 def _slug(drive: DriveIdentity) -> str:
-    """A name for the file: readable, and another one for another place."""
+    """A name for the file: readable, and another one for another drive or place."""
     url, station = drive.places[0] if drive.places else ("", 0)
     words = re.sub(r"[^A-Za-z0-9]+", "-", f"{url}-{station}").strip("-")[:60]
-    return f"{words}-{hashlib.sha256(f'{url} {station}'.encode()).hexdigest()[:8]}"
+    whole = f"{url} {station} {drive.vendor_id} {drive.product_code} {drive.serial}"
+    return f"{words}-{hashlib.sha256(whole.encode()).hexdigest()[:8]}"
 
 
 def _flush(file: Path) -> None:
