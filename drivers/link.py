@@ -276,6 +276,14 @@ class TakesSpeeds(Protocol):
 
 
 @runtime_checkable
+class Pauses(Protocol):
+    """A cyclic exchange that can brake an axis and hold it, enabled, for the next motion."""
+
+    async def pause(self, station: int) -> None:
+        """Brake now and hold; nothing where nothing moves. The motion is over."""
+
+
+@runtime_checkable
 class OwnsPowerState(Protocol):
     """A cyclic exchange whose loop writes the control word, so that nobody else may."""
 
