@@ -85,12 +85,11 @@ class Hold:
         if now - alive > GAP_S:
             # It proves that the page lived some time ago, and no more.
             return
-        if self._gap_began is not None:
+        if self._gap_began is not None and self._back is None:
             if alive - self._gap_began > RESUME_S:
                 self.release(_EXPIRED)
                 return
-            if self._back is None:
-                self._back = now
+            self._back = now
         self._alive = alive
 
     def release(self, reason: str, number: int = 0) -> None:

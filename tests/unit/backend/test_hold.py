@@ -156,7 +156,7 @@ def test_a_burst_without_a_release_goes_on_only_with_what_comes_after_it() -> No
     assert held.first("moves", 1.2) >= 1.44 + CONFIRM_S
 
 
-@pytest.mark.parametrize("order", itertools.permutations(range(3)))
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
 def test_signs_and_a_release_in_whatever_order_they_arrive(order: tuple[int, ...]) -> None:
     """Three messages after a gap of 0.4 s, the one in the middle a release."""
     held = Held()
