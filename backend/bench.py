@@ -30,10 +30,10 @@ from backend.monitor import Monitor, Snapshot
 from backend.motion.authority import MotionAuthority
 from backend.motion.axes import Motion
 from backend.naming import PlaceNames, new_id
-from backend.owed_store import OwedStore
 from backend.ports import Port
 from backend.readings import Reading
 from backend.records import Records
+from backend.restore.store import RestoreStore
 from backend.returning import Returning
 from backend.scope import ScopeHub
 from drivers.errors import Busy, DriveError, NotAllowed
@@ -82,7 +82,7 @@ class Bench:
         self.leases = Leases(self._lease_changed)
         self.witness = Witness(self.audit, self.name_of)
         self.on_job.append(self.witness.job_changed)
-        self.returning = Returning(self, OwedStore(state_folder / "owed"))
+        self.returning = Returning(self, RestoreStore(state_folder, "a server"))
         self.scope = ScopeHub(lambda drive: self.member(drive).axis)
         self.state_folder = state_folder
         self.axis_records = AxisStore(state_folder / "axes")

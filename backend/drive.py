@@ -507,6 +507,17 @@ class Drive:
             raise ValueError(f"{parameter.key} = {raw} does not only stop")
         await self._sent(parameter, raw)
 
+    async def stop_by(self, key: str, raw: int) -> None:
+        """Write what STOP brakes with, without reading back or a grant.
+
+        For `backend.stopping` alone (a test holds that): some ways to brake are values that could
+        move an axis at another time, such as another mode with the setpoint zero, or halt.
+
+        Raises:
+            DriveError: as `write`.
+        """
+        await self._sent(self.parameter(key), raw)
+
     async def trigger(self, key: str, raw: int) -> None:
         """Write an object that runs something and moves nothing, without reading back.
 

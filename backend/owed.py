@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from backend.readings import Reading
 from profiles.schema import Raw
@@ -24,6 +25,17 @@ class Debt:
     unapplied: bool = False
 
 
+class Note(Protocol):
+    """What writes the list down; ``durable`` waits for the disk, within bounds."""
+
+    def __call__(self, *, durable: bool = False) -> None:
+        """Write down what is outstanding now."""
+
+
+def _no_note(*, durable: bool = False) -> None:
+    """Nobody keeps the list."""
+
+
 class Owed:
     """The debts to one drive, in the order in which they arose. For the event loop."""
 
@@ -32,7 +44,7 @@ class Owed:
         self._lent: dict[str, list[Raw]] = {}
         self._sent: dict[str, frozenset[Raw]] = {}
         self._listeners: list[Callable[[], None]] = []
-        self._note: Callable[[], None] = lambda: None
+        self._note: Note = _no_note
 
     def __bool__(self) -> bool:
         return bool(self._debts)
@@ -41,8 +53,8 @@ class Owed:
         """Call ``listener`` after every change of the list."""
         self._listeners.append(listener)
 
-    def keep(self, note: Callable[[], None]) -> None:
-        """Call ``note`` after every change of `outstanding`."""
+    def keep(self, note: Note) -> None:
+        """Call ``note`` after every change of `outstanding`; durable before a value changes."""
         self._note = note
 
     def recall(self, debts: Iterable[Debt]) -> None:
@@ -57,7 +69,8 @@ class Owed:
         lent = dict(values)
         for key, raw in lent.items():
             self._lent.setdefault(key, []).append(raw)
-        self._note()
+        if lent:
+            self._note(durable=True)
         try:
             yield
         finally:

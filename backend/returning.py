@@ -10,7 +10,9 @@ from backend.drive_identity import confirm_identity
 from backend.files import StorageFailed
 from backend.jobs import Job, JobResult, Progress
 from backend.monitor import Snapshot
-from backend.owed_store import OwedStore
+from backend.restore.identity import identity_of
+from backend.restore.keep import keep_list
+from backend.restore.store import RestoreStore
 from backend.tools.settling import settle
 from drivers.cia402 import State
 from drivers.errors import Busy, NotAllowed
@@ -26,44 +28,38 @@ _STANDS_S, _STANDS_RPM = 0.5, 5.0
 class Returning:
     """For the drives of one bench."""
 
-    def __init__(self, bench: Bench, notes: OwedStore) -> None:
+    def __init__(self, bench: Bench, lists: RestoreStore) -> None:
         self._bench = bench
-        self._notes = notes
-        self._noted = True
+        self._lists = lists
         #: Drives to which something is owed, and whose axis did not stand free when they answered.
         self._awaited: set[str] = set()
 
     def begin(self, axis: Axis) -> None:
-        """Recall what an earlier server left in a drive; note from now on what is owed to it.
+        """Recall what an earlier server or command left in a drive; keep its list from now on.
 
-        An axis that was moved by a server which was killed a moment ago is stopped: what a drive
+        An axis that was moved by a process which was killed a moment ago is stopped: what a drive
         carries out by itself (a homing that looks for a switch) goes on without anybody.
         """
-        drive = axis.drive
-        debts, serial = self._notes.get(drive.id, _serial(drive))
-        if debts and self._notes.was_moved(drive.id):
+        drive, journal = axis.drive, self._bench.journal
+        known = self._lists.list_of(identity_of(drive), drive.id)
+        pending = known.pending
+        if pending.moved:
             axis.owes_stop = True
-        drive.owed.recall(debts)
-        drive.owed.keep(lambda: self._note(axis))
-        if drive.found is None and serial is not None:
-            # What is owed is owed to that one: another that answers here is noticed.
-            drive.found = Found(drive.ports[0].station, serial=serial)
+        if pending.held_by:
+            text = f"{drive.name}: {pending.held_by} moves this drive now and restores it itself"
+            journal.add(text, level="warning", drive=drive.id)
 
-    def _note(self, axis: Axis) -> None:
-        drive, owed = axis.drive, axis.drive.owed
+        def failed(error: StorageFailed) -> None:
+            text = f"a server that is killed in a motion will not know what to restore: {error}"
+            journal.add(text, level="warning", drive=drive.id)
+
         # A stop that did not reach the drive is owed to it by the next server, too.
-        moves = owed.in_motion or axis.owes_stop
-        try:
-            self._notes.put(drive.id, _serial(drive), owed.outstanding, in_motion=moves)
-        except StorageFailed as error:
-            if self._noted:
-                text = (
-                    f"a server that is killed in a motion will not know what to put back: {error}"
-                )
-                self._bench.journal.add(text, level="warning", drive=drive.id)
-            self._noted = False
-        else:
-            self._noted = True
+        keep_list(
+            drive, known, in_motion=lambda: drive.owed.in_motion or axis.owes_stop, failed=failed
+        )
+        if drive.found is None and pending.serial is not None:
+            # What is pending is of that one: another that answers here is noticed.
+            drive.found = Found(drive.ports[0].station, serial=pending.serial)
 
     def returned(self, drive_id: str) -> None:
         """It may have restarted, so everything is read anew, and what is owed to it is put back."""

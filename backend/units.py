@@ -53,8 +53,9 @@ class AxisUnits:
         velocity, acceleration = (
             by_text(quantity, text, per_rev, Origin.MANUAL, spec)
             for quantity, text in (
-                (Quantity.VELOCITY, spec.velocity), (Quantity.ACCELERATION, spec.acceleration),
-            )  # fmt: skip
+                (Quantity.VELOCITY, spec.velocity),
+                (Quantity.ACCELERATION, spec.acceleration),
+            )
         )
         return Scales(position, velocity, acceleration)
 

@@ -186,7 +186,7 @@ class Envelope:
     torque_max: float | None = None
     following_error_max: float | None = None
     feedback: FeedbackScale | None = None
-    """How 606Ch and 6064h hang together: both are compared then, and the speed limit watches both."""
+    """Scale between 606Ch and 6064h: both are compared then, and the speed limit watches both."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,6 +276,14 @@ class TakesSpeeds(Protocol):
 
         Where speeds of the mode CSV are asked for, the mode is then Profile velocity.
         """
+
+
+@runtime_checkable
+class Pauses(Protocol):
+    """A cyclic exchange that can brake an axis and hold it, enabled, for the next motion."""
+
+    async def pause(self, station: int) -> None:
+        """Brake now and hold; nothing where nothing moves. The motion is over."""
 
 
 @runtime_checkable

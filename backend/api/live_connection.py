@@ -221,9 +221,9 @@ class Connection:
             case StopAll():
                 await self._stop(request)
             case JogRenew():
-                self.jogs.renew(request.drive)
+                self.jogs.renew(request)
             case JogStop():
-                self.jogs.release(request.drive, request.reason or "released")
+                self.jogs.release(request.drive, request.reason or "released", request.press)
             case JogStart():
                 self.jogs.start(request, self.identity.person)
             case WatchState():

@@ -8,12 +8,13 @@ from pydantic import BaseModel
 
 from backend.api.convert_motion import jog_settings, unit_of
 from backend.api.errors import problem_of
-from backend.api.live_messages import JogEnded, JogStart
+from backend.api.live_messages import JogEnded, JogGap, JogRenew, JogStart
 from backend.bench import Bench
 from backend.jobs import JobResult, Progress
 from backend.member import Member
 from backend.tools.cyclic_motion import jog_cyclic
-from backend.tools.jog import Hold, jog
+from backend.tools.hold import Hold
+from backend.tools.jog import jog
 from drivers.errors import DriveError
 
 
@@ -24,16 +25,20 @@ class Jogs:
         self._bench, self._connection, self._send = bench, connection, send
         self._holds: dict[str, Hold] = {}
 
-    def renew(self, drive: str) -> None:
-        """The button is still held."""
-        if (hold := self._holds.get(drive)) is not None:
-            hold.renew()
+    def renew(self, sign: JogRenew) -> None:
+        """A sign of life of a press, or of its release."""
+        if (hold := self._holds.get(sign.drive)) is not None:
+            hold.renew(
+                sign.press, sign.sign,
+                sent_s=None if sign.sent_ms is None else sign.sent_ms / 1e3,
+                silent_s=sign.silent_ms / 1e3, pressed=sign.pressed,
+            )  # fmt: skip
 
-    def release(self, drive: str | None, reason: str) -> None:
-        """End the jog of one axis, or all."""
+    def release(self, drive: str | None, reason: str, press: int = 0) -> None:
+        """End the jog of one axis, or all; of one press, or whatever is held."""
         for each, hold in self._holds.items():
             if drive in (None, each):
-                hold.release(reason)
+                hold.release(reason, press)
 
     def start(self, request: JogStart, person: str) -> None:
         """Begin a jog, and take control for its length where nobody has it.
@@ -44,7 +49,11 @@ class Jogs:
         bench, member = self._bench, self._bench.member(request.drive)
         held_before = bench.leases.holder(request.drive) is not None
         bench.leases.take(request.drive, self._connection, person)
-        hold = Hold()
+
+        def gap(braking: bool, length_s: float) -> None:
+            self._send(JogGap(drive=request.drive, braking=braking, gap_ms=1e3 * length_s))
+
+        hold = Hold(request.press, paused=gap)
         try:
             job = bench.jobs.start(
                 "jog",

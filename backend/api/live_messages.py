@@ -62,13 +62,30 @@ class JogStart(Message):
     unit: Literal["rev", "mm", "°"] = Field(
         default="rev", description="unit of travel; speed is then rpm, mm/s or °/s"
     )
+    press: int = Field(
+        default=0, ge=0, description="number of this press, higher than that of the one before"
+    )
 
 
 class JogRenew(Message):
-    """The button is still held. Send at 20 Hz or faster."""
+    """A sign of life: the button is still held. Send at 20 Hz or faster.
+
+    The axis brakes where none comes for 200 ms, and goes on where the hold is alive again within
+    500 ms and was never released.
+    """
 
     type: Literal["jog_renew"] = "jog_renew"
     drive: str
+    press: int = Field(default=0, ge=0, description="of which press; 0: of any")
+    sign: int | None = Field(default=None, ge=0, description="counts the signs of a press")
+    sent_ms: float | None = Field(
+        default=None, allow_inf_nan=False, description="when it was sent, by the sender's own clock"
+    )
+    silent_ms: float = Field(
+        default=0.0, ge=0, allow_inf_nan=False,
+        description="how long the page had not been heard by its worker then",
+    )  # fmt: skip
+    pressed: bool = Field(default=True, description="False: the button was let go")
 
 
 class JogStop(Message):
@@ -76,6 +93,7 @@ class JogStop(Message):
 
     type: Literal["jog_stop"] = "jog_stop"
     drive: str
+    press: int = Field(default=0, ge=0, description="of which press; 0: of any")
     reason: str = Field(default="", max_length=200)
 
 
@@ -186,6 +204,15 @@ class JogEnded(Message):
     drive: str
     reason: str
     problem: Problem | None = None
+
+
+class JogGap(Message):
+    """The signs of life of a jog had a gap: the axis brakes, or goes on after it."""
+
+    type: Literal["jog_gap"] = "jog_gap"
+    drive: str
+    braking: bool = Field(description="True where the gap began, False where the axis goes on")
+    gap_ms: float = Field(description="length of the gap so far")
 
 
 class ScopeInfo(Message):

@@ -10,7 +10,8 @@ from backend import parameter_set
 from backend.axis import Axis
 from backend.commands import values
 from backend.commands.options import Place
-from backend.commands.session import drive_at, progress, show_progress
+from backend.commands.restoring import require_own_values, show_restored, stop_what_was_moved
+from backend.commands.session import drive_and_pending, drive_at, progress, show_progress
 from backend.commands.values import Compared
 from backend.drive import Drive
 from backend.files import write_atomically
@@ -19,6 +20,7 @@ from backend.motion.classes import motion_of
 from backend.motion.doors import refused
 from backend.parameter_set import ParameterSet
 from backend.tools import parameters, procedures
+from backend.tools.settling import settle
 from drivers.errors import NotAllowed
 from profiles.schema import Raw
 
@@ -74,8 +76,26 @@ async def save(place: Place) -> None:
                 drive=drive.name,
                 remedy="nothing needs to be done",
             )
+        require_own_values(drive)
         await procedures.run_procedure(Axis(drive), known, True, progress())
         print(f"{drive.name}: saved in the drive's memory")
+
+
+async def restore(place: Place, *, keep: bool) -> None:
+    """Restore what a motion left that was cut off, or let it stay as it is."""
+    async with drive_and_pending(place.url, place.station, place.profile) as (drive, pending):
+        listed = drive.owed.debts
+        if not listed:
+            print(f"{drive.name}: nothing is pending")
+            return
+        if keep:
+            drive.owed.settle([value.key for value in listed])
+            for value in listed:
+                print(f"{drive.name}: {value.key} (was {value.raw}) stays as it is")
+            return
+        axis = Axis(drive)
+        await stop_what_was_moved(axis, pending)
+        show_restored(drive.name, await settle(axis, asked=True))
 
 
 async def diff(place: Place, file: Path, *, as_json: bool) -> bool:

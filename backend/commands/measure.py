@@ -14,7 +14,8 @@ import typer
 from backend.api.models_bench import DriveSummary
 from backend.axis import Axis, Envelope
 from backend.commands.remote import Remote, remote
-from backend.commands.session import drive_at, progress, run_in_order
+from backend.commands.restoring import restore_first
+from backend.commands.session import drive_and_pending, progress, run_in_order
 from backend.cyclic import CyclicSession
 from backend.files import write_atomically
 from drivers.errors import NotAllowed
@@ -186,8 +187,9 @@ async def exchanging(
 
     if url is None:
         raise NotAllowed("give a bus URL, or --server and --axis", remedy="see --help")
-    async with drive_at(url, station, profile) as drive:
+    async with drive_and_pending(url, station, profile) as (drive, pending):
         axis = Axis(drive)
+        await restore_first(axis, pending)
         await take_taught(axis)
         link = drive.ports[0].link
         by_speed = {drive.id} if profile_speed.needed(drive, link) else set[str]()

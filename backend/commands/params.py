@@ -35,6 +35,8 @@ class _Params(Protocol):
 
     async def save(self, place: Place) -> None: ...
 
+    async def restore(self, place: Place, *, keep: bool) -> None: ...
+
     async def diff(self, place: Place, file: Path, *, as_json: bool) -> bool: ...
 
     async def load(self, place: Place, file: Path, *, yes: bool, other_drive: bool) -> bool: ...
@@ -111,6 +113,25 @@ def save(
     async def work() -> None:
         where = place(url, station, profile, server)
         await _by(where).save(where)
+
+    run(work)
+
+
+@app.command("restore")
+def restore(
+    url: Url,
+    station: Station = 1,
+    profile: Profile = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="write nothing: the values shall stay as they are")
+    ] = False,
+    server: Server = None,
+) -> None:
+    """Restore what a motion borrowed and left, because its command or server was cut off."""
+
+    async def work() -> None:
+        where = place(url, station, profile, server)
+        await _by(where).restore(where, keep=keep)
 
     run(work)
 

@@ -16,6 +16,7 @@ from backend.api.models_sets import Diff
 from backend.commands import values
 from backend.commands.options import Place
 from backend.commands.remote import Remote, remote
+from backend.commands.restoring import show_restored
 from backend.commands.values import Compared
 from backend.files import write_atomically
 from backend.parameter_set import parse
@@ -46,6 +47,21 @@ async def save(place: Place) -> None:
     async with remote_drive(place) as (at, drive):
         await at.result(f"/drives/{drive.id}/procedures/save", {"confirmed": True})
         print(f"{drive.name}: saved in the drive's memory")
+
+
+async def restore(place: Place, *, keep: bool) -> None:
+    """Restore what a motion left that was cut off, or let it stay as it is."""
+    async with remote_drive(place) as (at, drive):
+        if not drive.owed:
+            print(f"{drive.name}: nothing is pending")
+            return
+        if keep:
+            await at.ask("DELETE", f"/drives/{drive.id}/owed", DriveSummary)
+            for value in drive.owed:
+                print(f"{drive.name}: {value.key} (was {value.raw}) stays as it is")
+            return
+        found = await at.result(f"/drives/{drive.id}/jobs/put-back", {})
+        show_restored(drive.name, found)
 
 
 async def dump(

@@ -203,8 +203,9 @@ def _turned(increments: int) -> float | None:
         typer.prompt(
             f"moved {increments} increments. How far did the shaft turn, in revolutions? "
             "(empty: not visible, move ten times as far)",
-            default="", show_default=False,
-        )  # fmt: skip
+            default="",
+            show_default=False,
+        )
     )
     return float(answer.replace(",", ".")) if answer.strip() else None
 

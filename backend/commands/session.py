@@ -13,10 +13,12 @@ from typing import ParamSpec, TypeVar
 
 import typer
 
+from backend.commands.restoring import recall
 from backend.drive import Drive
 from backend.jobs import Progress
 from backend.matching import match_profiles, profile_for
 from backend.ports import Port
+from backend.restore.store import Pending
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link, NeedsProfile
 from drivers.urls import link_for
@@ -128,6 +130,21 @@ async def opened(url: str) -> AsyncIterator[Link]:
 async def drive_at(url: str, station: int, profile: str | None) -> AsyncIterator[Drive]:
     """A drive on a bus. Without ``profile`` it is recognised, or the choices are named.
 
+    What an earlier process left pending in it is told on standard error.
+
+    Raises:
+        NotAllowed: nothing answers, or several families would fit.
+    """
+    async with drive_and_pending(url, station, profile) as (drive, _pending):
+        yield drive
+
+
+@asynccontextmanager
+async def drive_and_pending(
+    url: str, station: int, profile: str | None
+) -> AsyncIterator[tuple[Drive, Pending]]:
+    """As `drive_at`, with what is pending in the drive.
+
     Raises:
         NotAllowed: nothing answers, or several families would fit.
     """
@@ -149,7 +166,7 @@ async def drive_at(url: str, station: int, profile: str | None) -> AsyncIterator
             [Port(link, station, spec)],
         )
         drive.found = found
-        yield drive
+        yield drive, recall(drive, url, station)
 
 
 def _recognise(link: Link, found: Found) -> str:

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import platformdirs
 
+STATE_FOLDER_VARIABLE = "SERVODECK_CONFIG"
+
 
 def state_folder(chosen: Path | None) -> Path:
-    """Where the list of drives and the parameter sets are kept."""
-    return chosen or Path(platformdirs.user_data_dir("servodeck"))
+    """Where the list of drives, the parameter sets and the restore lists are kept.
+
+    The environment's SERVODECK_CONFIG is taken where no folder is given, so that server and
+    commands of one station share it.
+    """
+    named = os.environ.get(STATE_FOLDER_VARIABLE)
+    return chosen or Path(named or platformdirs.user_data_dir("servodeck"))

@@ -41,7 +41,7 @@ async def brake_then_quick_stop(power: PowerState) -> None:
     elif known_settings(drive).halt_brakes and _seen_enabled(drive):
         # Over an axis that is not enabled this word would enable it.
         halt = cia402.ENABLE_OPERATION | cia402.HALT
-        await drive.command(drive.require("control_word"), halt)
+        await drive.stop_by(drive.require("control_word"), halt)
         power.stop_step(StepCode.HALT)
         halted = True
     brakes = await _let_quick_stop_brake(power)
@@ -70,8 +70,8 @@ async def _take_speed_control(power: PowerState) -> bool:
     """Profile velocity with the target 0: the drive brakes by 6084h."""
     drive, problem = power.drive, ""
     try:
-        await drive.command(drive.require("velocity_target"), 0)
-        await drive.command(drive.require("mode"), int(Mode.PV))
+        await drive.stop_by(drive.require("velocity_target"), 0)
+        await drive.stop_by(drive.require("mode"), int(Mode.PV))
         if await drive.raw(drive.require("mode_display")) != Mode.PV:
             problem = "the drive does not change its mode"
     except DriveError as error:
@@ -87,7 +87,7 @@ async def _let_quick_stop_brake(power: PowerState) -> bool:
         return False
     problem = ""
     try:
-        await drive.command(OPTION, option)
+        await drive.stop_by(OPTION, option)
         if await drive.raw(OPTION) != option:
             problem = "the drive keeps its value"
         elif power.option_before is None:

@@ -244,7 +244,7 @@ class StopWatch:
                 if wanted is None:
                     return True
                 figures = {"before": float(before), "after": float(wanted)}
-                await drive.command(entry.key, wanted)
+                await drive.stop_by(entry.key, wanted)
         except (LinkLost, LinkTimeout, TimeoutError):
             answers, problem = False, "no answer"
         except DriveError as error:
@@ -261,7 +261,7 @@ class StopWatch:
             if halted and sample.state is State.OPERATION_ENABLED and axis.cyclic_power() is None:
                 await axis.control(cia402.QUICK_STOP)
             if before is not None:
-                await axis.drive.command(OPTION, before)
+                await axis.drive.stop_by(OPTION, before)
                 axis.option_before = None
                 figures = {"raw": float(before)}
                 axis.stop_step(StepCode.OPTION_RESTORED, "", OPTION, figures)

@@ -24,12 +24,15 @@ from backend.jobs import JobResult, Progress
 from backend.motion import loop
 from backend.ports import address_of
 from backend.scales.words import halt_remedy, halt_words
-from backend.tools.jog import Hold, JogSettings, require_scale
+from backend.tools.hold import Hold
+from backend.tools.jog import JogSettings, require_scale
+from backend.units import AxisUnits
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, motion_halted
+from drivers.ethercat.motion import Phase
 
-_RENEW_S = 0.05
+_RENEW_S, _LOOK_S = 0.05, 0.02
 _STATE_TIMEOUT_S = 5.0
 _MAX_S = 120.0
 _PATIENCE = 10
@@ -196,12 +199,6 @@ async def jog_cyclic(
     enabled = axis.enabled_cyclic(session, Mode.CSP, _STATE_TIMEOUT_S)
     async with keeping_mode(axis, session), enabled:
         start = await axis.position_raw()
-        speed = settings.speed_rpm / 60.0
-        slope = settings.acceleration_rpm_s / 60.0
-        travel = run_up(settings.travel_rev, speed, slope, cycle_s)
-        raw = start + np.round(settings.direction * travel * units.position_raw(1.0)).astype(
-            np.int64
-        )
         envelope = Envelope(
             settings.travel_rev, settings.speed_rpm, settings.torque_percent, _MAX_S
         )
@@ -209,12 +206,28 @@ async def jog_cyclic(
         target = address_of(drive.profile.by_role["position_target"])
         limits = await _limits(axis, envelope, start)
         # Enabling takes longer than a button may be held: released meanwhile, nothing moves.
-        if reason := hold.ended():
+        if reason := await _alive(axis, session, hold):
             return {"reason": reason, "moved_rev": 0.0}
-        trajectory = bus.Trajectory(station, target, raw, limits)
-        await loop.play(session, drive, trajectory, axis.grant())
         progress(0.0, "moving")
-        reason = await _while_held(axis, session, hold)
+        begin = start
+        while True:
+            left_rev = settings.travel_rev - abs(units.position(begin - start))
+            if left_rev > 0.0:
+                raw = _run_up_from(begin, left_rev, settings, units, cycle_s)
+                trajectory = bus.Trajectory(station, target, raw, limits)
+                await loop.play(session, drive, trajectory, axis.grant())
+            reason = await _while_held(axis, session, hold)
+            if reason:
+                break
+            if not isinstance(session.cyclic, bus.Pauses):
+                hold.release("no sign of life from the page for 200 ms")
+                reason = hold.ended()
+                break
+            await session.cyclic.pause(station)
+            if reason := await _alive(axis, session, hold):
+                break
+            # Where its setpoint stands now, which its position is near.
+            begin = await drive.raw(drive.require("position_target"))
         await session.cyclic.halt(station)
         if not await axis.standstill(2.0):
             raise LinkTimeout(
@@ -224,6 +237,15 @@ async def jog_cyclic(
             )
         moved = units.position(await axis.position_raw() - start)
     return {"reason": reason, "moved_rev": moved}
+
+
+def _run_up_from(
+    begin: int, travel_rev: float, settings: JogSettings, units: AxisUnits, cycle_s: float
+) -> npt.NDArray[np.int64]:
+    """Raw positions of a jog over ``travel_rev`` from the set-point ``begin``."""
+    speed, slope = settings.speed_rpm / 60.0, settings.acceleration_rpm_s / 60.0
+    travel = settings.direction * run_up(travel_rev, speed, slope, cycle_s)
+    return begin + np.round(travel * units.position_raw(1.0)).astype(np.int64)
 
 
 def run_up(travel: float, speed: float, slope: float, cycle_s: float) -> Signal:
@@ -240,11 +262,22 @@ def run_up(travel: float, speed: float, slope: float, cycle_s: float) -> Signal:
 
 
 async def _while_held(axis: Axis, session: CyclicSession, hold: Hold) -> str:
+    """Renew until the hold ends, with the reason, or a gap begins, with none."""
     station = session.station(axis.drive)
-    while not (reason := hold.ended()):
+    while not (reason := hold.ended()) and not hold.braking():
         await session.cyclic.renew(station)
         _raise_if_ended(axis, session)
         await asyncio.sleep(_RENEW_S)
+    return reason
+
+
+async def _alive(axis: Axis, session: CyclicSession, hold: Hold) -> str:
+    """Wait for the end of a gap and for an axis that stands; the reason if the hold ends."""
+    station = session.station(axis.drive)
+    while not (reason := hold.ended()) and (hold.braking() or _brakes(session, station)):
+        _raise_if_ended(axis, session)
+        await asyncio.sleep(_LOOK_S)
+    _raise_if_ended(axis, session)
     return reason
 
 
@@ -300,8 +333,17 @@ async def _play(
 
 def _plays(session: CyclicSession, station: int) -> bool:
     """Whether values are still to come, where the loop tells."""
+    return _phase(session, station) is Phase.PLAYING
+
+
+def _brakes(session: CyclicSession, station: int) -> bool:
+    """Whether the loop still ramps down, where it tells."""
+    return _phase(session, station) is Phase.BRAKING
+
+
+def _phase(session: CyclicSession, station: int) -> Phase | None:
     power = session.power()
-    return power is not None and power.axis_state(station).phase == "playing"
+    return None if power is None else Phase(power.axis_state(station).phase)
 
 
 def _raise_if_ended(axis: Axis, session: CyclicSession) -> None:

@@ -9,20 +9,19 @@ from __future__ import annotations
 
 import asyncio
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
 from backend.optional import ramp_keys
 from backend.scales.polled import PolledGuard
+from backend.tools.hold import GAP_S, Hold
 from backend.travel_units import REVOLUTIONS, TravelUnit
 from backend.units import AxisUnits, ramp_raw
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 
-#: Longest time between renewals from the page before the axis is stopped.
-RENEWAL_TIMEOUT_S = 0.2
 #: Period of target renewals to the drive (20 Hz or faster).
 PERIOD_S = 0.04
 #: The axis may leave the travel limit by this much before the jog ends with an error.
@@ -44,34 +43,7 @@ class JogSettings:
     def lead_rev(self) -> float:
         """Distance between axis and target: ``v·T + v²/2a`` in revolutions."""
         speed = self.speed_rpm / 60.0
-        return speed * RENEWAL_TIMEOUT_S + speed**2 / (2.0 * self.acceleration_rpm_s / 60.0)
-
-
-@dataclass(slots=True)
-class Hold:
-    """The button of the person who jogs. Times are `time.monotonic` seconds."""
-
-    last: float = field(default_factory=time.monotonic)
-    released: str = ""
-
-    def renew(self) -> None:
-        """The button is still held. A late renewal does not revive an expired hold."""
-        if not self.expired():
-            self.last = time.monotonic()
-
-    def release(self, reason: str) -> None:
-        """The button was let go, or what amounts to it."""
-        self.released = self.released or reason
-
-    def expired(self) -> bool:
-        """Whether the last renewal is too long ago."""
-        return time.monotonic() - self.last > RENEWAL_TIMEOUT_S
-
-    def ended(self) -> str:
-        """Why to stop, or empty while the button is held."""
-        if self.released:
-            return self.released
-        return "no sign of life from the page for 200 ms" if self.expired() else ""
+        return speed * GAP_S + speed**2 / (2.0 * self.acceleration_rpm_s / 60.0)
 
 
 async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress) -> JobResult:
@@ -141,6 +113,7 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
     due = time.monotonic()
     last_target: int | None = None
     guard = PolledGuard(axis, units, settings.speed_rpm * 1.3 + 30.0)
+    paused = False
     while not (reason := hold.ended()):
         asked_s = time.monotonic()
         position, velocity, state = await _observe(axis)
@@ -162,6 +135,16 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
         )
         if hold.ended():
             continue
+        if hold.braking():
+            if not paused:
+                # The drive brakes by its own ramp and stays enabled.
+                await axis.control(cia402.ENABLE_OPERATION | cia402.HALT)
+                paused = True
+            await asyncio.sleep(PERIOD_S)
+            continue
+        if paused:
+            # Where it halted is a new place to start from: the target of before is old.
+            paused, last_target = False, None
         if target != last_target:
             await drive.command(target_key, target, axis.grant(target_key))
             await axis.control(toggle | cia402.NEW_SET_POINT)

@@ -239,6 +239,10 @@ class CanopenCyclic:
             if self._loop.bus_lost:
                 raise LinkLost("the CAN bus is lost", remedy="wait until the adapter is back")
 
+    async def pause(self, station: int) -> None:
+        """See `drivers.link.Pauses`."""
+        self._require_running().axis(station, AxisLoop.pause)
+
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
         """Deliver samples on the event loop's thread."""
         self._consumers.append(consumer)

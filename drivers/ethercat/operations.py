@@ -54,7 +54,7 @@ class Operations:
             "counters": self._counters, "clear_counters": self._clear_counters,
             "alias": self._alias, "foe": self._foe,
             "configure": self._configure, "start": self._start, "stop": self._stop,
-            "play": self._play, "renew": self._renew, "halt": self._halt,
+            "play": self._play, "renew": self._renew, "halt": self._halt, "pause": self._pause,
             "drive_to": self._drive_to,
         }  # fmt: skip
 
@@ -383,6 +383,11 @@ class Operations:
 
     def _renew(self, message: Message, done: Done) -> None:
         self.roster.exchange.axis(message["station"]).renew()
+        done(None, None)
+
+    def _pause(self, message: Message, done: Done) -> None:
+        self.roster.exchange.axis(message["station"]).pause()
+        self._tell_figures()
         done(None, None)
 
     def _halt(self, message: Message, done: Done) -> None:

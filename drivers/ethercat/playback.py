@@ -44,6 +44,10 @@ _RESTLESS = 2
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STANDARD = cia402.Dialect()
 _DISABLED = Halted(HaltCause.COMMANDED, note="the axis is being disabled")
+_PAUSED = Halted(HaltCause.COMMANDED, note="the motion was ended")
+_RESTLESS_STILL = Halted(
+    HaltCause.COMMANDED, note="it did not come to rest by its ramp: it is stopped and disabled"
+)
 _STALE_CYCLES = 3
 """Samples that may be older than what a mailbox told before an axis was enabled anew."""
 _REST_S, _GIVE_UP = 0.05, 30
@@ -173,6 +177,10 @@ class AxisLoop:
     def stop(self, why: Halted, goal: State = State.READY) -> None:
         """Brake now, then head for ``goal``."""
         if self.phase is Phase.BRAKING:
+            if self._after_brake is State.OPERATION_ENABLED:
+                # It braked to hold on; now its motion is over.
+                self.halted, self._after_brake = why, goal
+                self._report(self.station, why.words)
             return
         if self.phase is Phase.IDLE:
             self.goal = goal if self.goal is State.OPERATION_ENABLED else self.goal
@@ -188,6 +196,24 @@ class AxisLoop:
             self.goal = State.QUICK_STOP_ACTIVE
             self._after_quick_stop = goal
             return
+        self._begin_to_brake(motion, goal)
+
+    def pause(self) -> None:
+        """Brake now and hold, enabled; the motion is over, but another one may begin at once.
+
+        For setpoints of position and speed; one of torque ends as by `stop`.
+        """
+        if self.phase not in (Phase.PLAYING, Phase.HOLDING):
+            return
+        motion = self._motion
+        if motion is None or motion.target == TORQUE:
+            self.stop(_PAUSED)
+            return
+        self._motion = None
+        self._clear_offsets()
+        self._begin_to_brake(motion, State.OPERATION_ENABLED)
+
+    def _begin_to_brake(self, motion: Motion | None, goal: State) -> None:
         self._brake_target = motion.target if motion is not None else POSITION
         self.phase = Phase.BRAKING
         self._moved_at_stop = self._moved
@@ -355,8 +381,13 @@ class AxisLoop:
             self._speed = 0.0
             self.goal = self._after_brake
             if self._moved > max(0.1 * self._moved_at_stop, _RESTLESS):
+                # What did not follow its ramp is not held either.
+                held = self._after_brake is State.OPERATION_ENABLED
                 self.goal = State.QUICK_STOP_ACTIVE
-                self._after_quick_stop = self._after_brake
+                self._after_quick_stop = State.READY if held else self._after_brake
+                if held:
+                    self.halted = _RESTLESS_STILL
+                    self._report(self.station, _RESTLESS_STILL.words)
 
     def _control(self) -> None:
         place = self._out[CONTROL]

@@ -166,6 +166,10 @@ class EthercatCyclic:
         """Brake now and leave Operation enabled; setpoints end."""
         await self._host.call({"op": "halt", "station": station}, _ANSWER_S)
 
+    async def pause(self, station: int) -> None:
+        """See `drivers.link.Pauses`."""
+        await self._host.call({"op": "pause", "station": station}, _ANSWER_S)
+
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
         """Deliver samples on the event loop's thread."""
         entry = _Consumer(consumer)

@@ -18,7 +18,11 @@ STOP_S = 2.0
 #: pressed STOP and what it reached, that an axis has a fault.
 TOLD_MS = 5_000
 #: Why a jog ends, rightly, when a computer has no time for the page for a tenth of a second.
-SILENT = ("the page fell silent", "no sign of life from the page for 200 ms")
+SILENT = (
+    "the page fell silent",
+    "no sign of life from the page for 200 ms",
+    "no sign of life from the page for 500 ms",
+)
 
 
 class Bench:

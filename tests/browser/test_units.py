@@ -16,9 +16,7 @@ def test_a_screw_becomes_a_gear_and_is_taken_back(laptop: Page, bench: Bench) ->
     open_axis(page, bench.drive, "setup")
     page.get_by_label("Lead").fill("10")
     page.get_by_role("button", name="Calculate").click()
-    plan = page.locator("section.panel").filter(
-        has=page.get_by_role("heading", name="Result")
-    )
+    plan = page.locator("section.panel").filter(has=page.get_by_role("heading", name="Result"))
     expect(plan).to_contain_text("10 mm")
     # Nothing is written yet.
     assert bench.raw("6092:01") == before

@@ -22,11 +22,12 @@ from backend.jobs import Progress
 from backend.measuring import Exchange, exchange_for
 from backend.mechanics_calc import GearValue
 from backend.member import Member
-from backend.owed_store import OwedStore
 from backend.people.identity import LOCAL, Actor, acting
 from backend.people.rights import Right
 from backend.people.station import People
 from backend.people.support import Support
+from backend.restore.identity import identity_of
+from backend.restore.store import RestoreStore
 from backend.tools.cyclic_motion import jog_cyclic
 from backend.tools.end_search import limited
 from backend.tools.jog import Hold, JogSettings
@@ -298,11 +299,12 @@ async def test_a_server_killed_with_half_a_gear_has_noted_it(
 ) -> None:
     del bench
     writing, before = await half_a_gear(x, servo)
-    noted, _ = OwedStore(tmp_path / "owed").get("x", None)
-    assert {debt.key: debt.raw for debt in noted} == before
+    noted = RestoreStore(tmp_path, "a server").list_of(identity_of(x.drive), "x").pending.values
+    assert {value.key: value.raw for value in noted} == before
     servo.gate.set()
     await writing
-    assert not OwedStore(tmp_path / "owed").get("x", None)[0], "a gear that was written stays"
+    noted = RestoreStore(tmp_path, "a server").list_of(identity_of(x.drive), "x").pending.values
+    assert not noted, "a gear that was written stays"
 
 
 @pytest.mark.parametrize(

@@ -387,7 +387,7 @@ async def test_jog_released_while_enabling_aims_nowhere(x: Member, servo: Servo)
 
 async def test_jog_ends_at_the_end_of_the_number_range(x: Member, servo: Servo) -> None:
     servo.set(POSITION, 2**31 - 100)
-    hold = Hold()
+    hold = Hold(clock=lambda: 0.0)
     targets: list[int] = []
 
     def note(place: tuple[int, int], value: int) -> None:
@@ -395,7 +395,6 @@ async def test_jog_ends_at_the_end_of_the_number_range(x: Member, servo: Servo) 
             targets.append(value)
             if len(targets) > 3:
                 hold.release("enough")
-        hold.last += 0.2
 
     servo.on_write = note
     task = asyncio.create_task(jog(x.axis, JOG, hold, quiet()))
@@ -460,7 +459,7 @@ async def test_a_watchdog_that_watches_the_exchange_is_none_without_it(
 def test_lead_is_what_the_architecture_says() -> None:
     # 60 rpm = 1 rev/s; T = 0.2 s; a = 10 rev/s²: 0.2 + 1/20
     assert JOG.lead_rev == pytest.approx(0.25)
-    assert jogging.RENEWAL_TIMEOUT_S == 0.2
+    assert jogging.GAP_S == 0.2
 
 
 # --- the cyclic jog -------------------------------------------------------------------

@@ -285,13 +285,13 @@ async def test_the_next_server_puts_back_what_a_killed_one_left(
 ) -> None:
     state = tmp_path_factory.mktemp("killed") / "state"
     await killed(x, servo, tmp_path, state)
-    assert not any((tmp_path / "owed").iterdir()), "an orderly end leaves no note"
+    assert not any((tmp_path / "restore").iterdir()), "an orderly end leaves no note"
     again, member = await bench_with(servo, state)
     assert {debt.key: debt.raw for debt in member.drive.owed.debts} == WAS
     await back(again, servo)
     assert held(servo) == WAS
     assert not member.drive.owed
-    assert not any((state / "owed").iterdir())
+    assert not any((state / "restore").iterdir())
     await again.close()
 
 
@@ -303,7 +303,7 @@ async def test_the_mode_that_a_killed_server_left_comes_back_by_itself(
     servo.set(MODE, Mode.PV)
     state = tmp_path_factory.mktemp("killed") / "state"
     async with x.axis.enabled(Mode.PP, Envelope(1.0, 100.0, 50.0, 5.0)):
-        shutil.copytree(tmp_path / "owed", state / "owed")
+        shutil.copytree(tmp_path / "restore", state / "restore")
     assert servo.number(MODE) == Mode.PV
     left = Mode.PP if then == "untouched" else Mode.HM
     servo.set(MODE, left)
@@ -333,7 +333,7 @@ async def test_the_next_server_stops_what_a_killed_one_left_moving(
     """A homing that looks for a switch goes on in the drive; later it may be somebody else's."""
     state = tmp_path_factory.mktemp("killed") / "state"
     await killed(x, servo, tmp_path, state)
-    for note in (state / "owed").iterdir():
+    for note in (state / "restore").iterdir():
         os.utime(note, (time.time() - age_s,) * 2)
     servo.enable()
     servo.written.clear()
@@ -392,9 +392,9 @@ async def test_another_drive_in_its_place_owes_nothing(
 async def test_a_full_disk_keeps_nobody_from_moving(
     bench: Bench, x: Member, servo: Servo, tmp_path: Path
 ) -> None:
-    (tmp_path / "owed").write_text("in the way")
+    (tmp_path / "restore").write_text("in the way")
     async with temporary(x.axis, {SPEED: 200}):
         assert held(servo)[SPEED] == 200
     assert held(servo) == WAS
     lines = [entry.text for entry in bench.journal.entries("x")]
-    assert sum("will not know what to put back" in line for line in lines) == 1
+    assert sum("will not know what to restore" in line for line in lines) == 1

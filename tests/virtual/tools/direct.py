@@ -363,6 +363,11 @@ class DirectLink:
         assert self._loop is not None
         self._loop.stop(Halted(HaltCause.COMMANDED))
 
+    async def pause(self, station: int) -> None:
+        del station
+        assert self._loop is not None
+        self._loop.pause()
+
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
         self._consumers.append(consumer)
         return lambda: self._consumers.remove(consumer)

@@ -281,5 +281,3 @@ async def test_a_small_move_of_a_blocked_axis_ends_by_its_torque() -> None:
         b.axis.moved_small(1_000, None)
         with pytest.raises((MotionHalted, Interrupted)):
             await small_move(b.axis, b.session, SmallMoveSettings(10_000, 15.0), silent())
-
-

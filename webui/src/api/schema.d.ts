@@ -4799,12 +4799,69 @@ export interface components {
             type: "jog_ended";
         };
         /**
+         * JogGap
+         * @description The signs of life of a jog had a gap: the axis brakes, or goes on after it.
+         */
+        JogGap: {
+            /**
+             * Braking
+             * @description True where the gap began, False where the axis goes on
+             */
+            braking: boolean;
+            /** Drive */
+            drive: string;
+            /**
+             * Gap Ms
+             * @description length of the gap so far
+             */
+            gap_ms: number;
+            /**
+             * Type
+             * @default jog_gap
+             * @constant
+             */
+            type: "jog_gap";
+        };
+        /**
          * JogRenew
-         * @description The button is still held. Send at 20 Hz or faster.
+         * @description A sign of life: the button is still held. Send at 20 Hz or faster.
+         *
+         *     The axis brakes where none comes for 200 ms, and goes on where the hold is alive again within
+         *     500 ms and was never released.
          */
         JogRenew: {
             /** Drive */
             drive: string;
+            /**
+             * Press
+             * @description of which press; 0: of any
+             * @default 0
+             */
+            press: number;
+            /**
+             * Pressed
+             * @description False: the button was let go
+             * @default true
+             */
+            pressed: boolean;
+            /**
+             * Sent Ms
+             * @description when it was sent, by the sender's own clock
+             * @default null
+             */
+            sent_ms: number | null;
+            /**
+             * Sign
+             * @description counts the signs of a press
+             * @default null
+             */
+            sign: number | null;
+            /**
+             * Silent Ms
+             * @description how long the page had not been heard by its worker then
+             * @default 0
+             */
+            silent_ms: number;
             /**
              * Type
              * @default jog_renew
@@ -4831,6 +4888,12 @@ export interface components {
             direction: -1 | 1;
             /** Drive */
             drive: string;
+            /**
+             * Press
+             * @description number of this press, higher than that of the one before
+             * @default 0
+             */
+            press: number;
             /**
              * Speed
              * @description in the axis' velocity unit
@@ -4867,6 +4930,12 @@ export interface components {
         JogStop: {
             /** Drive */
             drive: string;
+            /**
+             * Press
+             * @description of which press; 0: of any
+             * @default 0
+             */
+            press: number;
             /**
              * Reason
              * @default
@@ -8099,6 +8168,7 @@ export type IoInfo = components['schemas']['IoInfo'];
 export type JobChanged = components['schemas']['JobChanged'];
 export type JobInfo = components['schemas']['JobInfo'];
 export type JogEnded = components['schemas']['JogEnded'];
+export type JogGap = components['schemas']['JogGap'];
 export type JogRenew = components['schemas']['JogRenew'];
 export type JogStart = components['schemas']['JogStart'];
 export type JogStop = components['schemas']['JogStop'];

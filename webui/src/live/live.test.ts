@@ -1,6 +1,6 @@
 import { describe, expect, it, vi } from 'vitest'
 import type { JogStart } from '../api/schema'
-import { DeadMan, SILENCE_MS } from './deadman'
+import { DeadMan, RELEASED_MS, SILENCE_MS } from './deadman'
 import { backOff, LiveSocket, type SocketLike } from './socket'
 
 const start: JogStart = {
@@ -12,12 +12,20 @@ const start: JogStart = {
   travel_limit: 1,
   torque_limit: 10,
   unit: 'rev',
+  press: 0,
 }
 
 describe('dead man', () => {
   function make(connected = true) {
     const clock = { now: 0 }
-    const sent: { type: string; reason?: string }[] = []
+    const sent: {
+      type: string
+      reason?: string
+      press?: number
+      sign?: number
+      silent_ms?: number
+      pressed?: boolean
+    }[] = []
     const deadMan = new DeadMan(
       (message) => {
         if (connected) sent.push(message)
@@ -45,7 +53,49 @@ describe('dead man', () => {
     expect(sent.at(-1)).toMatchObject({ type: 'jog_stop', reason: 'the page fell silent' })
     deadMan.beat('x')
     deadMan.tick()
-    expect(sent).toHaveLength(2)
+    expect(sent.filter((message) => message.pressed)).toHaveLength(0)
+  })
+  it('says with every sign how long the page has been silent', () => {
+    const { clock, sent, deadMan } = make()
+    deadMan.start(start)
+    clock.now = 40
+    deadMan.beat('x')
+    for (clock.now = 80; clock.now <= 400; clock.now += 40) deadMan.tick()
+    const signs = sent.filter((message) => message.type === 'jog_renew')
+    expect(signs.map((message) => message.silent_ms)).toEqual([
+      40, 80, 120, 160, 200, 240, 280, 320, 360,
+    ])
+    expect(signs.map((message) => message.sign)).toEqual([1, 2, 3, 4, 5, 6, 7, 8, 9])
+    deadMan.beat('x')
+    deadMan.tick()
+    expect(sent.at(-1)).toMatchObject({ silent_ms: 0, pressed: true })
+  })
+  it('releases by a message of its own and by every sign after it', () => {
+    const { clock, sent, deadMan } = make()
+    deadMan.start(start)
+    deadMan.tick()
+    deadMan.stop('released')
+    expect(sent.at(-1)).toMatchObject({ type: 'jog_stop', press: 1, reason: 'released' })
+    deadMan.beat('x')
+    for (clock.now = 40; clock.now < RELEASED_MS; clock.now += 40) deadMan.tick()
+    const after = sent.slice(3)
+    expect(after.length).toBeGreaterThan(10)
+    for (const message of after) {
+      expect(message).toMatchObject({ type: 'jog_renew', press: 1, pressed: false })
+    }
+    clock.now = RELEASED_MS + 40
+    const count = sent.length
+    deadMan.tick()
+    expect(sent).toHaveLength(count)
+  })
+  it('gives a new press a new number, which says nothing of the one before', () => {
+    const { sent, deadMan } = make()
+    deadMan.start(start)
+    deadMan.stop('released')
+    deadMan.start(start)
+    deadMan.tick()
+    expect(sent.at(-2)).toMatchObject({ type: 'jog_start', press: 2 })
+    expect(sent.at(-1)).toMatchObject({ type: 'jog_renew', press: 2, sign: 1, pressed: true })
   })
   it('is not revived by a late beat', () => {
     const { clock, sent, deadMan } = make()

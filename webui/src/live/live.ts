@@ -97,6 +97,10 @@ function receive(message: ToPage): void {
       store.contents.jogEnded = message
       store.publish('jogEnded')
       break
+    case 'jog_gap':
+      store.contents.jogGap = message
+      store.publish('jogGap')
+      break
     case 'scope_info':
       store.setScopeInfo(message)
       break
@@ -150,6 +154,9 @@ worker.onmessage = (event: MessageEvent<FromWorker>) => {
       break
     case 'message':
       receive(answer.message)
+      break
+    case 'jogAsked':
+      store.publish('jogAsked')
       break
     case 'jogRefused':
       store.publish('jogRefused')

@@ -20,6 +20,7 @@ import type {
   Hello,
   JobChanged,
   JogEnded,
+  JogGap,
   JogRenew,
   JogStart,
   JogStop,
@@ -70,6 +71,7 @@ export type ToPage =
   | ValuesChanged
   | JobChanged
   | JogEnded
+  | JogGap
   | ScopeInfo
   | Logged
   | Refused

@@ -4,6 +4,7 @@ import type {
   DriveSummary,
   JobInfo,
   JogEnded,
+  JogGap,
   LogEntry,
   ParameterRow,
   ParameterValue,
@@ -29,6 +30,7 @@ interface Contents {
   readings: Map<string, Map<string, ParameterValue>>
   log: LogEntry[]
   jogEnded: JogEnded | null
+  jogGap: JogGap | null
   /** What the server said of the subscriptions that there are, and of every channel ever asked. */
   scopeInfo: Map<number, ScopeInfo>
   scopeChannels: Map<string, ScopeChannelInfo>
@@ -56,6 +58,7 @@ export const contents: Contents = {
   readings: new Map(),
   log: [],
   jogEnded: null,
+  jogGap: null,
   scopeInfo: new Map(),
   scopeChannels: new Map(),
   trigger: 'off',

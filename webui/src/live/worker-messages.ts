@@ -132,6 +132,8 @@ export type FromWorker =
   | { kind: 'link'; state: LinkState }
   | { kind: 'message'; message: ToPage }
   | { kind: 'jogRefused' }
+  /** Is the button still held? Answered with `jogBeat`. */
+  | { kind: 'jogAsked' }
   | { kind: 'subscriptions'; numbers: number[] }
   | { kind: 'triggered'; state: TriggerState }
   | { kind: 'answer'; id: number; answer: Questions[QuestionKind]['get'] }

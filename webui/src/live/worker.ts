@@ -43,6 +43,7 @@ const enabling = new EnablingHold(
 
 setInterval(() => {
   deadMan.tick()
+  if (deadMan.held !== null) post({ kind: 'jogAsked' })
   enabling.tick()
 }, RENEW_MS)
 setInterval(() => socket.beat(), BEAT_MS)

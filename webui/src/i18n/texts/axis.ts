@@ -105,8 +105,8 @@ export const axis = {
   'motion.disable': ['Disable', '断使能'],
   'jog.title': ['Jog', '点动'],
   'jog.help': [
-    'Moves only while a button is held. Letting go, leaving the window, hiding the tab or losing the connection stops the axis. The travel limit counts from where the jog begins.',
-    '仅在按住时运动。松开、离开窗口、隐藏标签页或断开连接都会停止轴。行程限制从点动起点计算。',
+    'Moves only while a button is held. Letting go, leaving the window, hiding the tab or losing the connection stops the axis. A hiccup of the page or the network for 200 ms brakes it; it goes on if the hold is back within half a second. The travel limit counts from where the jog begins.',
+    '仅在按住时运动。松开、离开窗口、隐藏标签页或断开连接都会停止轴。页面或网络中断 200 毫秒时轴会制动；若半秒内恢复按住信号则继续运动。行程限制从点动起点计算。',
   ],
   'jog.pad': ['Jog: hold the left or right arrow key', '点动：按住左或右方向键'],
   'jog.buttonMinus': ['Hold to move in the negative direction', '按住向负方向运动'],
@@ -121,6 +121,18 @@ export const axis = {
     'The jog comes to its end: the axis brakes, is switched off, and gets its settings back.',
     '点动正在结束：轴制动、断使能并恢复设置。',
   ],
+  'jog.gap': [
+    'Hiccup: no sign of life from this page for {ms} ms. The axis brakes; it goes on if you keep holding and the page is back within 500 ms.',
+    '短暂中断：本页面 {ms} 毫秒无响应。轴正在制动；若继续按住且页面在 500 毫秒内恢复，轴将继续运动。',
+  ],
+  'jog.gapOver': [
+    'There was a hiccup of {ms} ms: the axis braked and went on. The network is slow, or this device is busy.',
+    '发生了 {ms} 毫秒的短暂中断：轴制动后继续运动。网络较慢，或本设备繁忙。',
+  ],
+  'jog.gapEnded': [
+    'The signs of life of this page stopped, so the axis braked.',
+    '本页面的响应中断，因此轴已制动。',
+  ],
   'jog.ended': ['Ended: {reason}', '已结束：{reason}'],
   'reason.released': ['released', '已松开'],
   'reason.page hidden': ['page hidden', '页面被隐藏'],
@@ -130,6 +142,10 @@ export const axis = {
   'reason.the page fell silent': [
     'this device was too busy to keep up the hold. Close other programs and tabs, then hold again',
     '本设备过于繁忙，无法维持按住。请关闭其他程序和标签页后再按住',
+  ],
+  'reason.no sign of life from the page for 500 ms': [
+    'no sign of life from the page for 500 ms. Is the network slow, or this device busy? Hold again',
+    '页面 500 毫秒无响应。网络慢或设备繁忙？请重新按住',
   ],
   'reason.no sign of life from the page for 200 ms': [
     'no sign of life from the page for 200 ms. Is the network slow, or this device busy? Hold again',

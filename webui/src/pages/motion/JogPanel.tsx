@@ -35,7 +35,7 @@ export function JogPanel({
     speed !== null && acceleration !== null && travel !== null && torque !== null
       ? { speed, acceleration, travel_limit: travel, torque_limit: torque, unit: unit.name }
       : null
-  const { direction, ended, ending, hold, press } = useJog(drive, settings)
+  const { direction, ended, ending, gap, hold, press } = useJog(drive, settings)
   const running = direction !== null
   const taken = !running && state?.moving_job != null
   const job = useJob(state?.moving_job ?? null)
@@ -135,6 +135,13 @@ export function JogPanel({
       {told !== null && !running && (
         <p className="note warn not-begun" role="alert">
           <strong>{t('start.not')}</strong> {told}
+        </p>
+      )}
+      {gap && (
+        <p className="note warn" role="status">
+          {t(running && gap.braking ? 'jog.gap' : gap.braking ? 'jog.gapEnded' : 'jog.gapOver', {
+            ms: Math.round(gap.gap_ms),
+          })}
         </p>
       )}
       {ended && !ended.problem && (

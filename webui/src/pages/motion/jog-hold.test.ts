@@ -1,9 +1,9 @@
 import { describe, expect, it } from 'vitest'
-import { JogHold } from './jog-hold'
+import { BUSY_MS, JogHold } from './jog-hold'
 
 function make() {
   const log: string[] = []
-  const page = { visible: true, focus: true }
+  const page = { visible: true, focus: true, now: 0 }
   let pending: (() => void) | null = null
   const hold = new JogHold(
     {
@@ -22,6 +22,7 @@ function make() {
       cancelFrame: () => {
         pending = null
       },
+      now: () => page.now,
     },
   )
   const draw = () => {
@@ -41,6 +42,39 @@ describe('jog hold', () => {
     hold.release('released')
     draw()
     expect(log).toEqual(['start 1', 'beat', 'beat', 'stop released'])
+  })
+  it('answers the worker between two frames, as plots may take long to draw', () => {
+    const { log, page, hold } = make()
+    hold.press(1)
+    for (page.now = 40; page.now <= 400; page.now += 40) hold.asked()
+    expect(log.filter((line) => line === 'beat')).toHaveLength(10)
+    page.visible = false
+    hold.asked()
+    expect(log.at(-1)).toBe('stop page hidden')
+    hold.asked()
+    expect(log.at(-1)).toBe('stop page hidden')
+  })
+  it('counts only a drawn frame after it was busy, as a release may be waiting', () => {
+    const { log, page, hold, draw } = make()
+    hold.press(1)
+    page.now = BUSY_MS + 1
+    hold.asked()
+    expect(log).toEqual(['start 1'])
+    // The browser hands over the input that waited, then draws.
+    hold.release('released')
+    draw()
+    hold.asked()
+    expect(log).toEqual(['start 1', 'stop released'])
+  })
+  it('goes on with the frame that is drawn when nothing was released', () => {
+    const { log, page, hold, draw } = make()
+    hold.press(1)
+    page.now = 300
+    hold.asked()
+    draw()
+    page.now = 340
+    hold.asked()
+    expect(log).toEqual(['start 1', 'beat', 'beat'])
   })
   it('ends when the page is hidden or loses the focus', () => {
     for (const what of ['visible', 'focus'] as const) {

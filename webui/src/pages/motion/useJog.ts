@@ -1,5 +1,5 @@
 import { useEffect, useMemo, useRef, useState } from 'react'
-import type { JogEnded } from '../../api/schema'
+import type { JogEnded, JogGap } from '../../api/schema'
 import * as live from '../../live/live'
 import { contents, subscribe } from '../../live/store'
 import { JogHold } from './jog-hold'
@@ -19,6 +19,8 @@ export function useJog(drive: string, settings: JogSettings | null) {
   const [ended, setEnded] = useState<JogEnded | null>(null)
   /** From the press until the server says that the jog has ended. */
   const [begun, setBegun] = useState(false)
+  /** The last gap in the signs of life of this hold. */
+  const [gap, setGap] = useState<JogGap | null>(null)
   const latest = useRef(settings)
   latest.current = settings
   const hold = useMemo(
@@ -27,9 +29,11 @@ export function useJog(drive: string, settings: JogSettings | null) {
         {
           start: (towards) => {
             setEnded(null)
+            setGap(null)
             if (latest.current) {
               setBegun(true)
-              live.jogStart({ type: 'jog_start', drive, direction: towards, ...latest.current })
+              const asked = { drive, direction: towards, press: 0, ...latest.current }
+              live.jogStart({ type: 'jog_start', ...asked })
             }
           },
           beat: () => live.jogBeat(drive),
@@ -41,6 +45,7 @@ export function useJog(drive: string, settings: JogSettings | null) {
           hasFocus: () => document.hasFocus(),
           requestFrame: (callback) => requestAnimationFrame(callback),
           cancelFrame: (id) => cancelAnimationFrame(id),
+          now: () => performance.now(),
         },
       ),
     [drive],
@@ -53,6 +58,10 @@ export function useJog(drive: string, settings: JogSettings | null) {
     const key = (event: KeyboardEvent) => event.key === 'Escape' && hold.release('Esc')
     const lost = subscribe('link', () => !contents.link.open && hold.release('connection lost'))
     const refused = subscribe('jogRefused', () => hold.release('connection lost'))
+    const asked = subscribe('jogAsked', () => hold.asked())
+    const paused = subscribe('jogGap', () => {
+      if (contents.jogGap?.drive === drive) setGap(contents.jogGap)
+    })
     const over = subscribe('jogEnded', () => {
       if (contents.jogEnded?.drive !== drive) return
       setEnded(contents.jogEnded)
@@ -72,7 +81,7 @@ export function useJog(drive: string, settings: JogSettings | null) {
     return () => {
       hold.release('axis changed')
       setBegun(false)
-      for (const end of [lost, refused, over, turnedDown]) end()
+      for (const end of [lost, refused, asked, paused, over, turnedDown]) end()
       document.removeEventListener('visibilitychange', hidden)
       window.removeEventListener('blur', blur)
       window.removeEventListener('pagehide', leave)
@@ -83,6 +92,7 @@ export function useJog(drive: string, settings: JogSettings | null) {
   return {
     direction,
     ended,
+    gap,
     ending: begun && direction === null,
     hold,
     press: (to: -1 | 1) => latest.current !== null && hold.press(to),

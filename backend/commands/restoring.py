@@ -1,0 +1,104 @@
+"""Values that an earlier process left in a drive, as a command sees them: told, and restored."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from datetime import datetime
+
+from backend.axis import Axis
+from backend.commands.state import state_folder
+from backend.drive import Drive
+from backend.files import StorageFailed
+from backend.restore.identity import identity_of
+from backend.restore.keep import keep_list
+from backend.restore.store import Pending, RestoreStore
+from backend.tools.settling import settle
+from drivers.errors import Busy, NotAllowed
+
+
+def recall(drive: Drive, url: str, station: int) -> Pending:
+    """Recall what is pending in this drive, say so, and keep its list from now on."""
+    command = f"`{_name()}`"
+    known = RestoreStore(state_folder(None), command).list_of(identity_of(drive), drive.id)
+
+    def failed(error: StorageFailed) -> None:
+        print(f"note: if this command is killed, nobody knows what to restore: {error}",
+              file=sys.stderr)  # fmt: skip
+
+    keep_list(drive, known, in_motion=lambda: drive.owed.in_motion, failed=failed)
+    if drive.owed:
+        print(_notice(drive, known.pending, url, station), file=sys.stderr)
+    if known.pending.held_by:
+        print(f"note: {drive.name}: {known.pending.held_by} moves it now and has borrowed values",
+              file=sys.stderr)  # fmt: skip
+    return known.pending
+
+
+async def restore_first(axis: Axis, pending: Pending) -> None:
+    """Before a motion: restore what nobody has changed since, as a server does by itself.
+
+    Raises:
+        Busy: another process moves this drive now.
+        NotAllowed: the axis is enabled or moves.
+        RestoreFailed: a value could not be restored; it stays on the list.
+    """
+    drive = axis.drive
+    if pending.held_by:
+        raise Busy(
+            f"{drive.name}: {pending.held_by} moves it now",
+            drive=drive.name,
+            remedy="wait for its end, or stop it",
+        )
+    if not drive.owed:
+        return
+    await stop_what_was_moved(axis, pending)
+    show_restored(drive.name, await settle(axis, asked=False))
+
+
+async def stop_what_was_moved(axis: Axis, pending: Pending) -> None:
+    """Quick stop of an axis that a process moved which was killed a moment ago."""
+    if pending.moved:
+        axis.owes_stop = True
+        await axis.require_stop_delivered()
+
+
+def require_own_values(drive: Drive) -> None:
+    """Borrowed values must not be stored as the drive's own.
+
+    Raises:
+        NotAllowed: something is pending.
+    """
+    if drive.owed:
+        raise NotAllowed(
+            f"{drive.name}: values of a motion that was cut off would be stored: {_values(drive)}",
+            drive=drive.name,
+            remedy="restore them first with `servodeck params restore`, or keep them with --keep",
+        )
+
+
+def show_restored(name: str, found: Mapping[str, object]) -> None:
+    """What `settle` did, line by line."""
+    for what, words in (("back", "restored"), ("left", "not restored")):
+        values = found[what]
+        for key, value in values.items() if isinstance(values, dict) else ():
+            print(f"{name}: {words}: {key} = {value}", file=sys.stderr)
+
+
+def _notice(drive: Drive, pending: Pending, url: str, station: int) -> str:
+    when = datetime.fromtimestamp(pending.since).astimezone()
+    return (
+        f"note: {drive.name}: {pending.by or 'a server'} was cut off on {when:%Y-%m-%d %H:%M:%S} "
+        f"and left borrowed values, which are not the drive's own: {_values(drive)}\n"
+        f"      restore them: servodeck params restore {url} --station {station}"
+    )
+
+
+def _values(drive: Drive) -> str:
+    return ", ".join(f"{value.key} (was {value.raw})" for value in drive.owed.debts)
+
+
+def _name() -> str:
+    """This command as it was called, without its arguments."""
+    words = [word for word in sys.argv[1:3] if not word.startswith("-") and word.isidentifier()]
+    return " ".join(("servodeck", *words[:2]))

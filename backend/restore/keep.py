@@ -1,0 +1,42 @@
+"""The restore list of a connected drive: recalled once, and written from then on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from backend.drive import Drive
+from backend.files import StorageFailed
+from backend.restore.identity import identity_of
+from backend.restore.store import RestoreList
+
+
+def keep_list(
+    drive: Drive,
+    known: RestoreList,
+    *,
+    in_motion: Callable[[], bool],
+    failed: Callable[[StorageFailed], None],
+) -> None:
+    """Recall what is pending in a drive; write its list whenever something is borrowed or back.
+
+    ``in_motion`` says whether the next process has to stop the axis, ``failed`` is called once per
+    failure of the disk: a motion goes on without a list, as people are told then.
+    """
+    drive.owed.recall(known.pending.values)
+    well = True
+
+    def note(*, durable: bool = False) -> None:
+        nonlocal well
+        try:
+            known.write(
+                drive.owed.outstanding, in_motion=in_motion(), identity=identity_of(drive),
+                durable=durable,
+            )  # fmt: skip
+        except StorageFailed as error:
+            if well:
+                failed(error)
+            well = False
+        else:
+            well = True
+
+    drive.owed.keep(note)
