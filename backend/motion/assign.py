@@ -7,18 +7,25 @@ shaft is watched afterwards, and where it turns the setting is put back and the 
 
 from __future__ import annotations
 
+import asyncio
+import time
+
 from backend.axis import Axis
+from backend.io_functions import TerminalState, read_terminals
 from backend.motion.classes import motion_of
 from backend.motion.doors import door_of
 from backend.motion.grant import NotGranted
 from backend.readings import Reading
 from backend.restoring import CLEANUP_TIMEOUT_S, shielded
 from drivers.cia402 import State
-from drivers.errors import NotAllowed
+from drivers.errors import DriveError, NotAllowed
 from profiles.schema import Parameter, Raw
 
 #: For so long the shaft is watched; a drive's own jog turns it at once.
-_WATCHED_S = 0.3
+_WATCHED_S, _LOOK_S = 0.3, 0.01
+#: What a shaft at rest may move, as noise of its encoder or by a jolt.
+_STILL_REV = 0.001
+_AT_REST_S = 0.3
 _DISABLED = frozenset({State.SWITCH_ON_DISABLED, State.READY, State.NOT_READY, State.FAULT})
 
 
@@ -37,25 +44,92 @@ async def assign(axis: Axis, key: str, raw: Raw) -> Reading:
         f"set {parameter.key} {parameter.name}", keys=frozenset({parameter.key})
     ) as grant:
         await _require_rest(axis, parameter)
+        await _require_inputs_off(axis, parameter, raw)
         before = (await drive.read(parameter.key)).raw
+        start = await axis.position_raw()
         reading = await drive.energise(parameter.key, raw, grant)
-        if await axis.standstill(_WATCHED_S):
+        if not await _turns(axis, start):
             return reading
 
+        left: list[str] = []
+
         async def undo() -> None:
-            if before is not None:
-                await drive.energise(parameter.key, before, grant)
+            try:
+                if before is not None:
+                    await drive.energise(parameter.key, before, grant)
+            except DriveError as error:
+                left.append(error.message)
             await axis.quick_stop()
 
         await shielded(undo, CLEANUP_TIMEOUT_S, drive.name)
     raise NotAllowed(
-        f"{drive.name}: the axis began to turn with {parameter.key} {parameter.name} = {raw}: "
-        f"it is {before} again, and the axis was stopped",
+        f"{drive.name}: the axis began to turn with {parameter.key} {parameter.name} = {raw}; "
+        + (f"it could not be put back: {left[0]}" if left else f"it is {before} again")
+        + "; a quick stop was sent",
         drive=drive.name,
         parameter=parameter.key,
         value=raw,
-        remedy="switch the inputs off that jog, home or enable, then try again",
+        remedy="use the machine's emergency stop if it still turns; switch the inputs off that "
+        "jog, home or enable before you try again",
     )
+
+
+async def _require_inputs_off(axis: Axis, parameter: Parameter, raw: Raw) -> None:
+    """The input that gets a function is off, and one that is inverted has no function.
+
+    A drive may not let a function be taken away again while it acts (M6-L), so this comes first.
+
+    Raises:
+        NotAllowed: the function would act at once.
+    """
+    drive = axis.drive
+    facts = drive.profile.functions.terminals
+    for state in await read_terminals(drive):
+        terminal, name = state.terminal, state.terminal.name
+        if terminal.direction != "in":
+            continue
+        if parameter.key == terminal.function_key:
+            if raw not in facts.unused_inputs and state.on:
+                raise NotAllowed(
+                    f"{drive.name}: {name} is on, so its new function would act at once",
+                    drive=drive.name,
+                    parameter=parameter.key,
+                    value=raw,
+                    remedy=f"switch {name} off, or give it no function",
+                )
+        elif _inverts(axis, state, parameter, raw) and state.function not in facts.unused_inputs:
+            raise NotAllowed(
+                f"{drive.name}: {name} has a function, which could act at once when it is inverted",
+                drive=drive.name,
+                parameter=parameter.key,
+                value=raw,
+                remedy=f"give {name} no function, invert it, and then give it its function",
+            )
+
+
+def _inverts(axis: Axis, state: TerminalState, parameter: Parameter, raw: Raw) -> bool:
+    """Whether this write changes the polarity of this terminal."""
+    drive, name = axis.drive, state.terminal.name
+    if parameter.key == state.terminal.polarity_key:
+        known = drive.readings.get(parameter.key)
+        return known is None or known.raw != raw
+    for place in drive.profile.functions.terminals.polarities:
+        if place.key == parameter.key and name in place.bits and isinstance(raw, int):
+            wanted = bool(raw >> place.bits[name] & 1)
+            return state.inverted is None or state.inverted != wanted
+    return False
+
+
+async def _turns(axis: Axis, start: int) -> bool:
+    """Whether the shaft leaves this place while it is watched."""
+    units = await axis.units()
+    tolerance = max(2, units.position_raw(_STILL_REV))
+    deadline = time.monotonic() + _WATCHED_S
+    while time.monotonic() < deadline:
+        if abs(await axis.position_raw() - start) > tolerance:
+            return True
+        await asyncio.sleep(_LOOK_S)
+    return False
 
 
 def _require_setting(axis: Axis, parameter: Parameter) -> None:
@@ -83,7 +157,7 @@ def _require_setting(axis: Axis, parameter: Parameter) -> None:
 
 async def _require_rest(axis: Axis, parameter: Parameter) -> None:
     drive = axis.drive
-    if await axis.state() in _DISABLED and await axis.standstill(_WATCHED_S):
+    if await axis.state() in _DISABLED and await axis.standstill(_AT_REST_S):
         return
     raise NotAllowed(
         f"{drive.name}: {parameter.key} {parameter.name} is set only while the motor has no "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -22,11 +23,15 @@ ACCESS_S = 0.0005
 
 
 class FirmwareLink:
-    """`drivers.link.Link` on one virtual drive. Time passes with accesses and `pass_s` only."""
+    """`drivers.link.Link` on one virtual drive. Time passes with accesses and `pass_s` only.
+
+    With ``real_time`` an access comes as late for the drive as it does for the computer.
+    """
 
     cyclic = None
 
-    def __init__(self, family: str, kind: LinkKind) -> None:
+    def __init__(self, family: str, kind: LinkKind, *, real_time: bool = False) -> None:
+        self._real_time, self._asked = real_time, time.monotonic()
         device = make_device(family)
         assert isinstance(device, VirtualServo)
         self.device: VirtualServo = device
@@ -50,6 +55,11 @@ class FirmwareLink:
         self._ns += round(seconds * 1e9)
         self.device.advance(self._ns)
 
+    def _access(self) -> None:
+        passed = time.monotonic() - self._asked
+        self._asked += passed
+        self.pass_s(max(ACCESS_S, passed) if self._real_time else ACCESS_S)
+
     # --- Link -----------------------------------------------------------------------------
 
     async def open(self) -> None:
@@ -64,7 +74,7 @@ class FirmwareLink:
 
     async def read(self, station: int, address: Address) -> bytes:
         del station
-        self.pass_s(ACCESS_S)
+        self._access()
         await asyncio.sleep(0)
         try:
             if self.kind == "modbus":
@@ -89,7 +99,7 @@ class FirmwareLink:
 
     async def write(self, station: int, address: Address, data: bytes) -> None:
         del station
-        self.pass_s(ACCESS_S)
+        self._access()
         await asyncio.sleep(0)
         try:
             if self.kind == "modbus":
