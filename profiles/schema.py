@@ -357,8 +357,17 @@ class Signal(Frozen):
     notes: str = ""
 
 
+UnitOrigin = Literal["manual", "makers_file", "standard"]
+#: Objects of CiA 402-2 that state units and the encoder's resolution, in any drive that has them.
+SCALE_KEYS = ("60A8:00", "60A9:00", "60AA:00", "608F:01", "608F:02")
+
+
 class UnitSpec(Frozen):
-    """Units of the motion objects and where the resolution comes from."""
+    """Units of the motion objects and where the resolution comes from.
+
+    ``origins`` says of each unit who states it. A unit that is only the standard's default counts
+    for nothing by itself: makers use others.
+    """
 
     position: str = "inc"
     velocity: str = Field(default="inc/s", description="inc/s, rpm, 0.1 rpm …")
@@ -374,6 +383,9 @@ class UnitSpec(Frozen):
     feed_revolutions: str | None = None
     ramp_reference_rpm: float | None = Field(
         default=None, description="speed that a ramp given as a time refers to"
+    )
+    origins: dict[Literal["position", "velocity", "acceleration"], UnitOrigin] = Field(
+        default_factory=dict, description="who states each unit; the manual where not given"
     )
     source: str = ""
     notes: str = ""
@@ -535,6 +547,7 @@ class Profile(Frozen):
         units = self.units
         keys = [units.gear_numerator, units.gear_denominator, units.feed, units.feed_revolutions]
         keys += [quirk.key for quirk in self.quirks if quirk.kind == "unit_switch"]
+        keys += [key for key in SCALE_KEYS if key in self.by_key]
         return frozenset(key for key in keys if key is not None)
 
     @cached_property
