@@ -61,12 +61,12 @@ def _importing() -> Iterator[None]:
         raise NotAllowed(str(error), remedy="see docs/drives/not-listed.md") from error
 
 
-def _product_code(text: str) -> int:
+def _number(option: str, text: str | None) -> int | None:
     try:
-        return int(text, 0)
+        return None if text is None else int(text, 0)
     except ValueError as error:
         raise NotAllowed(
-            f"--product-code {text!r} is no number", value=text, remedy="write it as 0x190 or 400"
+            f"{option} {text!r} is no number", value=text, remedy="write it as 0x190 or 400"
         ) from error
 
 
@@ -94,6 +94,9 @@ def import_description(
     product_code: Annotated[
         str | None, typer.Option(help="which device of an ESI file, e.g. 0x190")
     ] = None,
+    revision: Annotated[
+        str | None, typer.Option(help="which revision of it, e.g. 0x10001; else the newest")
+    ] = None,
     folder: Annotated[
         Path | None, typer.Option(help="where profiles lie; your own folder if left out")
     ] = None,
@@ -102,8 +105,13 @@ def import_description(
     if folder is None:
         _check_name(name)
     with _importing():
-        code = None if product_code is None else _product_code(product_code)
-        imported = import_file(file.read_bytes(), file.name, drive=name, product_code=code)
+        imported = import_file(
+            file.read_bytes(),
+            file.name,
+            drive=name,
+            product_code=_number("--product-code", product_code),
+            revision=_number("--revision", revision),
+        )
         if folder is None:
             _check_name(imported.profile.drive)
         target = write_profile(imported.profile, folder or user_folder())
@@ -111,6 +119,12 @@ def import_description(
         print(f"  {finding}")
     print(f"{imported.profile.title}: {len(imported.profile.parameters)} parameters, "
           f"{imported.report.summary()}")  # fmt: skip
+    for device in imported.others:
+        print(
+            f"also in the file: {device.name}"
+            f" (--product-code {device.product_code or 0:#x} --revision {device.revision or 0:#x})"
+            + ("" if device.has_control_word else ", without a control word: not a drive")
+        )
     print(f"written to {target}; use it as {imported.profile.drive}")
 
 
