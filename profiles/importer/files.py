@@ -15,6 +15,9 @@ from profiles.importer.report import ImportFailed, ImportReport
 from profiles.loader import CLASS_FIELDS
 from profiles.schema import Profile
 
+#: libyaml's writer where PyYAML was built with it; ten times as fast.
+_SafeDumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+
 
 def import_file(
     data: bytes,
@@ -140,4 +143,6 @@ def profile_yaml(profile: Profile) -> str:
     data = profile.model_dump(
         mode="json", exclude_defaults=True, exclude={"parameters": {"__all__": set(CLASS_FIELDS)}}
     )
-    return yaml.safe_dump(data, allow_unicode=True, sort_keys=False, width=100)
+    return str(
+        yaml.dump(data, Dumper=_SafeDumper, allow_unicode=True, sort_keys=False, width=100)
+    )

@@ -87,6 +87,8 @@ def parse_number(text: str, place: str, report: ImportReport) -> int | float | N
 
     Empty text is None without a finding: many files leave defaults empty.
     """
+    if text.isascii() and text.isdigit() and text[0] != "0" and len(text) <= _LONGEST_NUMBER:
+        return int(text)
     bare = text.split(";", 1)[0].strip().strip("\"'").replace("_", "").replace(" ", "")
     if not bare or bare in ("-", "0x", "0X"):
         return None

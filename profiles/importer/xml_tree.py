@@ -17,7 +17,13 @@ def strip_namespaces(root: Element) -> None:
 
 def child(element: Element | None, tag: str) -> Element | None:
     """The first child with this tag, whatever the case of its letters."""
-    return next(iter(children(element, tag)), None)
+    if element is None:
+        return None
+    wanted = tag.lower()
+    for each in element:
+        if isinstance(each.tag, str) and each.tag.lower() == wanted:
+            return each
+    return None
 
 
 def children(element: Element | None, tag: str) -> list[Element]:
