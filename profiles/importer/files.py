@@ -143,6 +143,4 @@ def profile_yaml(profile: Profile) -> str:
     data = profile.model_dump(
         mode="json", exclude_defaults=True, exclude={"parameters": {"__all__": set(CLASS_FIELDS)}}
     )
-    return str(
-        yaml.dump(data, Dumper=_SafeDumper, allow_unicode=True, sort_keys=False, width=100)
-    )
+    return str(yaml.dump(data, Dumper=_SafeDumper, allow_unicode=True, sort_keys=False, width=100))
