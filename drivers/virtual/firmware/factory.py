@@ -33,6 +33,9 @@ def make_device(
 ) -> Device:
     """A drive of this family with its own NVM file ``<drive>-<station>.json`` in ``nvm_dir``.
 
+    One of an imported profile behaves by CiA 402 and has the objects of the maker's file; what
+    the maker's own objects do is in no file, so they only keep their values.
+
     ``drive`` is a family's name or its loaded profile; ``mechanics`` a checked spec, the plain
     table of a bench file, or nothing for the standard axis.
 
@@ -42,6 +45,8 @@ def make_device(
     """
     profile = load_profile(drive) if isinstance(drive, str) else drive
     build = FAMILIES.get(profile.drive)
+    if build is None and profile.from_description:
+        build = FAMILIES["generic402"]
     if build is None:
         raise ValueError(f"no virtual {profile.drive!r}; there are: {', '.join(sorted(FAMILIES))}")
     if mechanics is None:
