@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -46,6 +47,7 @@ def make_device(
     profile = load_profile(drive) if isinstance(drive, str) else drive
     build = FAMILIES.get(profile.drive)
     if build is None and profile.from_description:
+        _require_known_units(profile)
         build = FAMILIES["generic402"]
     if build is None:
         raise ValueError(f"no virtual {profile.drive!r}; there are: {', '.join(sorted(FAMILIES))}")
@@ -64,6 +66,26 @@ def make_device(
         station=station,
         seed=station,
     )
+
+
+#: Units that the virtual firmware computes in; any other would be a wrong speed in silence.
+_POSITIONS = re.compile(r"inc")
+_RATES = re.compile(r"inc/s²?|(0\.\d+ )?rpm(/s)?")
+
+
+def _require_known_units(profile: Profile) -> None:
+    """Raises ValueError where the file states units that this firmware does not have."""
+    units = profile.units
+    for quantity, text, known in (
+        ("positions", units.position, _POSITIONS),
+        ("speeds", units.velocity, _RATES),
+        ("accelerations", units.acceleration, _RATES),
+    ):
+        if known.fullmatch(text) is None:
+            raise ValueError(
+                f"no virtual {profile.drive!r}: its {quantity} are in {text!r}; a virtual drive "
+                "has increments and rpm, with or without a power of ten"
+            )
 
 
 def number_device(device: Device, serial: int) -> None:
