@@ -392,6 +392,13 @@ class UnitSpec(Frozen):
     notes: str = ""
 
 
+class PdoPart(Frozen):
+    """A stretch of a PDO: an object of which ``bits`` are mapped, or with no key padding."""
+
+    key: str | None = None
+    bits: int = Field(ge=1, le=64 * 8)
+
+
 class PdoSet(Frozen):
     """One PDO: its mapping object and default contents as ``key`` list."""
 
@@ -399,7 +406,22 @@ class PdoSet(Frozen):
     direction: Literal["rx", "tx"]
     entries: tuple[str, ...]
     fixed: bool = False
+    layout: tuple[PdoPart, ...] = Field(
+        default=(), description="every stretch in its order, where there is padding or single bits"
+    )
+    sync_manager: int | None = Field(
+        default=None, description="sync manager that it is assigned to without a master's doing"
+    )
+    mandatory: bool = False
+    exclude: tuple[int, ...] = Field(
+        default=(), description="PDOs that cannot be assigned together with this one"
+    )
     source: str
+
+    @property
+    def is_free(self) -> bool:
+        """Whether its contents can be written."""
+        return not self.fixed
 
 
 class PdoSpec(Frozen):
@@ -416,6 +438,20 @@ class PdoSpec(Frozen):
     sync_modes: tuple[str, ...] = ()
     source: str
     notes: str = ""
+
+    def free_set(self, direction: Literal["rx", "tx"]) -> int | None:
+        """The PDO whose contents are written: the default, or where that is fixed another free one.
+
+        None: nothing of this direction can be remapped.
+        """
+        if not self.remappable:
+            return None
+        default = self.default_rx if direction == "rx" else self.default_tx
+        known = [s for s in self.sets if s.direction == direction]
+        if all(s.index != default for s in known):
+            return default
+        free = [s.index for s in known if s.is_free]
+        return default if default in free else next(iter(free), None)
 
 
 class Watchdog(Frozen):

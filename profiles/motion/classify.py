@@ -22,6 +22,8 @@ STANDARD_FILE = Path(__file__).with_name("standard.yaml")
 #: (CiA 402-1 clause 7.1; ETG.6010 clause 5.1): 6000h–67FFh, 6800h–6FFFh … up to 9FFFh.
 _AXES = range(0x6000, 0xA000)
 _AXIS_STEP = 0x800
+#: Communication objects of CiA 301.
+_COMMUNICATION = range(0x1000, 0x2000)
 _UNCLASSIFIED = "nobody has said yet what writing it does"
 
 
@@ -37,6 +39,8 @@ def standard_rule(key: str) -> MotionRule | None:
     if key.startswith("PA_"):
         return None
     index = int(key[:4], 16)
+    if index not in _COMMUNICATION and index not in _AXES:
+        return None
     if index in _AXES:
         key = f"{_AXES.start + (index - _AXES.start) % _AXIS_STEP:04X}:{key[5:]}"
     return next((rule for rule in standard_rules() if rule.covers(key)), None)

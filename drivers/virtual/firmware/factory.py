@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -34,6 +35,9 @@ def make_device(
 ) -> Device:
     """A drive of this family with its own NVM file ``<drive>-<station>.json`` in ``nvm_dir``.
 
+    One of an imported profile behaves by CiA 402 and has the objects of the maker's file; what
+    the maker's own objects do is in no file, so they only keep their values.
+
     ``drive`` is a family's name or its loaded profile; ``mechanics`` a checked spec, the plain
     table of a bench file, or nothing for the standard axis.
 
@@ -43,6 +47,9 @@ def make_device(
     """
     profile = load_profile(drive) if isinstance(drive, str) else drive
     build = FAMILIES.get(profile.drive)
+    if build is None and profile.from_description:
+        _require_known_units(profile)
+        build = FAMILIES["generic402"]
     if build is None:
         raise ValueError(f"no virtual {profile.drive!r}; there are: {', '.join(sorted(FAMILIES))}")
     if mechanics is None:
@@ -61,6 +68,26 @@ def make_device(
         station=station,
         seed=station,
     )
+
+
+#: Units that the virtual firmware computes in; any other would be a wrong speed in silence.
+_POSITIONS = re.compile(r"inc")
+_RATES = re.compile(r"inc/s²?|(0\.\d+ )?rpm(/s)?")
+
+
+def _require_known_units(profile: Profile) -> None:
+    """Raises ValueError where the file states units that this firmware does not have."""
+    units = profile.units
+    for quantity, text, known in (
+        ("positions", units.position, _POSITIONS),
+        ("speeds", units.velocity, _RATES),
+        ("accelerations", units.acceleration, _RATES),
+    ):
+        if known.fullmatch(text) is None:
+            raise ValueError(
+                f"no virtual {profile.drive!r}: its {quantity} are in {text!r}; a virtual drive "
+                "has increments and rpm, with or without a power of ten"
+            )
 
 
 def number_device(device: Device, serial: int) -> None:

@@ -5,6 +5,7 @@ import { frame } from './texts/frame'
 import { functions } from './texts/functions'
 import { library } from './texts/library'
 import { notListed } from './texts/notlisted'
+import { motionClass } from './texts/motion-class'
 import { parameters } from './texts/parameters'
 import { people } from './texts/people'
 import { recordings } from './texts/recordings'
@@ -25,6 +26,7 @@ export const catalogue = {
   ...axis,
   ...drive,
   ...functions,
+  ...motionClass,
   ...parameters,
   ...people,
   ...recordings,

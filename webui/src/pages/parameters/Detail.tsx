@@ -13,10 +13,12 @@ import { setRecord, useRecord } from '../../widgets/useFunctions'
 import { setEdit, useEdits, writeEdits } from './edits'
 import { editable } from './Grid'
 import { editText, pendingKey, range, readingText } from './GridRow'
+import { MotionClass } from './MotionClass'
 
 /** Everything about one parameter, and its editor: enum, bits, raw and physical. */
 export function Detail({
   drive,
+  profile,
   row,
   onClose,
 }: {
@@ -97,6 +99,7 @@ export function Detail({
       </div>
       <ProblemNote problem={problems.get(row.key) ?? act.problem} />
       <OnWatchList drive={drive} row={row} />
+      {row.access !== 'ro' && <MotionClass key={row.key} profile={profile} parameter={row.key} />}
       <Facts row={row} />
     </aside>
   )
