@@ -88,7 +88,7 @@ def rigid_part(found: ForeignResponse, filter_hz: float | None) -> RigidPart | N
     gain = abs(fit.model.gain) * TURN * corner
     pick = np.zeros(fit.covariance.shape[0])
     pick[0] = pick[2 + pole] = 1.0
-    spread = float(np.sqrt(max(pick @ fit.covariance @ pick, 0.0)))
+    spread = float(np.sqrt(max(float(pick @ fit.covariance @ pick), 0.0)))
     # What is common to all lines, as the band counts it.
     common = float(np.median(found.band.level))
     factor = float(np.exp(_CI95 * np.hypot(spread, common)))
