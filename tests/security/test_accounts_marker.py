@@ -168,6 +168,7 @@ def serve(folder: Path) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
+@pytest.mark.timeout(400)  # four starts of the whole program
 def test_a_second_server_on_a_folder_does_not_start(tmp_path: Path) -> None:
     """Also where the first one has just made the folder; and not for longer than the first runs."""
     folder = tmp_path / "state"
