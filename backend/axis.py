@@ -55,6 +55,8 @@ class Axis(ScaledAxis):
         super().__init__(drive)
         #: A person enabled it by a transition, and nobody took that back here.
         self._left_enabled = False
+        #: Time that a brake which opens by itself takes after enabling, once a motion met it closed.
+        self.brake_wait_s = 0.0
         #: The page by which that was done; None where it was no page.
         self.enabled_by: str | None = None
 
@@ -232,6 +234,8 @@ class Axis(ScaledAxis):
             await self.require_certain_scales()
         try:
             await self.go_to_cyclic(session, State.OPERATION_ENABLED, mode, timeout_s)
+            if self.brake_wait_s:
+                await asyncio.sleep(self.brake_wait_s)
             yield
         except NotAllowed as error:
             await self._name_fault(error)

@@ -10,6 +10,7 @@ import { people } from './texts/people'
 import { recordings } from './texts/recordings'
 import { saidTexts } from './texts/said'
 import { saidOfTuning } from './texts/said-tuning'
+import { scales } from './texts/scales'
 import { scene } from './texts/scene'
 import { scope } from './texts/scope'
 import { segment } from './texts/segment'
@@ -30,6 +31,7 @@ export const catalogue = {
   ...notListed,
   ...saidTexts,
   ...saidOfTuning,
+  ...scales,
   ...scene,
   ...scope,
   ...segment,
