@@ -6,7 +6,9 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import get_args
 
+from profiles.motion.rule import Motion, place_of
 from profiles.schema import INTEGER_RANGE, Chapter, Fault, HomingMethod, Parameter, Profile
 
 
@@ -33,7 +35,43 @@ def check(profile: Profile) -> list[Finding]:
     findings += [Finding(code, "fault code given twice") for code, n in codes.items() if n > 1]
     methods = Counter(method.method for method in profile.homing_methods)
     findings += [Finding(f"homing {m}", "given twice") for m, n in methods.items() if n > 1]
-    return findings + _check_chapters(profile)
+    return findings + _check_motion(profile) + _check_chapters(profile)
+
+
+def motion_counts(profile: Profile) -> dict[Motion, int]:
+    """How many writable parameters have each motion class, all three named."""
+    counts = Counter(p.motion for p in profile.parameters if p.motion is not None)
+    return {motion: counts[motion] for motion in get_args(Motion)}
+
+
+def unclassified(profile: Profile) -> list[Parameter]:
+    """Writable parameters whose class nobody has given: they count as ``energises``."""
+    return [p for p in profile.parameters if p.motion_origin == "unclassified"]
+
+
+def _check_motion(profile: Profile) -> list[Finding]:
+    """Every writable object has a motion class from exactly one rule, and no rule is left over.
+
+    A profile made from a maker's file has objects that nobody has classified yet; that is its
+    normal state and the count tells how many.
+    """
+    findings: list[Finding] = []
+    if not profile.from_description:
+        findings += [
+            Finding(p.key, f"{p.name} can be written and has no motion class: add a motion rule")
+            for p in unclassified(profile)
+        ]
+    writable = [p.key for p in profile.parameters if p.access != "ro"]
+    own = [rule for rule in profile.motion_rules if rule.origin == "profile"]
+    for key in writable:
+        if sum(rule.covers(key) for rule in own) > 1:
+            findings.append(Finding(key, "two motion rules are about it"))
+    places = [place_of(key) for key in writable]
+    for rule in profile.motion_rules:
+        for text, (first, last) in zip(rule.keys, rule.spans, strict=True):
+            if not any(first <= place <= last for place in places):
+                findings.append(Finding(text, "a motion rule about nothing that can be written"))
+    return findings
 
 
 def _check_chapters(profile: Profile) -> list[Finding]:

@@ -46,6 +46,7 @@ def _parameter(p: Parameter) -> dict[str, object]:
         "settable": p.settable,
         "modbus_register": p.modbus_register,
         "motor_individual": p.motor_individual,
+        "motion": p.motion,
         "source": p.source,
         "also_printed": list(p.also_printed),
         "notes": " ".join(text for text in (p.help, p.notes) if text),

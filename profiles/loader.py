@@ -20,11 +20,16 @@ import platformdirs
 import yaml
 from pydantic import ValidationError
 
+from profiles.motion.classify import STANDARD_FILE, classified
 from profiles.schema import Profile
 
 _HERE = Path(__file__).parent
 #: libyaml's loader where PyYAML was built with it; ten times as fast.
 _SafeLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+#: Filled in from the motion rules, see `profiles.motion.classify`.
+CLASS_FIELDS = frozenset({"motion", "safe_in_motion", "motion_origin", "motion_reason"})
 
 
 class ProfileError(Exception):
@@ -120,10 +125,27 @@ def parse_profile(texts: dict[str, str]) -> Profile:
                 raise ProfileError(f"{name}: {field!r} is already given by another file")
             else:
                 merged[field] = value
+    _refuse_own_classes(merged)
     try:
-        return Profile.model_validate(merged)
+        return classified(Profile.model_validate(merged))
     except ValidationError as error:
         raise ProfileError(_explain(merged, error)) from error
+
+
+def _refuse_own_classes(merged: dict[str, Any]) -> None:
+    """Motion classes have one place: the rules, which give each a reason.
+
+    Raises:
+        ProfileError: a parameter's row gives a class itself.
+    """
+    rows = merged.get("parameters")
+    for row in rows if isinstance(rows, list) else ():
+        if isinstance(row, dict) and (given := CLASS_FIELDS & row.keys()):
+            raise ProfileError(
+                f"profile {merged.get('drive', '?')}: {row.get('key', '?')} gives "
+                f"{', '.join(sorted(given))} in its row; write a rule in motion_rules, with its "
+                "reason"
+            )
 
 
 def _explain(merged: dict[str, Any], error: ValidationError) -> str:
@@ -143,7 +165,8 @@ def _explain(merged: dict[str, Any], error: ValidationError) -> str:
 def _cache_path(drive: str, files: list[Path]) -> Path:
     digest = hashlib.sha256()
     schema = (_HERE / name for name in ("schema.py", "functions.py", "record.py"))
-    for path in [*schema, Path(__file__), *files]:
+    motion = (*sorted((_HERE / "motion").glob("*.py")), STANDARD_FILE)
+    for path in [*schema, *motion, Path(__file__), *files]:
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     folder = Path(os.environ.get("SERVODECK_CACHE") or platformdirs.user_cache_dir("servodeck"))

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from profiles.functions import Functions, referenced_keys
+from profiles.motion.rule import Motion, MotionOrigin, MotionRule
 from profiles.record import Frozen
 
 DataType = Literal[
@@ -74,6 +75,18 @@ class Parameter(Frozen):
     motor_individual: bool = Field(
         default=False, description="belongs to one motor or station; never cloned by default"
     )
+    motion: Motion | None = Field(
+        default=None,
+        description="whether writing it can cause motion; filled in from the motion rules, "
+        "None for what cannot be written",
+    )
+    safe_in_motion: bool = Field(
+        default=False, description="at_enable, and may be changed while the axis is enabled"
+    )
+    motion_origin: MotionOrigin | None = Field(
+        default=None, description="who gave the motion class"
+    )
+    motion_reason: str = Field(default="", description="what gives it this motion class")
     help: str = ""
     source: str = Field(description="manual:line, for example 004:5432")
     also_printed: tuple[str, ...] = Field(
@@ -378,6 +391,13 @@ class UnitSpec(Frozen):
     notes: str = ""
 
 
+class PdoPart(Frozen):
+    """A stretch of a PDO: an object of which ``bits`` are mapped, or with no key padding."""
+
+    key: str | None = None
+    bits: int = Field(ge=1, le=64 * 8)
+
+
 class PdoSet(Frozen):
     """One PDO: its mapping object and default contents as ``key`` list."""
 
@@ -385,7 +405,22 @@ class PdoSet(Frozen):
     direction: Literal["rx", "tx"]
     entries: tuple[str, ...]
     fixed: bool = False
+    layout: tuple[PdoPart, ...] = Field(
+        default=(), description="every stretch in its order, where there is padding or single bits"
+    )
+    sync_manager: int | None = Field(
+        default=None, description="sync manager that it is assigned to without a master's doing"
+    )
+    mandatory: bool = False
+    exclude: tuple[int, ...] = Field(
+        default=(), description="PDOs that cannot be assigned together with this one"
+    )
     source: str
+
+    @property
+    def is_free(self) -> bool:
+        """Whether its contents can be written."""
+        return not self.fixed
 
 
 class PdoSpec(Frozen):
@@ -402,6 +437,20 @@ class PdoSpec(Frozen):
     sync_modes: tuple[str, ...] = ()
     source: str
     notes: str = ""
+
+    def free_set(self, direction: Literal["rx", "tx"]) -> int | None:
+        """The PDO whose contents are written: the default, or where that is fixed another free one.
+
+        None: nothing of this direction can be remapped.
+        """
+        if not self.remappable:
+            return None
+        default = self.default_rx if direction == "rx" else self.default_tx
+        known = [s for s in self.sets if s.direction == direction]
+        if all(s.index != default for s in known):
+            return default
+        free = [s.index for s in known if s.is_free]
+        return default if default in free else next(iter(free), None)
 
 
 class Watchdog(Frozen):
@@ -506,6 +555,9 @@ class Profile(Frozen):
     gains: GainSpec | None = None
     quirks: tuple[Quirk, ...] = ()
     functions: Functions = Functions()
+    motion_rules: tuple[MotionRule, ...] = Field(
+        default=(), description="motion classes of the maker's objects; the first that fits counts"
+    )
     conflicts: tuple[Conflict, ...] = ()
     manual_chapters: tuple[Chapter, ...] = Field(
         default=(), description="the whole manual, chapter behind chapter, without a gap"
@@ -519,6 +571,11 @@ class Profile(Frozen):
     def by_key(self) -> dict[str, Parameter]:
         """Parameters by key."""
         return {p.key: p for p in self.parameters}
+
+    @property
+    def from_description(self) -> bool:
+        """Made from a maker's file or a drive's own dictionary, not from a numbered manual."""
+        return not (self.manual.isdigit() or self.manual == "CiA")
 
     @cached_property
     def unit_keys(self) -> frozenset[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import ConfigDict, Field, model_validator
 
 from backend.api.models import Message
 from backend.api.models_bench import FoundDrive
@@ -19,6 +19,39 @@ class DescribedDevice(Message):
     name: str
     product_code: int | None
     revision: int | None
+
+
+class MotionClass(Message):
+    """Whether writing an object can cause motion, who says so, and whether it can be changed."""
+
+    motion: Literal["none", "at_enable", "energises"] | None = Field(
+        description="null: it cannot be written"
+    )
+    safe_in_motion: bool = Field(description="at_enable, and may be changed while enabled")
+    origin: Literal["standard", "profile", "person", "unclassified"] | None = Field(
+        description="unclassified: nobody has said, so that it counts as energises"
+    )
+    reason: str
+    changeable: bool = Field(description="whether a person may give it another class")
+    fixed_why: str = Field(description="why not; empty where it is changeable")
+
+
+class MotionClassRequest(Message):
+    """What writing an object does, by the word of the person who asks."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    motion: Literal["none", "at_enable", "energises"]
+    safe_in_motion: bool = False
+    reason: str = Field(
+        min_length=3, max_length=500, description="how the person knows: the manual's page, a test"
+    )
+
+    @model_validator(mode="after")
+    def _safe_only_at_enable(self) -> MotionClassRequest:
+        if self.safe_in_motion and self.motion != "at_enable":
+            raise ValueError("safe_in_motion is for at_enable only")
+        return self
 
 
 class ImportFinding(Message):

@@ -50,7 +50,8 @@ BlobPlace = Annotated[
 Out = Annotated[Path | None, typer.Option(help="file to write; by default the terminal")]
 
 
-def _records(config: Path | None, database: str | None, blobs: str | None = None) -> Records:
+def station_records(config: Path | None, database: str | None, blobs: str | None = None) -> Records:
+    """What the station of this folder keeps, with the terminal's user as who acts."""
     who = replace(LOCAL, person=f"{getpass.getuser()} (terminal)")
     acting.set(Actor(who))
     return Records(state_folder(config), Journal(), database, blobs)
@@ -62,7 +63,7 @@ def _existing(config: Path | None, database: str | None, blobs: str | None = Non
     Raises:
         NotAllowed: there is no database in this folder.
     """
-    records = _records(config, database, blobs)
+    records = station_records(config, database, blobs)
     file = records.store.sqlite_file
     if file is not None and not file.exists():
         raise NotAllowed(
@@ -258,7 +259,7 @@ def import_sets(
     tag: Annotated[list[str] | None, typer.Option(help="to put on them")] = None,
 ) -> None:
     """Take parameter-set files into the library; a known name gets a new version."""
-    records = _records(config, database, blobs)
+    records = station_records(config, database, blobs)
     for file in files:
         data = file.read_bytes()
         parameter_set.parse(data, file.name)

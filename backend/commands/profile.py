@@ -9,17 +9,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast, get_args
 
 import typer
 
+from backend.audit import Fact
+from backend.audit.facts import Value
+from backend.commands.keep import station_records
 from backend.commands.session import opened, show_progress, told
 from backend.description import profile_of_drive
 from backend.files import write_atomically
 from drivers.errors import NotAllowed
 from profiles import drive_names, load_profile
 from profiles.check import check as check_profile
-from profiles.check import coverage
+from profiles.check import coverage, motion_counts, unclassified
 from profiles.export import show as shown
 from profiles.importer import (
     ImportedProfile,
@@ -29,6 +32,8 @@ from profiles.importer import (
     write_profile,
 )
 from profiles.loader import ProfileError, user_folder
+from profiles.motion import decisions
+from profiles.motion.rule import Motion
 
 app = typer.Typer(help="Drive profiles: show, check, import.")
 
@@ -61,12 +66,12 @@ def _importing() -> Iterator[None]:
         raise NotAllowed(str(error), remedy="see docs/drives/not-listed.md") from error
 
 
-def _product_code(text: str) -> int:
+def _number(option: str, text: str | None) -> int | None:
     try:
-        return int(text, 0)
+        return None if text is None else int(text, 0)
     except ValueError as error:
         raise NotAllowed(
-            f"--product-code {text!r} is no number", value=text, remedy="write it as 0x190 or 400"
+            f"{option} {text!r} is no number", value=text, remedy="write it as 0x190 or 400"
         ) from error
 
 
@@ -94,6 +99,9 @@ def import_description(
     product_code: Annotated[
         str | None, typer.Option(help="which device of an ESI file, e.g. 0x190")
     ] = None,
+    revision: Annotated[
+        str | None, typer.Option(help="which revision of it, e.g. 0x10001; else the newest")
+    ] = None,
     folder: Annotated[
         Path | None, typer.Option(help="where profiles lie; your own folder if left out")
     ] = None,
@@ -102,8 +110,13 @@ def import_description(
     if folder is None:
         _check_name(name)
     with _importing():
-        code = None if product_code is None else _product_code(product_code)
-        imported = import_file(file.read_bytes(), file.name, drive=name, product_code=code)
+        imported = import_file(
+            file.read_bytes(),
+            file.name,
+            drive=name,
+            product_code=_number("--product-code", product_code),
+            revision=_number("--revision", revision),
+        )
         if folder is None:
             _check_name(imported.profile.drive)
         target = write_profile(imported.profile, folder or user_folder())
@@ -111,6 +124,12 @@ def import_description(
         print(f"  {finding}")
     print(f"{imported.profile.title}: {len(imported.profile.parameters)} parameters, "
           f"{imported.report.summary()}")  # fmt: skip
+    for device in imported.others:
+        print(
+            f"also in the file: {device.name}"
+            f" (--product-code {device.product_code or 0:#x} --revision {device.revision or 0:#x})"
+            + ("" if device.has_control_word else ", without a control word: not a drive")
+        )
     print(f"written to {target}; use it as {imported.profile.drive}")
 
 
@@ -143,6 +162,62 @@ def import_from_drive(
     print(f"{len(imported.profile.parameters)} parameters written to {target}; use it as {name}")
 
 
+@app.command("classify")
+@told
+def classify_object(
+    drive: Annotated[str, typer.Argument(help="an imported profile")],
+    key: Annotated[str, typer.Argument(help="key of the object, for example 2005:01")],
+    motion: Annotated[str, typer.Argument(help="none, at_enable or energises; or forget")],
+    reason: Annotated[
+        str, typer.Option(help="how you know: the manual's page, a test; needed for a class")
+    ] = "",
+    safe_in_motion: Annotated[
+        bool, typer.Option("--safe-in-motion", help="at_enable, and may be changed while enabled")
+    ] = False,
+    config: Annotated[Path | None, typer.Option(help="state folder of the station")] = None,
+    database: Annotated[
+        str | None, typer.Option(envvar="SERVODECK_DATABASE", help="database of the station")
+    ] = None,
+) -> None:
+    """Say whether writing an object of an imported profile can cause motion.
+
+    Nobody has said so of a maker's objects in an imported file, and so each counts as one that
+    can. The decision is kept beside the profile and written down in the station's audit.
+    """
+    if motion not in (*get_args(Motion), "forget"):
+        raise NotAllowed(
+            f"{motion!r} is no motion class",
+            value=motion,
+            limit="none, at_enable, energises, forget",
+            remedy="choose one of these",
+        )
+    known = load_profile(drive).parameter(key)
+    before = None if known is None else known.motion
+    try:
+        if motion == "forget":
+            now = decisions.forget(drive, key)
+        else:
+            now = decisions.classify(
+                drive, key, cast(Motion, motion), reason=reason, safe_in_motion=safe_in_motion
+            )
+    except (decisions.CannotClassify, ValueError) as error:
+        raise NotAllowed(
+            str(error), parameter=key, remedy="see docs/drives/not-listed.md"
+        ) from error
+    records = station_records(config, database)
+    told_as: dict[str, Value] = {
+        "reason": now.motion_reason,
+        "safe_in_motion": now.safe_in_motion,
+    }
+    target = f"/profiles/{drive}/parameters/{now.key}/motion"
+    records.audit.add(
+        Fact("station", "changed", target=target, old=before, new=now.motion, detail=told_as)
+    )
+    records.audit.close()
+    records.store.close()
+    print(f"{now.key} {now.name}: {now.motion}{', safe in motion' if now.safe_in_motion else ''}")
+
+
 @app.command("export-eds")
 @told
 def export_description(
@@ -168,6 +243,8 @@ def check(drive: Annotated[str | None, typer.Argument()] = None) -> None:
         findings = check_profile(profile)
         print(f"{name}: {len(profile.parameters)} parameters, {len(profile.faults)} faults, "
               f"{len(findings)} findings")  # fmt: skip
+        counts = ", ".join(f"{count} {motion}" for motion, count in motion_counts(profile).items())
+        print(f"  motion classes: {counts}; {len(unclassified(profile))} not classified")
         for finding in findings:
             print(f"  {finding}")
         for line in coverage(profile):

@@ -13,7 +13,7 @@ from drivers.codec import size_of
 from drivers.errors import NotAllowed
 from drivers.link import Address, CyclicSignal
 from drivers.setpoints import TARGETS
-from profiles.schema import DataType, PdoSet, PdoSpec, Profile
+from profiles.schema import Parameter, PdoPart, PdoSet, PdoSpec, Profile
 
 CONTROL_WORD = Address(0x6040, 0, "UINT16")
 STATUS_WORD = Address(0x6041, 0, "UINT16")
@@ -50,6 +50,13 @@ class Pdo:
     index: int
     entries: tuple[Entry, ...]
     write: bool
+    words: tuple[int, ...] = ()
+    """Mapping entries of a fixed PDO with padding or single bits, where ``entries`` has bytes."""
+
+    @property
+    def mapping_words(self) -> tuple[int, ...]:
+        """What its mapping object holds (ETG.1000.6 clause 5.6.7.4.7)."""
+        return self.words or tuple(entry.word for entry in self.entries)
 
     @property
     def size(self) -> int:
@@ -121,7 +128,7 @@ def _direction(
     station: int, direction: str, wish: Sequence[Address], needed: int, profile: Profile | None
 ) -> tuple[Pdo, dict[tuple[int, int], str]]:
     spec = profile.pdo if profile is not None else None
-    if spec is not None and not spec.remappable:
+    if spec is not None and spec.free_set("rx" if direction == "rx" else "tx") is None:
         return _fixed(station, direction, wish[:needed], wish, profile), {}
     index, most, room = _limits(spec, direction)
     entries: list[Entry] = []
@@ -150,7 +157,8 @@ def _direction(
 def _limits(spec: PdoSpec | None, direction: str) -> tuple[int, int, int | None]:
     if spec is None:
         return (_GENERIC_RX if direction == "rx" else _GENERIC_TX), _GENERIC_ENTRIES, None
-    index = spec.default_rx if direction == "rx" else spec.default_tx
+    index = spec.free_set("rx" if direction == "rx" else "tx")
+    assert index is not None, "a direction without a free set is fixed"
     return index, spec.max_entries, spec.max_bytes
 
 
@@ -194,7 +202,8 @@ def _fixed(
     must = {str(address) for address in needed}
     want = {str(address) for address in wish}
     sets = [s for s in profile.pdo.sets if s.direction == direction]
-    usable = [s for s in sets if must <= set(s.entries)]
+    reached = {s.index: _reached(_set_entries(s, profile)) for s in sets}
+    usable = [s for s in sets if must <= reached[s.index]]
     if not usable:
         raise NotAllowed(
             f"station {station}: none of the drive's fixed process data carries"
@@ -202,17 +211,46 @@ def _fixed(
             limit="fixed process data: " + ", ".join(f"{s.index:04X}h" for s in sets),
             remedy="use a mode whose setpoints one of these sets carries",
         )
-    best = max(usable, key=lambda s: (len(want & set(s.entries)), s.index == default))
-    return Pdo(best.index, _set_entries(best, profile), write=False)
+    best = max(usable, key=lambda s: (len(want & reached[s.index]), s.index == default))
+    words = tuple(_word(part) for part in best.layout)
+    return Pdo(best.index, _set_entries(best, profile), write=False, words=words)
+
+
+def _reached(entries: Sequence[Entry]) -> set[str]:
+    """Keys of the objects that lie in whole bytes of a PDO."""
+    return {f"{e.index:04X}:{e.subindex:02X}" for e in entries if e.code != "x"}
+
+
+def _word(part: PdoPart) -> int:
+    """The mapping entry of a stretch; padding has index 0."""
+    if part.key is None:
+        return part.bits
+    return int(part.key[:4], 16) << 16 | int(part.key[5:], 16) << 8 | part.bits
 
 
 def _set_entries(chosen: PdoSet, profile: Profile) -> tuple[Entry, ...]:
-    entries = []
-    for key in chosen.entries:
-        parameter = profile.by_key[key]
-        kind: DataType = parameter.type
-        entries.append(_entry(Address(parameter.index, parameter.subindex or 0, kind)))
+    """Its contents byte by byte; padding and single bits become bytes of no interest."""
+    if not chosen.layout:
+        return tuple(_entry_of(profile.by_key[key]) for key in chosen.entries)
+    entries: list[Entry] = []
+    loose = 0  # bits since the last object that begins at a byte
+    for part in chosen.layout:
+        known = profile.by_key.get(part.key) if part.key is not None else None
+        entry = None if known is None else _entry_of(known)
+        if entry is None or loose % 8 or entry.size * 8 != part.bits or entry.code == "x":
+            loose += part.bits
+            continue
+        if loose:
+            entries.append(Entry(0, 0, loose // 8, "x"))
+            loose = 0
+        entries.append(entry)
+    if loose:
+        entries.append(Entry(0, 0, (loose + 7) // 8, "x"))
     return tuple(entries)
+
+
+def _entry_of(parameter: Parameter) -> Entry:
+    return _entry(Address(parameter.index, parameter.subindex or 0, parameter.type))
 
 
 def _unique(addresses: Sequence[Address]) -> list[Address]:

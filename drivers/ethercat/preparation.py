@@ -252,4 +252,5 @@ class Preparation:
 
 
 def _pdo(plan: Message) -> Pdo:
-    return Pdo(plan["index"], tuple(Entry(*entry) for entry in plan["entries"]), plan["write"])
+    entries = tuple(Entry(*entry) for entry in plan["entries"])
+    return Pdo(plan["index"], entries, plan["write"], tuple(plan["words"]))

@@ -430,4 +430,4 @@ class EthercatCyclic:
 
 def _wire(pdo: Pdo) -> Message:
     entries = [[e.index, e.subindex, e.size, e.code] for e in pdo.entries]
-    return {"index": pdo.index, "entries": entries, "write": pdo.write}
+    return {"index": pdo.index, "entries": entries, "write": pdo.write, "words": pdo.words}

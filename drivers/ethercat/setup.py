@@ -32,8 +32,9 @@ _DC_CONTROL, _DC_ACTIVATE, _DC_START, _DC_CYCLE = 0x980, 0x981, 0x990, 0x9A0
 _ASSIGN = {"rx": 0x1C12, "tx": 0x1C13}
 _READ_ONLY = 0x06010002
 _FIXED = (
-    "its process data are fixed: import the maker's ESI file, which tells them (Connect page, My"
-    " drive is not listed)"
+    "its process data are fixed and others than the profile says: import the maker's ESI file of"
+    " this very revision (Connect page, My drive is not listed), or, if that has been done, choose"
+    " another device of the file"
 )
 _SETPOINTS = {0x6040, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2}
 _SYNC_LEAD_NS = 100_000_000
@@ -144,7 +145,7 @@ def _has_them_anyway(station: Station, assign: int, pdo: Pdo) -> Steps[bool]:
     if (yield from _read_list(station, assign, 2)) != ([pdo.index] if pdo.entries else []):
         return False
     words = yield from _read_list(station, pdo.index, 4)
-    return words == [entry.word for entry in pdo.entries]
+    return words == list(pdo.mapping_words)
 
 
 def interpolation_period(cycle_ns: int) -> tuple[int, int]:

@@ -10,7 +10,7 @@ from profiles.importer.dcf import (
 from profiles.importer.description import DescribedEntry, DescribedPdo, Description
 from profiles.importer.dictionary import describe_dictionary
 from profiles.importer.eds import read_eds
-from profiles.importer.esi import EsiDevice, read_esi
+from profiles.importer.esi import EsiDevice, open_esi, read_device
 from profiles.importer.export_eds import export_dcf, export_eds
 from profiles.importer.files import import_file, write_profile
 from profiles.importer.report import Finding, ImportFailed, ImportReport
@@ -31,9 +31,10 @@ __all__ = [
     "export_eds",
     "import_file",
     "is_dcf",
+    "open_esi",
     "read_dcf_identity",
     "read_dcf_values",
+    "read_device",
     "read_eds",
-    "read_esi",
     "write_profile",
 ]

@@ -4,24 +4,34 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import Literal
 
 from profiles.importer.description import DescribedEntry, Description
+from profiles.importer.esi import EsiDevice
+from profiles.importer.file_units import FileUnits
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.loader import load_profile
+from profiles.motion.classify import classified
 from profiles.schema import (
     INTEGER_RANGE,
+    Access,
     DataType,
     Identity,
     LinkSpec,
     Parameter,
+    PdoMapping,
+    PdoPart,
     PdoSet,
     PdoSpec,
     Profile,
-    UnitSpec,
     Watchdog,
 )
 
 GENERIC = "generic402"
+
+#: Objects of the axes of a device, each 800h behind the one before (CiA 402-1).
+_AXES = range(0x6000, 0xA000)
+_AXIS_STEP = 0x800
 
 #: Objects of CiA 402 without which a drive is none.
 _NEEDED = ("6040:00", "6041:00")
@@ -44,6 +54,8 @@ class ImportedProfile:
 
     profile: Profile
     report: ImportReport
+    others: tuple[EsiDevice, ...] = ()
+    """Further devices of the file, which could have been taken instead."""
 
 
 def build_profile(
@@ -63,11 +75,12 @@ def build_profile(
     """
     base = generic or load_profile(GENERIC)
     parameters: dict[str, Parameter] = {}
+    units = FileUnits(description.entries)
     for entry in description.entries:
         if entry.key in parameters:
             report.noted(entry.source, f"{entry.key} comes twice, the first one counts")
             continue
-        parameter = _parameter(entry, base.by_key.get(entry.key), report)
+        parameter = _parameter(entry, _standard(base, entry), units, report)
         if parameter is not None:
             parameters[entry.key] = parameter
     if not parameters:
@@ -75,6 +88,7 @@ def build_profile(
     for key in _NEEDED:
         if key not in parameters:
             report.noted(description.file, f"{key} is missing: this may not be a CiA 402 drive")
+    _note_further_axes(description, report)
     link = _link(description, parameters)
     profile = Profile(
         drive=drive or slug(description.model),
@@ -91,7 +105,7 @@ def build_profile(
             notes="The revision is the file's; the drive may have another.",
         ),
         links=(link,),
-        units=_units(base, parameters),
+        units=units.spec(base.units, frozenset(parameters)),
         supported_modes=_modes(parameters),
         parameters=tuple(parameters.values()),
         faults=base.faults,
@@ -108,7 +122,27 @@ def build_profile(
         pdo=_pdo_spec(description, parameters, report),
         chapters={description.file: "imported; not checked against a manual"},
     )
-    return ImportedProfile(profile, report)
+    return ImportedProfile(classified(profile), report)
+
+
+def _note_further_axes(description: Description, report: ImportReport) -> None:
+    """Axes behind the first, whose objects lie 800h behind each other (CiA 402-1)."""
+    indexes = {entry.index for entry in description.entries}
+    further = [n for n in range(1, 8) if 0x6040 + _AXIS_STEP * n in indexes]
+    if further:
+        report.noted(
+            description.file,
+            f"the device has {len(further) + 1} axes; the first one can be moved, the objects of "
+            "the others are listed",
+        )
+
+
+def _standard(base: Profile, entry: DescribedEntry) -> Parameter | None:
+    """The standard's object of this key; of a further axis that of the first one."""
+    if entry.index in _AXES:
+        first = _AXES.start + (entry.index - _AXES.start) % _AXIS_STEP
+        return base.by_key.get(f"{first:04X}:{entry.subindex:02X}")
+    return base.by_key.get(entry.key)
 
 
 def slug(name: str) -> str:
@@ -118,9 +152,10 @@ def slug(name: str) -> str:
 
 
 def _parameter(
-    entry: DescribedEntry, standard: Parameter | None, report: ImportReport
+    entry: DescribedEntry, standard: Parameter | None, units: FileUnits, report: ImportReport
 ) -> Parameter | None:
     data_type = entry.type
+    access, pdo = _rights(entry, standard, report)
     also: tuple[str, ...] = ()
     if data_type is None and standard is not None:
         report.repaired(entry.source, f"{entry.key} has no type, taken from CiA 402")
@@ -129,7 +164,13 @@ def _parameter(
         report.left_out(entry.source, f"{entry.key} {entry.name!r} has no known type")
         return None
     if standard is not None and data_type != standard.type:
-        if _SAME_WIDTH.get(data_type) == standard.type:
+        if _SAME_WIDTH.get(data_type) == standard.type and _uses_sign(entry):
+            report.noted(
+                entry.source,
+                f"{entry.key} is {data_type} with negative values, CiA 402 says {standard.type}: "
+                "the file counts",
+            )
+        elif _SAME_WIDTH.get(data_type) == standard.type:
             # A speed of -1 must not appear as 4294967295.
             report.repaired(
                 entry.source,
@@ -140,18 +181,20 @@ def _parameter(
         else:
             report.noted(entry.source, f"{entry.key} is {data_type}, CiA 402 says {standard.type}")
     low, high, default = _limits(entry, data_type, report)
+    unit, scale = units.of(entry.key, entry.unit, standard.unit if standard else "")
     return Parameter(
         key=entry.key,
         name=entry.name,
         group=entry.group or (standard.group if standard else _group(entry.index)),
         type=data_type,
-        access=entry.access,
-        pdo=entry.pdo,
-        unit=entry.unit or (standard.unit if standard else ""),
+        access=access,
+        pdo=pdo,
+        unit=unit,
+        scale=scale,
         min_raw=low,
         max_raw=high,
         default_raw=default,
-        enum=entry.enum or (dict(standard.enum) if standard else {}),
+        enum=entry.enum or (_within(standard.enum, data_type, low, high) if standard else {}),
         bits=dict(standard.bits) if standard else {},
         settable=standard.settable if standard else "any",
         motor_individual=standard.motor_individual if standard else False,
@@ -159,6 +202,41 @@ def _parameter(
         source=entry.source or entry.key,
         also_printed=also,
     )
+
+
+def _rights(
+    entry: DescribedEntry, standard: Parameter | None, report: ImportReport
+) -> tuple[Access, PdoMapping]:
+    """Access and mapping. Files mark read-only objects as outputs, and outputs as read-only.
+
+    What the standard only lets read (603Fh, 6041h) stays so; what it lets write and the file
+    maps as an output is writable. Of a maker's object the file's own words count.
+    """
+    if entry.access != "ro" or entry.pdo not in ("rx", "rxtx") or standard is None:
+        return entry.access, entry.pdo
+    if standard.access == "ro":
+        report.repaired(entry.source, f"{entry.key} is read-only and cannot be an output")
+        return "ro", "tx" if entry.pdo == "rxtx" or standard.pdo == "tx" else "none"
+    report.repaired(entry.source, f"{entry.key} can be an output but is marked read-only")
+    return "rw", entry.pdo
+
+
+def _uses_sign(entry: DescribedEntry) -> bool:
+    """Whether the file itself gives the object a negative value."""
+    values = (entry.default_raw, entry.min_raw)
+    return any(isinstance(value, (int, float)) and value < 0 for value in values)
+
+
+def _within(
+    enum: dict[int, str], data_type: DataType, low: float | None, high: float | None
+) -> dict[int, str]:
+    """Values of the standard's list that this drive's own limits allow."""
+    bounds = INTEGER_RANGE.get(data_type)
+    if bounds is None:
+        return {}
+    low = bounds[0] if low is None else low
+    high = bounds[1] if high is None else high
+    return {value: text for value, text in enum.items() if low <= value <= high}
 
 
 def _limits(
@@ -203,31 +281,6 @@ def _group(index: int) -> str:
     return "Other objects"
 
 
-def _units(base: Profile, parameters: dict[str, Parameter]) -> UnitSpec:
-    """Units as the file gives them on the motion objects, else the standard's."""
-    units = base.units
-
-    def unit_of(key: str, otherwise: str) -> str:
-        parameter = parameters.get(key)
-        return parameter.unit if parameter is not None and parameter.unit else otherwise
-
-    def present(key: str | None) -> str | None:
-        return key if key in parameters else None
-
-    return units.model_copy(
-        update={
-            "position": unit_of("607A:00", units.position),
-            "velocity": unit_of("60FF:00", units.velocity),
-            "acceleration": unit_of("6083:00", units.acceleration),
-            "torque": unit_of("6071:00", units.torque),
-            "gear_numerator": present(units.gear_numerator),
-            "gear_denominator": present(units.gear_denominator),
-            "feed": present(units.feed),
-            "feed_revolutions": present(units.feed_revolutions),
-        }
-    )
-
-
 def _modes(parameters: dict[str, Parameter]) -> tuple[int, ...]:
     """Modes that the drive's 6502h default names, else those whose objects it has."""
     bits = {1: 0, 3: 2, 4: 3, 6: 5, 7: 6, 8: 7, 9: 8, 10: 9}
@@ -247,7 +300,12 @@ def _link(description: Description, parameters: dict[str, Parameter]) -> LinkSpe
             help="the drive's heartbeat consumer" if has_consumer else "the file names none",
             source=description.file,
         )
-        return LinkSpec(kind="canopen", watchdog=watchdog, source=description.file)
+        return LinkSpec(
+            kind="canopen",
+            watchdog=watchdog,
+            baudrates=description.baudrates,
+            source=description.file,
+        )
     watchdog = Watchdog(
         present=True,
         help="the process data watchdog of the EtherCAT slave controller",
@@ -270,26 +328,43 @@ def _pdo_spec(
         entries = tuple(key for key in pdo.entries if key in parameters)
         if len(entries) < len(pdo.entries):
             report.left_out(pdo.source, f"PDO {pdo.index:04X}h names objects without a type")
-        if entries and pdo.index not in {s.index for s in sets}:
+        if (entries or not pdo.fixed) and pdo.index not in {s.index for s in sets}:
             sets.append(
                 PdoSet(
                     index=pdo.index,
                     direction=pdo.direction,
                     entries=entries,
                     fixed=pdo.fixed,
+                    layout=tuple(
+                        PdoPart(key=key if key in parameters else None, bits=bits)
+                        for key, bits in pdo.layout
+                    ),
+                    sync_manager=pdo.sync_manager,
+                    mandatory=pdo.mandatory,
+                    exclude=pdo.exclude,
                     source=pdo.source,
                 )
             )
-    receive = [s.index for s in sets if s.direction == "rx"]
-    transmit = [s.index for s in sets if s.direction == "tx"]
-    if not receive or not transmit:
+    default_rx, default_tx = _default(sets, "rx"), _default(sets, "tx")
+    if default_rx is None or default_tx is None:
         return None
     return PdoSpec(
         sets=tuple(sets),
-        default_rx=receive[0],
-        default_tx=transmit[0],
-        max_entries=max(8, *(len(s.entries) for s in sets)),
+        default_rx=default_rx,
+        default_tx=default_tx,
+        max_entries=max(8, *(len(s.layout or s.entries) for s in sets)),
         max_bytes=8 if description.link == "canopen" else None,
         remappable=not all(s.fixed for s in sets),
         source=description.file,
     )
+
+
+def _default(sets: list[PdoSet], direction: Literal["rx", "tx"]) -> int | None:
+    """The PDO that a sync manager carries as delivered, else the first with contents."""
+    own = [s for s in sets if s.direction == direction]
+    assigned = [s for s in own if s.sync_manager is not None]
+    filled = [s for s in own if s.entries]
+    for group in ([s for s in assigned if s.entries], filled, assigned, own):
+        if group:
+            return group[0].index
+    return None

@@ -45,6 +45,11 @@ class DescribedPdo:
     entries: tuple[str, ...]
     fixed: bool
     source: str
+    layout: tuple[tuple[str | None, int], ...] = ()
+    """Key (None: padding) and bits of every stretch; empty where entries are whole objects."""
+    sync_manager: int | None = None
+    mandatory: bool = False
+    exclude: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,3 +67,5 @@ class Description:
     pdos: tuple[DescribedPdo, ...] = ()
     complete_access: bool = False
     foe: bool = False
+    baudrates: tuple[int, ...] = ()
+    """Bit rates of a CANopen drive in bit/s."""

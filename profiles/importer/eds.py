@@ -48,7 +48,8 @@ class _Section:
     values: dict[str, str] = field(default_factory=dict)
 
     def get(self, *names: str) -> str:
-        return next((self.values[n] for n in names if n in self.values), "")
+        """The first of these values that is not empty: editors write keys without values."""
+        return next((self.values[n] for n in names if self.values.get(n)), "")
 
 
 def read_eds(data: bytes, name: str, report: ImportReport) -> Description:
@@ -72,11 +73,15 @@ def read_eds(data: bytes, name: str, report: ImportReport) -> Description:
         link="canopen",
         maker=tidy(device.get("vendorname")) or "unknown maker",
         model=tidy(device.get("productname")) or tidy(name.rsplit(".", 1)[0]),
-        vendor_id=_identity(device, "vendornumber", name, report),
-        product_code=_identity(device, "productnumber", name, report),
-        revision=_identity(device, "revisionnumber", name, report),
+        vendor_id=_identity(device, "vendornumber", name, report)
+        or _own_identity(entries, "1018:01"),
+        product_code=_identity(device, "productnumber", name, report)
+        or _own_identity(entries, "1018:02"),
+        revision=_identity(device, "revisionnumber", name, report)
+        or _own_identity(entries, "1018:03"),
         entries=tuple(entries),
         pdos=tuple(_pdos(entries, name, report)),
+        baudrates=_bit_rates(device),
     )
 
 
@@ -113,10 +118,33 @@ def device_identity(text: str, name: str, report: ImportReport) -> tuple[int | N
 
 def _identity(device: _Section, key: str, name: str, report: ImportReport) -> int | None:
     number = parse_number(device.get(key), f"{name}: {key}", report)
-    if number is None or number != int(number) or not 0 <= number < 2**32:
+    return None if number is None else _real_identity(number)
+
+
+#: What templates leave in these fields; vendor 0 does not exist.
+_PLACEHOLDERS = (0, 0xFFFFFFFF)
+
+
+def _real_identity(number: int | float) -> int | None:
+    if number != int(number) or not 0 <= number < 2**32 or number in _PLACEHOLDERS:
         return None
-    # Templates leave 0 in these fields, and vendor 0 does not exist.
-    return int(number) or None
+    return int(number)
+
+
+def _own_identity(entries: list[DescribedEntry], key: str) -> int | None:
+    """A number of the identity object 1018h by its default, None where it has none."""
+    value = next((e.default_raw for e in entries if e.key == key), None)
+    return _real_identity(value) if isinstance(value, int) else None
+
+
+#: Keys of [DeviceInfo] and the bit rate in bit/s that each stands for (CiA 306-1 clause 4.5.2).
+_BIT_RATES = {f"baudrate_{kbit}": kbit * 1000 for kbit in (10, 20, 50, 125, 250, 500, 800, 1000)}
+
+
+def _bit_rates(device: _Section) -> tuple[int, ...]:
+    return tuple(
+        rate for key, rate in _BIT_RATES.items() if device.get(key) in ("1", "0x1", "0x01")
+    )
 
 
 def _sections(text: str, name: str, report: ImportReport) -> dict[str, _Section]:
@@ -155,6 +183,7 @@ class _Entries:
         self._sections = sections
         self._name = name
         self._report = report
+        self._configured = 0
         self._objects: dict[int, _Section] = {}
         self._members: dict[int, dict[int, _Section]] = {}
         self._compact: dict[tuple[int, str], _Section] = {}
@@ -192,6 +221,12 @@ class _Entries:
                 break
             entries += self._object(index)
         self._compare_with_lists({e.index for e in entries})
+        if self._configured:
+            self._report.noted(
+                self._name,
+                f"{self._configured} values configured for one machine are not taken as defaults; "
+                "load the file as a parameter set for them",
+            )
         return entries
 
     def _object(self, index: int) -> list[DescribedEntry]:
@@ -218,10 +253,15 @@ class _Entries:
         return [
             entry
             for subindex, member in sorted(members.items())
-            # Subindex 0 only counts the others (CiA 301 clause 7.4.4).
-            if subindex > 0 or len(members) == 1
+            # Subindex 0 only counts the others (CiA 301 clause 7.4.4), as a byte. One of another
+            # type is a value of its own: some makers put 603Fh:00 beside further subindices.
+            if subindex > 0 or len(members) == 1 or self._is_value(member, parent)
             for entry in self._entry(index, subindex, member, parent, title)
         ]
+
+    def _is_value(self, member: _Section, parent: _Section) -> bool:
+        kind = self._type(member, parent, self._name)
+        return kind is not None and kind not in ("UINT8", "INT8", "BOOL")
 
     def _compact_object(self, index: int, parent: _Section, count: int) -> list[DescribedEntry]:
         names = self._compact.get((index, "name"), _Section(0))
@@ -253,8 +293,10 @@ class _Entries:
         remark = ""
         low = high = None
         if data_type is not None:
-            text = section.get("parametervalue", "defaultvalue")
-            default, remark = default_value(text, data_type, place, self._report)
+            default, remark = default_value(
+                section.get("defaultvalue"), data_type, place, self._report
+            )
+            self._configured += bool(section.get("parametervalue"))
             low = self._limit(section, "lowlimit", data_type, place)
             high = self._limit(section, "highlimit", data_type, place)
         entry = DescribedEntry(
@@ -362,8 +404,8 @@ def _pdos(entries: list[DescribedEntry], name: str, report: ImportReport) -> lis
                 mapped.append(key)
             elif value >> 16 & 0xFFFF >= 0x20:  # below are dummies that only fill space
                 report.left_out(f"{name} [{index:04X}]", f"{key} is mapped but not described")
-        if mapped:
+        fixed = all(e.access == "ro" for e in mapping)
+        if mapped or not fixed:
             direction: Literal["rx", "tx"] = "rx" if index < 0x1A00 else "tx"
-            fixed = all(e.access == "ro" for e in mapping)
             pdos.append(DescribedPdo(index, direction, tuple(mapped), fixed, name))
     return pdos

@@ -6,8 +6,8 @@ files come from anywhere.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+import re
+from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element, ParseError
 
 from defusedxml.common import DefusedXmlException
@@ -19,23 +19,33 @@ from profiles.importer.description import (
     DescribedPdo,
     Description,
 )
+from profiles.importer.esi_pdo import PdoReader
 from profiles.importer.esi_types import EsiTypes, Member
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.importer.texts import check_size, decode_xml
 from profiles.importer.values import (
     fit,
-    named_type,
     parse_access,
     parse_number,
     tidy,
     unit_of_code,
     unit_of_name,
+    whole_number,
 )
-from profiles.importer.xml_tree import child, children, strip_namespaces, text_of
+from profiles.importer.xml_tree import (
+    attribute_of,
+    child,
+    children,
+    flag_of,
+    name_of,
+    strip_namespaces,
+    text_of,
+)
 from profiles.schema import Access, DataType, PdoMapping, Raw
 
 MAX_BYTES = 32 * 2**20
-_ENGLISH = "1033"
+#: Names that only count: "SubIndex 003", "Element 3".
+_NUMBERED = re.compile(r"(?:sub\s*index|element|entry|item)?\s*\d+", re.I)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,29 +57,33 @@ class EsiDevice:
     vendor_id: int | None
     product_code: int | None
     revision: int | None
+    has_control_word: bool = False
+    """Whether it describes 6040h: a bootloader in the same file does not."""
 
 
 @dataclass(slots=True)
-class _File:
+class EsiFile:
+    """An ESI file that has been parsed."""
+
     name: str
     report: ImportReport
     root: Element
     devices: list[Element]
 
 
-def esi_devices(data: bytes, name: str, report: ImportReport) -> tuple[EsiDevice, ...]:
-    """The devices of a file. Raises ImportFailed where it is no ESI file."""
-    file = _open(data, name, report)
-    return tuple(_choice(file, n) for n in range(len(file.devices)))
+def esi_devices(file: EsiFile) -> tuple[EsiDevice, ...]:
+    """The devices of a file, in its order."""
+    quiet = replace(file, report=ImportReport())
+    return tuple(_choice(quiet, n) for n in range(len(file.devices)))
 
 
-def read_esi(data: bytes, name: str, report: ImportReport, device: int = 0) -> Description:
+def read_device(file: EsiFile, device: int = 0) -> Description:
     """Read one device of an ESI file.
 
     Raises:
-        ImportFailed: not XML, not ESI, forbidden constructs, no such device, or nothing in it.
+        ImportFailed: no such device, or nothing in it.
     """
-    file = _open(data, name, report)
+    name = file.name
     if not 0 <= device < len(file.devices):
         raise ImportFailed(f"{name} has {len(file.devices)} devices, there is no number {device}")
     element = file.devices[device]
@@ -84,19 +98,24 @@ def read_esi(data: bytes, name: str, report: ImportReport, device: int = 0) -> D
     return Description(
         file=name,
         link="ethercat",
-        maker=_name(vendor) or "unknown maker",
+        maker=name_of(vendor) or "unknown maker",
         model=choice.name,
         vendor_id=choice.vendor_id,
         product_code=choice.product_code,
         revision=choice.revision,
         entries=tuple(entries),
         pdos=tuple(pdos),
-        complete_access=_flag(mailbox, "CompleteAccess"),
+        complete_access=flag_of(mailbox, "CompleteAccess"),
         foe=child(child(element, "Mailbox"), "FoE") is not None,
     )
 
 
-def _open(data: bytes, name: str, report: ImportReport) -> _File:
+def open_esi(data: bytes, name: str, report: ImportReport) -> EsiFile:
+    """Parse an ESI file.
+
+    Raises:
+        ImportFailed: not XML, not ESI, too large, or with forbidden constructs.
+    """
     check_size(data, MAX_BYTES, name)
     try:
         root: Element = fromstring(decode_xml(data, name, report), forbid_dtd=True)
@@ -119,25 +138,41 @@ def _open(data: bytes, name: str, report: ImportReport) -> _File:
     devices = children(child(child(root, "Descriptions"), "Devices"), "Device")
     if not devices:
         raise ImportFailed(f"{name} describes no device")
-    return _File(name, report, root, devices)
+    return EsiFile(name, report, root, devices)
 
 
-def _choice(file: _File, number: int) -> EsiDevice:
+def _choice(file: EsiFile, number: int) -> EsiDevice:
     element = file.devices[number]
     kind = child(element, "Type")
     place = f"{file.name}: device {number}"
     vendor = child(file.root, "Vendor")
-    name = _name(element) or text_of(kind)
+    name = name_of(element) or text_of(kind)
     return EsiDevice(
         number=number,
         name=tidy(name) or f"device {number}",
-        vendor_id=_whole(text_of(child(vendor, "Id")), place, file.report),
-        product_code=_whole(_attribute(kind, "ProductCode"), place, file.report),
-        revision=_whole(_attribute(kind, "RevisionNo"), place, file.report),
+        vendor_id=whole_number(text_of(child(vendor, "Id")), place, file.report),
+        product_code=whole_number(attribute_of(kind, "ProductCode"), place, file.report),
+        revision=whole_number(attribute_of(kind, "RevisionNo"), place, file.report),
+        has_control_word=_has_control_word(element),
     )
 
 
-def _contents(file: _File, element: Element) -> tuple[list[DescribedEntry], list[DescribedPdo]]:
+def _has_control_word(element: Element) -> bool:
+    """Whether the device describes 6040h, in its dictionary or in a PDO."""
+    objects = [
+        item
+        for dictionary in _dictionaries(element)
+        for item in children(child(dictionary, "Objects"), "Object")
+    ]
+    entries = [entry for pdo in children(element, "RxPdo") for entry in children(pdo, "Entry")]
+    return any(
+        text_of(child(item, "Index")).lower().lstrip("#0x").lstrip("0") == "6040"
+        or text_of(child(item, "Index")).strip() == str(0x6040)
+        for item in (*entries, *objects)
+    )
+
+
+def _contents(file: EsiFile, element: Element) -> tuple[list[DescribedEntry], list[DescribedPdo]]:
     """Dictionary and PDOs of a device, or of its first module where the device has none."""
     owner, dictionaries = element, _dictionaries(element)
     if not dictionaries:
@@ -147,7 +182,7 @@ def _contents(file: _File, element: Element) -> tuple[list[DescribedEntry], list
             owner = with_dictionary[0]
             dictionaries = _dictionaries(owner)
             file.report.noted(
-                file.name, f"a device of modules: the objects are those of {_name(owner)!r}"
+                file.name, f"a device of modules: the objects are those of {name_of(owner)!r}"
             )
     entries: list[DescribedEntry] = []
     seen: set[str] = set()
@@ -161,10 +196,12 @@ def _contents(file: _File, element: Element) -> tuple[list[DescribedEntry], list
     if not dictionaries:
         file.report.noted(file.name, "there is no object dictionary: only what the PDOs name")
     pdos = []
+    reader = PdoReader(file.name, file.report, entries, seen)
     for source in {id(e): e for e in (element, owner)}.values():
-        for tag, direction in (("RxPdo", "rx"), ("TxPdo", "tx")):
-            for pdo in children(source, tag):
-                pdos += _pdo(file, pdo, "rx" if direction == "rx" else "tx", entries, seen)
+        for pdo in children(source, "RxPdo"):
+            pdos += reader.read(pdo, "rx")
+        for pdo in children(source, "TxPdo"):
+            pdos += reader.read(pdo, "tx")
     return entries, pdos
 
 
@@ -180,31 +217,43 @@ def _dictionaries(element: Element) -> list[Element]:
 class _Dictionary:
     """Objects of one ``Dictionary`` element."""
 
-    def __init__(self, file: _File, dictionary: Element) -> None:
+    def __init__(self, file: EsiFile, dictionary: Element) -> None:
         self._file = file
         self._report = file.report
         self._types = EsiTypes(child(dictionary, "DataTypes"), file.name, file.report)
         self._objects = children(child(dictionary, "Objects"), "Object")
+        self._preop_only: list[str] = []
 
     def entries(self) -> list[DescribedEntry]:
-        return [entry for element in self._objects for entry in self._object(element)]
+        found = [entry for element in self._objects for entry in self._object(element)]
+        writable = sum(entry.access != "ro" for entry in found)
+        # Where nearly every object is so, the remark says nothing about any of them.
+        if self._preop_only and 2 * len(self._preop_only) < writable:
+            first = ", ".join(self._preop_only[:5])
+            more = len(self._preop_only) - 5
+            self._report.noted(
+                self._file.name,
+                f"may be written in PreOP or SafeOP only: {first}"
+                + (f" and {more} more" if more > 0 else ""),
+            )
+        return found
 
     def _object(self, element: Element) -> list[DescribedEntry]:
         index_text = text_of(child(element, "Index"))
         place = f"{self._file.name}: object {index_text[:12]}"
-        index = _whole(index_text, place, self._report)
+        index = whole_number(index_text, place, self._report)
         if index is None or not 0x1000 <= index <= 0xFFFF:
             if index is None:
                 self._report.left_out(place, "an object without a usable index")
             return []
         place = f"{self._file.name}: {index:04X}h"
-        title = tidy(_name(element)) or f"Object {index:04X}h"
+        title = tidy(name_of(element)) or f"Object {index:04X}h"
         type_name = text_of(child(element, "Type"))
         members = self._types.members(type_name)
         info = child(element, "Info")
         infos = children(info, "SubItem")
         if not members and not infos:
-            bits = _whole(text_of(child(element, "BitSize")), place, self._report)
+            bits = whole_number(text_of(child(element, "BitSize")), place, self._report)
             member = Member(0, title, type_name, bits, child(element, "Flags"))
             return [self._entry(index, member, "", info, element, place)]
         if not members:
@@ -212,12 +261,17 @@ class _Dictionary:
                 place, f"its data type {type_name[:30]!r} is not described, taken from the values"
             )
             members = [
-                Member(n, tidy(_name(item)), "", None, child(element, "Flags"))
+                Member(n, tidy(name_of(item)), "", None, child(element, "Flags"))
                 for n, item in enumerate(infos)
             ]
+        names = {member.name for member in members if member.name}
+        by_name = any(name_of(info) in names for info in infos)
+        # Files that give no values for subindex 0 begin their list with subindex 1.
+        skipped = not by_name and members[0].subindex == 0 and len(infos) == len(members) - 1
         return [
-            self._entry(index, member, title, _info_of(infos, position, member), element, place)
+            self._entry(index, named, title, info, element, place)
             for position, member in enumerate(members)
+            for named, info in (_info_of(infos, position - skipped, member, names),)
             # Subindex 0 only counts the others (CiA 301 clause 7.4.4).
             if member.subindex > 0 or len(members) == 1
         ]
@@ -234,7 +288,9 @@ class _Dictionary:
         place = f"{place}:{member.subindex:02X}"
         data_type = self._types.base(member.type, member.bits)
         flags = member.flags if member.flags is not None else child(element, "Flags")
-        access, pdo = _rights(flags, child(element, "Flags"), place, self._report)
+        access, pdo, preop_only = _rights(flags, child(element, "Flags"), place, self._report)
+        if preop_only and access != "ro":
+            self._preop_only.append(f"{index:04X}:{member.subindex:02X}")
         plain, unit = unit_of_name(tidy(member.name))
         name = f"{title}: {plain}" if title and plain and plain != title else plain or title
         default: Raw | None = None
@@ -306,26 +362,39 @@ def _hex_data(text: str, place: str, report: ImportReport) -> int | None:
         return None
 
 
-def _info_of(infos: list[Element], position: int, member: Member) -> Element | None:
-    """Values of a member: by name where the names are unique, else by place."""
-    named = [i for i in infos if member.name and _name(i) == member.name]
-    if len(named) == 1:
-        return child(named[0], "Info")
-    return child(infos[position], "Info") if position < len(infos) else None
+def _info_of(
+    infos: list[Element], position: int, member: Member, names: set[str]
+) -> tuple[Member, Element | None]:
+    """A member with its values: by name where the names are unique, else by place.
+
+    What stands at its place under the name of another member (``names``) is that one's.
+    An element of an array has only its number for a name, and the object may name it.
+    """
+    named = [i for i in infos if member.name and name_of(i) == member.name]
+    found = named[0] if len(named) == 1 else None
+    if found is None and 0 <= position < len(infos):
+        own = tidy(name_of(infos[position]))
+        if own != member.name and own in names:
+            return member, None
+        found = infos[position]
+        if member.name.isdecimal() and own and not _NUMBERED.fullmatch(own):
+            member = replace(member, name=own)
+    return member, child(found, "Info")
 
 
 def _rights(
     flags: Element | None, fallback: Element | None, place: str, report: ImportReport
-) -> tuple[Access, PdoMapping]:
+) -> tuple[Access, PdoMapping, bool]:
+    """Access, mapping, and whether it may be written in PreOP or SafeOP only."""
+    preop_only = False
     access_element = child(flags, "Access")
     if access_element is None:
         access_element = child(fallback, "Access")
     access: Access = "ro"
     if access_element is not None:
-        writes = _attribute(access_element, "WriteRestrictions")
+        writes = attribute_of(access_element, "WriteRestrictions")
         access = parse_access(text_of(access_element) or "ro", place, report)
-        if writes.lower() in ("preop", "preop_safeop"):
-            report.noted(place, f"may be written in {writes} only")
+        preop_only = writes.lower() in ("preop", "preop_safeop")
     mapping = (
         text_of(child(flags, "PdoMapping")) or text_of(child(fallback, "PdoMapping"))
     ).upper()
@@ -336,50 +405,7 @@ def _rights(
         pdo = "rx"
     elif "T" in mapping:
         pdo = "tx"
-    if pdo in ("rx", "rxtx") and access == "ro":
-        report.repaired(place, "it can be in the drive's inputs but is marked read-only")
-        access = "rw"
-    return access, pdo
-
-
-def _pdo(
-    file: _File,
-    pdo: Element,
-    direction: Literal["rx", "tx"],
-    entries: list[DescribedEntry],
-    seen: set[str],
-) -> list[DescribedPdo]:
-    place = f"{file.name}: {pdo.tag}"
-    index = _whole(text_of(child(pdo, "Index")), place, file.report)
-    if index is None:
-        file.report.left_out(place, "a PDO without an index")
-        return []
-    keys: list[str] = []
-    for item in children(pdo, "Entry"):
-        where = f"{place} {index:04X}h"
-        object_index = _whole(text_of(child(item, "Index")), where, file.report)
-        if not object_index:
-            continue  # index 0 only fills space (ETG.2000 clause 6.10)
-        subindex = _whole(text_of(child(item, "SubIndex")), where, file.report) or 0
-        if not 0x1000 <= object_index <= 0xFFFF or not 0 <= subindex <= 255:
-            file.report.left_out(where, f"entry {object_index:#x}:{subindex}")
-            continue
-        key = f"{object_index:04X}:{subindex:02X}"
-        if key not in seen and len(entries) < MAX_ENTRIES:
-            bits = _whole(text_of(child(item, "BitLen")), where, file.report)
-            kind = named_type(text_of(child(item, "DataType")), bits) or named_type("", bits)
-            if kind is None:
-                file.report.left_out(where, f"{key} has no known type")
-                continue
-            name = tidy(_name(item)) or f"Object {key}"
-            access: Access = "rw" if direction == "rx" else "ro"
-            entries.append(
-                DescribedEntry(object_index, subindex, name, kind, access, direction, source=where)
-            )
-            seen.add(key)
-        keys.append(key)
-    fixed = _attribute(pdo, "Fixed").strip().lower() in ("1", "true")
-    return [DescribedPdo(index, direction, tuple(keys), fixed, file.name)] if keys else []
+    return access, pdo, preop_only
 
 
 def _unit(info: Element | None, element: Element) -> str:
@@ -388,28 +414,3 @@ def _unit(info: Element | None, element: Element) -> str:
         if text:
             return unit_of_code(text) or tidy(text, 20)
     return ""
-
-
-def _name(element: Element | None) -> str:
-    """The English name where there are several, else the first."""
-    names = children(element, "Name")
-    for name in names:
-        if (name.get("LcId") or _ENGLISH).strip() in (_ENGLISH, "9"):
-            return text_of(name)
-    return text_of(names[0]) if names else ""
-
-
-def _attribute(element: Element | None, name: str) -> str:
-    if element is None:
-        return ""
-    lowered = {key.lower(): value for key, value in element.attrib.items()}
-    return lowered.get(name.lower(), "")
-
-
-def _flag(element: Element | None, name: str) -> bool:
-    return _attribute(element, name).strip().lower() in ("1", "true")
-
-
-def _whole(text: str, place: str, report: ImportReport) -> int | None:
-    number = parse_number(text, place, report)
-    return None if number is None or number != int(number) or number < 0 else int(number)

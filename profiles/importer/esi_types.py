@@ -63,9 +63,13 @@ class EsiTypes:
         array = self._array(type_name)
         if array is not None:
             first, count, base = array
+            if first + count - 1 > _LONGEST_ARRAY:
+                self._report.left_out(
+                    place, f"{count} elements from {first} on: subindices end at {_LONGEST_ARRAY}"
+                )
             return [
                 Member(first + n, f"{first + n}", base, None, flags)
-                for n in range(min(count, _LONGEST_ARRAY))
+                for n in range(min(count, _LONGEST_ARRAY - first + 1))
             ]
         given = parse_number(text_of(child(item, "SubIdx")), place, self._report)
         bits = parse_number(text_of(child(item, "BitSize")), place, self._report)

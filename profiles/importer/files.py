@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import yaml
 
 from profiles.importer.build import ImportedProfile, build_profile
 from profiles.importer.eds import read_eds
-from profiles.importer.esi import esi_devices, read_esi
+from profiles.importer.esi import EsiDevice, EsiFile, esi_devices, open_esi, read_device
 from profiles.importer.report import ImportFailed, ImportReport
+from profiles.loader import CLASS_FIELDS
 from profiles.schema import Profile
+
+#: libyaml's writer where PyYAML was built with it; ten times as fast.
+_SafeDumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
 def import_file(
@@ -25,7 +30,8 @@ def import_file(
     """A profile from an ESI, EDS or DCF file, told apart by their contents.
 
     Of an ESI file with several devices the one with ``product_code`` (and ``revision``) is
-    taken; without them the first, and the report says which others there are.
+    taken; without them the newest revision of the first product that has 6040h. The result says
+    which others there are.
 
     Raises:
         ImportFailed: not such a file, or nothing usable in it.
@@ -33,11 +39,11 @@ def import_file(
     report = ImportReport()
     _refuse_what_is_known(data, name)
     if is_xml(data):
-        number = _choose(data, name, report, product_code, revision)
-        description = read_esi(data, name, report, number)
-    else:
-        description = read_eds(data, name, report)
-    return build_profile(description, report, drive=drive)
+        file = open_esi(data, name, report)
+        chosen, others = _choose(file, report, product_code, revision)
+        imported = build_profile(read_device(file, chosen.number), report, drive=drive)
+        return replace(imported, others=others)
+    return build_profile(read_eds(data, name, report), report, drive=drive)
 
 
 #: How files begin that are handed in for a description, and what they are.
@@ -68,25 +74,44 @@ def is_xml(data: bytes) -> bool:
 
 
 def _choose(
-    data: bytes, name: str, report: ImportReport, product_code: int | None, revision: int | None
-) -> int:
-    devices = esi_devices(data, name, ImportReport())
-    matching = [
-        d
-        for d in devices
-        if product_code in (None, d.product_code) and revision in (None, d.revision)
-    ]
+    file: EsiFile, report: ImportReport, product_code: int | None, revision: int | None
+) -> tuple[EsiDevice, tuple[EsiDevice, ...]]:
+    """The device to be read, and the others of the file.
+
+    Raises:
+        ImportFailed: none has this product code.
+    """
+    devices = esi_devices(file)
+    of_product = [d for d in devices if product_code in (None, d.product_code)]
+    if not of_product:
+        known = ", ".join(_named(d) for d in devices[:10])
+        raise ImportFailed(f"{file.name} has no product {product_code or 0:#x}; it has {known}")
+    matching = [d for d in of_product if revision in (None, d.revision)]
+    if not matching and product_code is None:
+        known = ", ".join(_named(d) for d in devices[:10])
+        raise ImportFailed(f"{file.name} has no revision {revision or 0:#x}; it has {known}")
+    # The newest revision of the right product is nearer than any other product.
+    chosen = _newest(matching or of_product)
+    others = tuple(d for d in devices if d.number != chosen.number)
     if not matching:
-        # The newest revision of the right product is nearer than any other product.
-        matching = [d for d in devices if d.product_code == product_code][-1:]
-        if not matching:
-            known = ", ".join(f"{d.product_code or 0:#x} {d.name}" for d in devices[:10])
-            raise ImportFailed(f"{name} has no product {product_code or 0:#x}; it has {known}")
-        report.noted(name, f"revision {revision or 0:#x} is not in it, {matching[0].name} is used")
-    if len(matching) > 1:
-        others = ", ".join(d.name for d in matching[1:6])
-        report.noted(name, f"{matching[0].name} is used; there are also {others}")
-    return matching[0].number
+        report.noted(
+            file.name, f"revision {revision or 0:#x} is not in it, {_named(chosen)} is used"
+        )
+    elif len(matching) > 1:
+        offered = ", ".join(_named(d) for d in matching if d.number != chosen.number)
+        report.noted(file.name, f"{_named(chosen)} is used; there are also {offered[:400]}")
+    return chosen, others
+
+
+def _newest(devices: list[EsiDevice]) -> EsiDevice:
+    """The newest revision of the first product that has a control word, else of the first one."""
+    drives = [d for d in devices if d.has_control_word] or devices
+    same = [d for d in drives if d.product_code == drives[0].product_code]
+    return max(same, key=lambda d: -1 if d.revision is None else d.revision)
+
+
+def _named(device: EsiDevice) -> str:
+    return f"{device.name} ({device.product_code or 0:#x} revision {device.revision or 0:#x})"
 
 
 def write_profile(imported: Profile, folder: Path) -> Path:
@@ -115,5 +140,7 @@ def write_profile(imported: Profile, folder: Path) -> Path:
 
 def profile_yaml(profile: Profile) -> str:
     """The profile as YAML with one parameter per line group, defaults left out."""
-    data = profile.model_dump(mode="json", exclude_defaults=True)
-    return yaml.safe_dump(data, allow_unicode=True, sort_keys=False, width=100)
+    data = profile.model_dump(
+        mode="json", exclude_defaults=True, exclude={"parameters": {"__all__": set(CLASS_FIELDS)}}
+    )
+    return str(yaml.dump(data, Dumper=_SafeDumper, allow_unicode=True, sort_keys=False, width=100))

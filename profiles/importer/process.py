@@ -15,7 +15,7 @@ from pathlib import Path
 
 from profiles.importer.build import ImportedProfile, build_profile
 from profiles.importer.description import Description
-from profiles.importer.esi import esi_devices
+from profiles.importer.esi import esi_devices, open_esi
 from profiles.importer.files import import_file, is_xml, write_profile
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.loader import ProfileError, drive_names, load_profile
@@ -69,7 +69,7 @@ class DevicesTask:
         """``devices``: name, product_code and revision of each; empty for an EDS file."""
         if not is_xml(self.data):
             return {"devices": []}
-        devices = esi_devices(self.data, self.file, ImportReport())
+        devices = esi_devices(open_esi(self.data, self.file, ImportReport()))
         return {
             "devices": [
                 {"name": d.name, "product_code": d.product_code, "revision": d.revision}

@@ -62,16 +62,23 @@ _UNITS = (
     "rev", "rpm/s", "r/s", "rps", "mr/s", "user unit", "units", "1/s", "0.1hz", "0.1rpm", "0.1ms",
     "0.01ms", "0.1a", "0.01a", "0.1v", "bit",
 )  # fmt: skip
-_PREFIXES = {0x00: "", 0x03: "k", 0x06: "M", 0xFE: "c", 0xFD: "m", 0xFA: "µ", 0xF7: "n"}
+#: With or without a mark: eight bare digits are a code, never a unit's name.
+_UNIT_CODE = re.compile(r"(?:#x|0x)([0-9a-fA-F]{1,8})|([0-9a-fA-F]{8})")
+_PREFIXES = {0: "", 3: "k", 6: "M", -2: "c", -3: "m", -6: "µ", -9: "n"}
+#: Units that take no prefix in use: 0.001 rev, not mrev.
+_WITHOUT_PREFIX = frozenset({"rev", "rpm", "inc", "°", "min", "h", "s²", "s³", "°C"})
 _UNIT_CODES = {
     0x00: "", 0x01: "m", 0x02: "g", 0x03: "s", 0x04: "A", 0x05: "K", 0x10: "rad", 0x20: "Hz",
     0x21: "N", 0x22: "Pa", 0x23: "J", 0x24: "W", 0x26: "V", 0x28: "Ω", 0x2C: "H", 0x2D: "°C",
-    0x41: "°", 0x47: "min", 0x48: "h", 0x56: "Nm", 0x57: "s²", 0xB4: "rev", 0xB5: "inc",
+    0x41: "°", 0x47: "min", 0x48: "h", 0x56: "Nm", 0x57: "s²", 0xA0: "s³",
+    0xB4: "rev", 0xB5: "inc",
 }  # fmt: skip
 
 _UNIT_IN_NAME = re.compile(r"[\[({（]\s*(?:unit\s*:?\s*)?([^\])}）]{1,12}?)\s*[\])}）]\s*$", re.I)
 _NODE_ID = re.compile(r"\$?\s*NODE[-_ ]?ID", re.I)
 _LONGEST_NUMBER = 40
+#: What the formats call an upper limit.
+_MAXIMA = ("maximum", "highlimit")
 _REAL32_MAX = 3.4028234e38
 
 
@@ -80,6 +87,8 @@ def parse_number(text: str, place: str, report: ImportReport) -> int | float | N
 
     Empty text is None without a finding: many files leave defaults empty.
     """
+    if text.isascii() and text.isdigit() and text[0] != "0" and len(text) <= _LONGEST_NUMBER:
+        return int(text)
     bare = text.split(";", 1)[0].strip().strip("\"'").replace("_", "").replace(" ", "")
     if not bare or bare in ("-", "0x", "0X"):
         return None
@@ -128,13 +137,20 @@ def _decimal(bare: str, text: str, place: str, report: ImportReport) -> int | fl
     return value
 
 
+def whole_number(text: str, place: str, report: ImportReport) -> int | None:
+    """A whole number that is not negative, or None."""
+    number = parse_number(text, place, report)
+    return None if number is None or number != int(number) or number < 0 else int(number)
+
+
 def fit(
     value: int | float | None, data_type: DataType, what: str, place: str, report: ImportReport
 ) -> int | float | None:
     """``value`` as a raw value of ``data_type``, or None with a finding.
 
     A positive number above a signed type's maximum that fits its width is two's complement:
-    most makers write negative limits so.
+    most makers write negative limits so. As a maximum, the number just above the type's own and
+    the greatest of the unsigned type mean "no limit", never a negative one.
     """
     if value is None or data_type in ("STRING", "OCTETS"):
         return None
@@ -150,6 +166,9 @@ def fit(
         report.repaired(place, f"{what} {value} is written with a decimal point")
     low, high = INTEGER_RANGE[data_type]
     whole = int(value)
+    if low < 0 and what in _MAXIMA and whole in (high + 1, 2 * high + 1):
+        report.repaired(place, f"{what} {whole} does not fit {data_type}, taken as {high}")
+        return high
     if whole > high and low < 0 and whole <= 2 * high + 1:
         return whole - 2 * (high + 1)
     if not low <= whole <= high:
@@ -206,19 +225,22 @@ def unit_of_name(name: str) -> tuple[str, str]:
 def unit_of_code(text: str) -> str:
     """A unit from its number of CiA 303-2 (as ETG.1004 uses it), or empty where it is none.
 
-    Bits 31-24 are the power of ten, 23-16 the numerator, 15-8 the denominator.
+    Bits 31-24 are the power of ten (signed), 23-16 the numerator, 15-8 the denominator.
     """
-    match = re.fullmatch(r"(?:#x|0x)([0-9a-fA-F]{1,8})", text.strip())
+    match = _UNIT_CODE.fullmatch(text.strip())
     if match is None:
         return ""
-    code = int(match[1], 16)
-    prefix = _PREFIXES.get(code >> 24)
+    code = int(match[1] or match[2], 16)
+    exponent = code >> 24 if code >> 24 < 0x80 else (code >> 24) - 0x100
     numerator = _UNIT_CODES.get(code >> 16 & 0xFF)
     denominator = _UNIT_CODES.get(code >> 8 & 0xFF)
-    if prefix is None or not numerator or denominator is None:
+    if not numerator or denominator is None or code & 0xFF or abs(exponent) > 12:
         return ""
-    if (numerator, denominator) == ("rev", "min") and not prefix:
-        return "rpm"
+    if (numerator, denominator) == ("rev", "min"):
+        numerator, denominator = "rpm", ""
+    prefix = _PREFIXES.get(exponent)
+    if prefix is None or (exponent and numerator in _WITHOUT_PREFIX):
+        prefix = f"{10.0**exponent:g} "
     return f"{prefix}{numerator}/{denominator}" if denominator else f"{prefix}{numerator}"
 
 

@@ -14,7 +14,7 @@ from profiles.loader import ProfileError, parse_profile
 PARAMETER_FIELDS = {
     "key", "index", "subindex", "number", "name", "group", "type", "access", "pdo", "unit",
     "scale", "offset", "min_raw", "max_raw", "default_raw", "enum", "bits", "effective",
-    "settable", "modbus_register", "motor_individual", "source", "also_printed", "notes",
+    "settable", "modbus_register", "motor_individual", "motion", "source", "also_printed", "notes",
 }  # fmt: skip
 
 

@@ -122,9 +122,11 @@ def test_a_file_that_is_too_big_is_not_read() -> None:
         import_file(b";" * (MAX_BYTES + 1), "x.eds")
 
 
-def test_dcf_values_count_before_defaults() -> None:
+def test_values_of_one_machine_are_no_defaults() -> None:
     odd = "[2100]\nParameterName=Rate\nDataType=6\nAccessType=rw\nDefaultValue=1\nParameterValue=2"
-    assert import_file(with_object(odd), "x.dcf").profile.by_key["2100:00"].default_raw == 2
+    imported = import_file(with_object(odd), "x.dcf")
+    assert imported.profile.by_key["2100:00"].default_raw == 1
+    assert any("1 values configured for one machine" in str(f) for f in imported.report.findings)
 
 
 CREATED = datetime(2026, 1, 2, 3, 4, tzinfo=UTC)

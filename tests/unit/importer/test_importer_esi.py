@@ -7,7 +7,7 @@ from importer_samples import GOOD_ESI
 
 from profiles.importer import ImportFailed, ImportReport, build_profile, import_file
 from profiles.importer.dictionary import DictionaryEntry, describe_dictionary
-from profiles.importer.esi import MAX_BYTES, esi_devices
+from profiles.importer.esi import MAX_BYTES, esi_devices, open_esi
 from profiles.importer.values import unit_of_code
 
 
@@ -40,7 +40,7 @@ def test_a_good_file() -> None:
 
 
 def test_the_devices_of_a_series_can_be_chosen() -> None:
-    devices = esi_devices(GOOD_ESI.encode(), "good.xml", ImportReport())
+    devices = esi_devices(open_esi(GOOD_ESI.encode(), "good.xml", ImportReport()))
     assert [(d.name, d.product_code, d.revision) for d in devices] == [
         ("Drive ES4", 0x190, 2), ("Drive ES5", 0x191, 1),
     ]  # fmt: skip

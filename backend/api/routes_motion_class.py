@@ -1,0 +1,114 @@
+"""Routes for the motion classes of objects: why one has its class, and who may give it another."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Annotated
+
+from fastapi import APIRouter, Path
+
+from backend.api.context import TheBench
+from backend.api.errors import NotFound
+from backend.api.models_description import PROFILE_NAME, MotionClass, MotionClassRequest
+from backend.audit.asked import note_before
+from backend.bench import Bench
+from drivers.errors import NotAllowed
+from profiles import load_profile
+from profiles.loader import ProfileError
+from profiles.motion.decisions import CannotClassify, classify, forget, why_fixed
+from profiles.schema import Parameter, Profile
+
+router = APIRouter()
+
+ProfileName = Annotated[str, Path(pattern=PROFILE_NAME, description="name of the profile")]
+Key = Annotated[str, Path(max_length=20, description="key of the object, for example 2005:01")]
+_PATH = "/profiles/{profile}/parameters/{key}/motion"
+
+
+def _known(profile: str, key: str) -> tuple[Profile, Parameter]:
+    try:
+        known = load_profile(profile)
+    except ProfileError as error:
+        raise NotFound(str(error), value=profile, remedy="see the list of profiles") from error
+    parameter = known.parameter(key)
+    if parameter is None:
+        raise NotFound(
+            f"{known.title} has no parameter {key}",
+            parameter=key,
+            remedy="see the list of parameters",
+        )
+    return known, parameter
+
+
+def _answer(profile: str, key: str) -> MotionClass:
+    known, parameter = _known(profile, key)
+    why = why_fixed(known, parameter)
+    return MotionClass(
+        motion=parameter.motion,
+        safe_in_motion=parameter.safe_in_motion,
+        origin=parameter.motion_origin,
+        reason=parameter.motion_reason,
+        changeable=not why,
+        fixed_why=why,
+    )
+
+
+@router.get(_PATH)
+async def motion_class(profile: ProfileName, key: Key) -> MotionClass:
+    """Whether writing an object can cause motion, who says so and why."""
+    return await asyncio.to_thread(_answer, profile, key)
+
+
+@router.put(_PATH)
+async def set_motion_class(
+    bench: TheBench, profile: ProfileName, key: Key, request: MotionClassRequest
+) -> MotionClass:
+    """Say what writing an object of an imported profile does, on one's own responsibility."""
+    await asyncio.to_thread(_note, profile, key)
+    try:
+        parameter = await asyncio.to_thread(
+            classify,
+            profile,
+            key,
+            request.motion,
+            reason=request.reason,
+            safe_in_motion=request.safe_in_motion,
+        )
+    except CannotClassify as error:
+        raise _refused(key, error) from error
+    return await _changed(bench, profile, parameter)
+
+
+@router.delete(_PATH)
+async def forget_motion_class(bench: TheBench, profile: ProfileName, key: Key) -> MotionClass:
+    """Take a class back that a person gave: the object counts as energising again."""
+    await asyncio.to_thread(_note, profile, key)
+    try:
+        parameter = await asyncio.to_thread(forget, profile, key)
+    except CannotClassify as error:
+        raise _refused(key, error) from error
+    return await _changed(bench, profile, parameter)
+
+
+def _note(profile: str, key: str) -> None:
+    _, parameter = _known(profile, key)
+    note_before(motion=parameter.motion, safe_in_motion=parameter.safe_in_motion)
+
+
+def _refused(key: str, error: CannotClassify) -> NotAllowed:
+    return NotAllowed(
+        str(error),
+        parameter=key,
+        limit="objects of imported profiles that no standard describes",
+        remedy="use the page of the function that the object belongs to",
+    )
+
+
+async def _changed(bench: Bench, profile: str, parameter: Parameter) -> MotionClass:
+    """Drives on the bench have the new class at once."""
+    known = await asyncio.to_thread(load_profile, profile)
+    for member in bench.members.values():
+        if member.drive.profile.drive == profile:
+            member.drive.profile = known
+    bench.journal.add(f"{known.title}: {parameter.key} {parameter.name}: {parameter.motion}")
+    return _answer(profile, parameter.key)

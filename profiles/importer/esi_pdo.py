@@ -1,0 +1,115 @@
+"""Process data objects of an ESI device (ETG.2000 clause 6.10)."""
+
+from __future__ import annotations
+
+from typing import Literal
+from xml.etree.ElementTree import Element
+
+from profiles.importer.description import MAX_ENTRIES, DescribedEntry, DescribedPdo
+from profiles.importer.report import ImportReport
+from profiles.importer.values import named_type, tidy, whole_number
+from profiles.importer.xml_tree import attribute_of, child, children, flag_of, name_of, text_of
+from profiles.schema import Access
+
+#: Bits of a whole object by its type; others are mapped as many bits as the file says.
+_BITS = {
+    "BOOL": 1, "INT8": 8, "UINT8": 8, "INT16": 16, "UINT16": 16, "INT32": 32, "UINT32": 32,
+    "INT64": 64, "UINT64": 64, "REAL32": 32,
+}  # fmt: skip
+_MOST_BITS = 64 * 8
+
+
+class PdoReader:
+    """Reads ``RxPdo`` and ``TxPdo``; objects that only a PDO names are added to ``entries``."""
+
+    def __init__(
+        self, file: str, report: ImportReport, entries: list[DescribedEntry], seen: set[str]
+    ) -> None:
+        self._file = file
+        self._report = report
+        self._entries = entries
+        self._by_key = {entry.key: entry for entry in entries}
+        self._seen = seen
+
+    def read(self, pdo: Element, direction: Literal["rx", "tx"]) -> list[DescribedPdo]:
+        """The PDO; none where it has no index, or is fixed and empty.
+
+        A PDO without contents that can be written is one to be filled.
+        """
+        place = f"{self._file}: {pdo.tag}"
+        index = whole_number(text_of(child(pdo, "Index")), place, self._report)
+        if index is None:
+            self._report.left_out(place, "a PDO without an index")
+            return []
+        where = f"{place} {index:04X}h"
+        layout: list[tuple[str | None, int]] = []
+        keys: list[str] = []
+        for item in children(pdo, "Entry"):
+            part = self._part(item, direction, where)
+            if part is None:
+                continue
+            layout.append(part)
+            if part[0] is not None and part[0] not in keys:
+                keys.append(part[0])
+        fixed = flag_of(pdo, "Fixed")
+        if not keys and fixed:
+            return []
+        exclude = (
+            whole_number(text_of(item), where, self._report) for item in children(pdo, "Exclude")
+        )
+        return [
+            DescribedPdo(
+                index=index,
+                direction=direction,
+                entries=tuple(keys),
+                fixed=fixed,
+                source=self._file,
+                layout=() if self._whole_objects(layout) else tuple(layout),
+                sync_manager=whole_number(attribute_of(pdo, "Sm"), where, self._report),
+                mandatory=flag_of(pdo, "Mandatory"),
+                exclude=tuple(number for number in exclude if number is not None),
+            )
+        ]
+
+    def _part(
+        self, item: Element, direction: Literal["rx", "tx"], where: str
+    ) -> tuple[str | None, int] | None:
+        """One stretch of the PDO; index 0 is padding. None: it cannot be understood."""
+        object_index = whole_number(text_of(child(item, "Index")), where, self._report)
+        bits = whole_number(text_of(child(item, "BitLen")), where, self._report)
+        if not object_index:
+            return (None, bits) if bits and bits <= _MOST_BITS else None
+        subindex = whole_number(text_of(child(item, "SubIndex")), where, self._report) or 0
+        if not 0x1000 <= object_index <= 0xFFFF or not 0 <= subindex <= 255:
+            self._report.left_out(where, f"entry {object_index:#x}:{subindex}")
+            return None
+        key = f"{object_index:04X}:{subindex:02X}"
+        if key not in self._seen and len(self._entries) < MAX_ENTRIES:
+            kind = named_type(text_of(child(item, "DataType")), bits) or named_type("", bits)
+            if kind is None:
+                self._report.left_out(where, f"{key} has no known type")
+                return (None, bits) if bits and bits <= _MOST_BITS else None
+            access: Access = "rw" if direction == "rx" else "ro"
+            name = tidy(name_of(item)) or f"Object {key}"
+            entry = DescribedEntry(
+                object_index, subindex, name, kind, access, direction, source=where
+            )
+            self._entries.append(entry)
+            self._by_key[key] = entry
+            self._seen.add(key)
+        natural = self._natural_bits(key)
+        if not bits or bits > _MOST_BITS:
+            bits = natural
+        return (key, bits) if bits else None
+
+    def _natural_bits(self, key: str) -> int | None:
+        entry = self._by_key.get(key)
+        return None if entry is None or entry.type is None else _BITS.get(entry.type)
+
+    def _whole_objects(self, layout: list[tuple[str | None, int]]) -> bool:
+        """Whether the list of keys says it all: no padding, no bits, nothing twice."""
+        keys = [key for key, _ in layout]
+        return len(set(keys)) == len(keys) and all(
+            key is not None and bits % 8 == 0 and bits == self._natural_bits(key)
+            for key, bits in layout
+        )

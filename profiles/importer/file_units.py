@@ -1,0 +1,114 @@
+"""Units of the motion objects as a maker's file states them, each with who states it.
+
+Source: CiA 402-2 objects 60A8h to 60AAh (unit codes), and the units that a file prints at the
+objects themselves. The standard's own "increments" is nobody's statement: makers use others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from profiles.importer.description import DescribedEntry
+from profiles.schema import UnitOrigin, UnitSpec
+from profiles.si_unit import SiUnit, decode_si_unit
+
+#: Object with the unit's code, and the set-point object whose printed unit counts otherwise.
+_QUANTITIES = {
+    "position": ("60A8:00", "607A:00"),
+    "velocity": ("60A9:00", "60FF:00"),
+    "acceleration": ("60AA:00", "6083:00"),
+}
+#: How the generic profile marks objects that are in one of the motion units.
+_MARKS = {"inc": "position", "inc/s": "velocity", "inc/s²": "acceleration"}
+#: Encoder increments whatever the unit of positions is (CiA 402-2).
+_INTERNAL = frozenset({"6063:00", "60FC:00", "608F:01", "60E4:01"})
+
+
+class FileUnits:
+    """What one file says of the units of position, velocity and acceleration."""
+
+    def __init__(self, entries: Iterable[DescribedEntry]) -> None:
+        by_key = {entry.key: entry for entry in entries}
+        self._codes: dict[str, int] = {}
+        self._stated: dict[str, SiUnit] = {}
+        self._printed: dict[str, str] = {}
+        torque = by_key.get("6071:00")
+        self._torque = torque.unit if torque is not None else ""
+        self._held = {q for q, (key, _) in _QUANTITIES.items() if key in by_key}
+        for quantity, (key, target) in _QUANTITIES.items():
+            code = by_key[key].default_raw if key in by_key else None
+            if isinstance(code, int) and code != 0:
+                # A code is 32 bits, whatever sign the file gives its type.
+                self._codes[quantity] = code & 0xFFFFFFFF
+                unit = decode_si_unit(code & 0xFFFFFFFF)
+                if unit is not None and _is_of(quantity, unit):
+                    self._stated[quantity] = unit
+            elif target in by_key and by_key[target].unit:
+                self._printed[quantity] = by_key[target].unit
+
+    def of(self, key: str, printed: str, standard: str) -> tuple[str, float]:
+        """Unit of an object, and what one raw step is in it.
+
+        ``printed`` is what the file says at the object, ``standard`` what the generic profile has.
+        A motion unit that nobody states is shown as none: the number is raw.
+        """
+        quantity = _MARKS.get(standard)
+        if key in _INTERNAL or quantity is None:
+            return printed or standard, 1.0
+        unit = self._stated.get(quantity)
+        if unit is not None:
+            return _shown(unit)
+        if quantity in self._codes:
+            return "", 1.0
+        if printed or self._printed.get(quantity):
+            return printed or self._printed[quantity], 1.0
+        return ("inc" if quantity == "position" and quantity not in self._held else ""), 1.0
+
+    def spec(self, base: UnitSpec, present: frozenset[str]) -> UnitSpec:
+        """Units of the profile; ``base`` has the standard's, ``present`` the keys that exist."""
+
+        def existing(key: str | None) -> str | None:
+            return key if key in present else None
+
+        origins: dict[str, UnitOrigin] = {}
+        texts: dict[str, str] = {"torque": self._torque or base.torque}
+        for quantity, (key, _) in _QUANTITIES.items():
+            origins[quantity] = "makers_file"
+            if quantity in self._stated:
+                texts[quantity] = self._stated[quantity].name
+            elif quantity in self._codes:
+                # Kept as it stands: no reader takes it for a unit that it knows.
+                texts[quantity] = f"{key[:4]}h = {self._codes[quantity]:08X}h"
+            elif quantity in self._printed:
+                texts[quantity] = self._printed[quantity]
+            else:
+                texts[quantity] = getattr(base, quantity)
+                origins[quantity] = "standard"
+        return UnitSpec.model_validate(
+            {
+                **base.model_dump(),
+                **texts,
+                "origins": origins,
+                "gear_numerator": existing(base.gear_numerator),
+                "gear_denominator": existing(base.gear_denominator),
+                "feed": existing(base.feed),
+                "feed_revolutions": existing(base.feed_revolutions),
+            }
+        )
+
+
+def _is_of(quantity: str, unit: SiUnit) -> bool:
+    """Whether the unit has the quantity's dimension: a speed is no position."""
+    if quantity == "position":
+        return unit.denominator.value == 0
+    if quantity == "velocity":
+        return unit.seconds is not None
+    return unit.square_seconds is not None
+
+
+def _shown(unit: SiUnit) -> tuple[str, float]:
+    """A unit without a number in its name, and the step that the number stands for."""
+    bare = SiUnit(0, unit.numerator, unit.denominator)
+    if unit.name.endswith(f" {bare.name}"):
+        return bare.name, unit.factor
+    return unit.name, 1.0

@@ -1,0 +1,111 @@
+"""Motion classes that a person of a station gives to objects of an imported profile.
+
+They are kept as rules in ``motion.yaml`` beside the imported ``profile.yaml``. The loader joins
+files in name order and the first rule counts, so a person's word stands before everything else.
+Profiles that come with servodeck have their classes from a manual, standard objects from the
+standard: those nobody changes here.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+from pydantic import TypeAdapter
+
+from profiles.loader import is_own, load_profile, user_folder
+from profiles.motion.classify import standard_rule
+from profiles.motion.rule import Motion, MotionRule
+from profiles.schema import Parameter, Profile
+
+FILE_NAME = "motion.yaml"
+_MAX_REASON = 500
+
+
+class CannotClassify(Exception):
+    """The class of this object is not a person's to give; the message says why."""
+
+
+def why_fixed(profile: Profile, parameter: Parameter) -> str:
+    """Why a person cannot change the motion class of this object; empty where it is possible."""
+    if parameter.access == "ro":
+        return "it cannot be written, so it has no motion class"
+    if not is_own(profile.drive):
+        return "it comes with servodeck and has its classes from the manual"
+    if standard_rule(parameter.key) is not None:
+        return "its class is that of the standard (CiA 301, CiA 402)"
+    if any(
+        rule.origin == "profile" and rule.covers(parameter.key) for rule in profile.motion_rules
+    ):
+        return "its class stands in the profile"
+    return ""
+
+
+def classify(
+    drive: str, key: str, motion: Motion, *, reason: str, safe_in_motion: bool = False
+) -> Parameter:
+    """Give one object of an imported profile a motion class; returns it as it now is.
+
+    Raises:
+        CannotClassify: not an object whose class a person may give, or no reason.
+        ProfileError: no such profile, or it cannot be read.
+        ValueError: ``safe_in_motion`` for another class than ``at_enable``.
+        OSError: the profile's folder cannot be written.
+    """
+    parameter = _changeable(drive, key)
+    told = " ".join(reason.split())[:_MAX_REASON]
+    if not told:
+        raise CannotClassify(f"{parameter.key}: say why it has this class")
+    rule = MotionRule(
+        keys=(parameter.key,),
+        motion=motion,
+        safe_in_motion=safe_in_motion,
+        reason=told,
+        origin="person",
+    )
+    _write(drive, (rule, *_without(drive, parameter.key)))
+    return load_profile(drive).by_key[parameter.key]
+
+
+def forget(drive: str, key: str) -> Parameter:
+    """Take a person's class back: the object counts as ``energises`` again.
+
+    Raises:
+        CannotClassify, ProfileError, OSError: as `classify`.
+    """
+    parameter = _changeable(drive, key)
+    _write(drive, _without(drive, parameter.key))
+    return load_profile(drive).by_key[parameter.key]
+
+
+def _changeable(drive: str, key: str) -> Parameter:
+    profile = load_profile(drive)
+    parameter = profile.parameter(key)
+    if parameter is None:
+        raise CannotClassify(f"{profile.title} has no parameter {key}")
+    if why := why_fixed(profile, parameter):
+        raise CannotClassify(f"{profile.title}: {parameter.key} {parameter.name}: {why}")
+    return parameter
+
+
+def _without(drive: str, key: str) -> tuple[MotionRule, ...]:
+    """A person's rules of this profile, without that of one object."""
+    rules = (rule for rule in load_profile(drive).motion_rules if rule.origin == "person")
+    return tuple(rule for rule in rules if rule.keys != (key,))
+
+
+def _write(drive: str, rules: tuple[MotionRule, ...]) -> None:
+    """Whole or not at all: half a file would take the classes of all objects away."""
+    path: Path = user_folder() / drive / FILE_NAME
+    if not rules:
+        path.unlink(missing_ok=True)
+        return
+    dumped = TypeAdapter(tuple[MotionRule, ...]).dump_python(rules, mode="json")
+    text = yaml.safe_dump({"motion_rules": dumped}, allow_unicode=True, sort_keys=False)
+    part = path.with_suffix(".part")
+    try:
+        part.write_text(text, "utf-8")
+        part.replace(path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise

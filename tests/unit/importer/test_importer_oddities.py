@@ -1,0 +1,464 @@
+"""What files of real makers hold, rebuilt small: units, PDOs, limits, names, identity, access."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+
+from drivers.ethercat.mapping import plan_station
+from drivers.link import Address, CyclicSignal
+from profiles.check import check
+from profiles.importer import ImportFailed, ImportReport, import_file
+from profiles.importer.values import fit, unit_of_code
+from profiles.schema import Profile
+
+HEAD = """<?xml version="1.0" encoding="UTF-8"?>
+<EtherCATInfo><Vendor><Id>#x00000A2B</Id><Name>Example Drives</Name></Vendor>
+<Descriptions><Devices>"""
+TAIL = "</Devices></Descriptions></EtherCATInfo>"
+
+
+def scalar(
+    index: int,
+    name: str,
+    kind: str,
+    bits: int,
+    *,
+    access: str = "rw",
+    mapping: str = "",
+    info: str = "",
+) -> str:
+    pdo = f"<PdoMapping>{mapping}</PdoMapping>" if mapping else ""
+    return (
+        f"<Object><Index>#x{index:04X}</Index><Name>{name}</Name><Type>{kind}</Type>"
+        f"<BitSize>{bits}</BitSize><Info>{info}</Info>"
+        f"<Flags><Access>{access}</Access>{pdo}</Flags></Object>"
+    )
+
+
+CONTROL = scalar(0x6040, "Controlword", "UINT", 16, mapping="R")
+STATUS = scalar(0x6041, "Statusword", "UINT", 16, access="ro", mapping="T")
+SPEEDS = (
+    scalar(0x60FF, "Target velocity", "DINT", 32, mapping="R")
+    + scalar(0x606C, "Velocity actual value", "DINT", 32, access="ro", mapping="T")
+    + scalar(0x6081, "Profile velocity", "UDINT", 32)
+)
+POSITIONS = scalar(0x607A, "Target position", "DINT", 32, mapping="R") + scalar(
+    0x6064, "Position actual value", "DINT", 32, access="ro", mapping="T"
+)
+
+
+def device(
+    objects: str, pdos: str = "", *, name: str = "ES4", code: int = 0x190, revision: int = 1,
+    types: str = "",
+) -> str:  # fmt: skip
+    return (
+        f'<Device><Type ProductCode="#x{code:08X}" RevisionNo="#x{revision:08X}">{name}</Type>'
+        f"<Name>{name}</Name><Profile><Dictionary><DataTypes>{types}</DataTypes>"
+        f"<Objects>{objects}</Objects></Dictionary></Profile>{pdos}</Device>"
+    )
+
+
+def esi(*devices: str) -> bytes:
+    return (HEAD + "".join(devices) + TAIL).encode()
+
+
+def imported(objects: str, pdos: str = "", types: str = "") -> Profile:
+    profile = import_file(esi(device(objects, pdos, types=types)), "odd.xml").profile
+    assert [str(f) for f in check(profile)] == []
+    return profile
+
+
+def unit_object(index: int, code: int) -> str:
+    data = struct.pack("<I", code).hex()
+    return scalar(index, "SI unit", "UDINT", 32, info=f"<DefaultData>{data}</DefaultData>")
+
+
+# 1: units of 60A8h to 60AAh ---------------------------------------------------------------------
+
+
+def test_speed_in_rpm_by_60a9h() -> None:
+    profile = imported(CONTROL + STATUS + SPEEDS + unit_object(0x60A9, 0x00B44700))
+    assert profile.units.velocity == "rpm"
+    assert profile.units.origins["velocity"] == "makers_file"
+    target = profile.by_key["60FF:00"]
+    assert (target.unit, target.to_raw(60), profile.by_key["6081:00"].unit) == ("rpm", 60, "rpm")
+
+
+def test_speed_in_tenths_of_rpm_and_position_in_tenths_of_a_degree() -> None:
+    profile = imported(
+        CONTROL + STATUS + SPEEDS + POSITIONS
+        + unit_object(0x60A9, 0xFFB44700) + unit_object(0x60A8, 0xFF410000)
+    )  # fmt: skip
+    assert (profile.units.velocity, profile.units.position) == ("0.1 rpm", "0.1 °")
+    target = profile.by_key["60FF:00"]
+    # 60 rpm is 600 tenths; 90 degrees are 900 tenths.
+    assert (target.unit, target.to_raw(60), target.to_value(600)) == ("rpm", 600, 60)
+    position = profile.by_key["607A:00"]
+    assert (position.unit, position.to_raw(90)) == ("°", 900)
+
+
+def test_a_unit_that_is_not_certain_is_shown_raw_and_kept() -> None:
+    profile = imported(CONTROL + STATUS + SPEEDS + unit_object(0x60A9, 0x00AC4700))
+    assert profile.by_key["60FF:00"].unit == ""
+    assert profile.units.velocity == "60A9h = 00AC4700h"
+    # A position where the speed should be says nothing about the speed.
+    wrong = imported(CONTROL + STATUS + SPEEDS + unit_object(0x60A9, 0x00410000))
+    assert wrong.by_key["60FF:00"].unit == ""
+    assert wrong.units.velocity == "60A9h = 00410000h"
+
+
+def test_nobody_states_a_unit() -> None:
+    profile = imported(CONTROL + STATUS + SPEEDS + POSITIONS)
+    assert set(profile.units.origins.values()) == {"standard"}
+    assert profile.by_key["60FF:00"].unit == ""
+    assert profile.by_key["607A:00"].unit == "inc"
+    zero = imported(CONTROL + STATUS + SPEEDS + unit_object(0x60A9, 0))
+    assert zero.units.origins["velocity"] == "standard"
+
+
+def test_a_unit_printed_at_the_target_counts() -> None:
+    target = scalar(0x60FF, "Target velocity", "DINT", 32, info="<Unit>#x00B44700</Unit>")
+    profile = imported(CONTROL + STATUS + target)
+    assert (profile.units.velocity, profile.units.origins["velocity"]) == ("rpm", "makers_file")
+
+
+# 2: unit codes without a mark -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("00470000", "min"), ("FD030000", "ms"), ("00B44700", "rpm"), ("FFB44700", "0.1 rpm"),
+        ("#xFF260000", "0.1 V"), ("rpm", ""), ("00FE0000", ""), ("1000000", ""),
+    ],
+)  # fmt: skip
+def test_bare_unit_codes(text: str, unit: str) -> None:
+    assert unit_of_code(text) == unit
+
+
+# 3, 5: process data -----------------------------------------------------------------------------
+
+
+def entry(index: int, bits: int, subindex: int = 0, kind: str = "UINT") -> str:
+    return (
+        f"<Entry><Index>#x{index:X}</Index><SubIndex>{subindex}</SubIndex><BitLen>{bits}</BitLen>"
+        f"<Name>e</Name><DataType>{kind}</DataType></Entry>"
+    )
+
+
+PAD_8 = "<Entry><Index>#x0</Index><BitLen>8</BitLen></Entry>"
+MODE = scalar(0x6060, "Modes of operation", "SINT", 8, mapping="R")
+FIXED_OUT = (
+    f'<RxPdo Sm="2" Fixed="1" Mandatory="1"><Index>#x1600</Index><Name>Out</Name>'
+    f"<Exclude>#x1601</Exclude>{entry(0x6040, 16)}{entry(0x6060, 8, kind='SINT')}{PAD_8}"
+    f"{entry(0x60FF, 32, kind='DINT')}</RxPdo>"
+)
+FIXED_IN = (
+    f'<TxPdo Sm="3" Fixed="1"><Index>#x1A00</Index><Name>In</Name>{entry(0x6041, 16)}'
+    f"{entry(0x2100, 1, 1, 'BOOL')}{entry(0x2100, 1, 2, 'BOOL')}"
+    f"<Entry><Index>#x0</Index><BitLen>6</BitLen></Entry>{PAD_8}"
+    f"{entry(0x6064, 32, kind='DINT')}</TxPdo>"
+)
+
+
+def signal(index: int, kind: str) -> CyclicSignal:
+    return CyclicSignal(1, Address(index, 0, kind), f"{index:04X}")  # type: ignore[arg-type]
+
+
+def test_padding_and_bits_keep_their_places() -> None:
+    """Eight bytes by ETG.2000 clause 6.10: 2 + 1 + 1 (padding) + 4, and 2 + 2 bits + 6 + 8 + 4."""
+    profile = imported(CONTROL + STATUS + MODE + SPEEDS + POSITIONS, FIXED_OUT + FIXED_IN)
+    assert profile.pdo is not None
+    assert not profile.pdo.remappable
+    rx, tx = profile.pdo.sets
+    assert (rx.sync_manager, rx.mandatory, rx.exclude) == (2, True, (0x1601,))
+    assert sum(part.bits for part in rx.layout) == 64
+    assert sum(part.bits for part in tx.layout) == 64
+    plan = plan_station(1, [signal(0x6064, "INT32")], [signal(0x60FF, "INT32")], profile)
+    assert (plan.rx.size, plan.tx.size) == (8, 8)
+    places: dict[int, int] = {}
+    start = 0
+    for part in plan.tx.entries:
+        places[part.index] = start
+        start += part.size
+    assert places[0x6064] == 4
+    assert plan.rx.mapping_words == (0x60400010, 0x60600008, 0x00000008, 0x60FF0020)
+    assert plan.tx.mapping_words == (
+        0x60410010, 0x21000101, 0x21000201, 0x00000006, 0x00000008, 0x60640020,
+    )  # fmt: skip
+
+
+def test_a_free_pdo_without_contents_is_one_to_be_filled() -> None:
+    pdos = (
+        FIXED_OUT + FIXED_IN
+        + "<RxPdo><Index>#x1605</Index><Name>Free</Name></RxPdo>"
+        + "<TxPdo><Index>#x1A05</Index><Name>Free</Name></TxPdo>"
+    )  # fmt: skip
+    profile = imported(CONTROL + STATUS + MODE + SPEEDS + POSITIONS, pdos)
+    assert profile.pdo is not None
+    assert profile.pdo.remappable
+    assert (profile.pdo.default_rx, profile.pdo.free_set("rx")) == (0x1600, 0x1605)
+    plan = plan_station(1, [signal(0x6064, "INT32")], [signal(0x60FF, "INT32")], profile)
+    assert (plan.rx.index, plan.rx.write, plan.tx.index) == (0x1605, True, 0x1A05)
+
+
+def test_one_direction_is_free_and_the_other_fixed() -> None:
+    pdos = FIXED_OUT + f'<TxPdo Sm="3"><Index>#x1A00</Index>{entry(0x6041, 16)}</TxPdo>'
+    profile = imported(CONTROL + STATUS + MODE + SPEEDS + POSITIONS, pdos)
+    plan = plan_station(1, [signal(0x6064, "INT32")], [signal(0x60FF, "INT32")], profile)
+    assert (plan.rx.index, plan.rx.write) == (0x1600, False)
+    assert (plan.tx.index, plan.tx.write) == (0x1A00, True)
+
+
+# 4: several devices -----------------------------------------------------------------------------
+
+BOOTLOADER = device(scalar(0x1000, "Device type", "UDINT", 32, access="ro"), name="Boot", code=1)
+OLD = device(CONTROL + STATUS, name="Servo", code=0x200, revision=1)
+NEW = device(CONTROL + STATUS, name="Servo", code=0x200, revision=0x20000)
+OTHER = device(CONTROL + STATUS, name="Other", code=0x300, revision=0x50000)
+
+
+def test_the_newest_revision_of_a_drive_is_taken_and_the_others_are_offered() -> None:
+    taken = import_file(esi(BOOTLOADER, OLD, NEW, OTHER), "series.xml")
+    identity = taken.profile.identity
+    assert (identity.product_code, identity.revision) == (0x200, 0x20000)
+    assert [(d.name, d.product_code, d.has_control_word) for d in taken.others] == [
+        ("Boot", 1, False), ("Servo", 0x200, True), ("Other", 0x300, True),
+    ]  # fmt: skip
+    assert any("0x300 revision 0x50000" in str(f) for f in taken.report.findings)
+
+
+def test_a_device_can_be_chosen() -> None:
+    data = esi(BOOTLOADER, OLD, NEW, OTHER)
+    old = import_file(data, "series.xml", product_code=0x200, revision=1).profile.identity
+    assert (old.product_code, old.revision) == (0x200, 1)
+    missing = import_file(data, "series.xml", product_code=0x200, revision=9)
+    assert missing.profile.identity.revision == 0x20000
+    assert any("revision 0x9 is not in it" in str(f) for f in missing.report.findings)
+    with pytest.raises(ImportFailed, match="no product 0x999"):
+        import_file(data, "series.xml", product_code=0x999)
+    with pytest.raises(ImportFailed, match="no revision 0x999"):
+        import_file(data, "series.xml", revision=0x999)
+
+
+# 6, 7: limits and signs -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "what", "expected"),
+    [
+        (2147483648, "maximum", 2147483647),
+        (4294967295, "highlimit", 2147483647),
+        (2147483648, "minimum", -2147483648),
+        (4294966296, "default", -1000),
+        (4294966296, "maximum", -1000),
+    ],
+)
+def test_maximum_above_the_type_is_no_negative_number(value: int, what: str, expected: int) -> None:
+    assert fit(value, "INT32", what, "here", ImportReport()) == expected
+
+
+def test_limits_of_the_whole_type() -> None:
+    info = "<MinValue>-2147483648</MinValue><MaxValue>2147483648</MaxValue>"
+    profile = imported(CONTROL + STATUS + scalar(0x2000, "Offset", "DINT", 32, info=info))
+    found = profile.by_key["2000:00"]
+    assert (found.min_raw, found.max_raw) == (-(2**31), 2**31 - 1)
+
+
+def test_negative_values_of_the_file_keep_its_sign() -> None:
+    info = "<DefaultValue>-1000</DefaultValue>"
+    profile = imported(CONTROL + STATUS + scalar(0x6072, "Max torque", "INT", 16, info=info))
+    found = profile.by_key["6072:00"]
+    assert (found.type, found.default_raw) == ("INT16", -1000)
+
+
+# 8: names of array members ----------------------------------------------------------------------
+
+ARRAY = (
+    "<DataType><Name>DT2010ARR</Name><BaseType>UINT</BaseType><BitSize>32</BitSize>"
+    "<ArrayInfo><LBound>1</LBound><Elements>2</Elements></ArrayInfo></DataType>"
+    "<DataType><Name>DT2010</Name><BitSize>48</BitSize>"
+    "<SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type></SubItem>"
+    "<SubItem><Name>Elements</Name><Type>DT2010ARR</Type>"
+    "<Flags><Access>rw</Access></Flags></SubItem></DataType>"
+)
+MEMBERS = (
+    "<SubItem><Name>Controller Kp</Name><Info><DefaultData>0A00</DefaultData></Info></SubItem>"
+    "<SubItem><Name>Controller Ki</Name><Info><DefaultData>1400</DefaultData></Info></SubItem>"
+)
+
+
+@pytest.mark.parametrize("first", ["", "<SubItem><Name>SubIndex 000</Name></SubItem>"])
+def test_array_members_have_the_names_of_the_object(first: str) -> None:
+    gains = (
+        "<Object><Index>#x2010</Index><Name>Torque Controller</Name><Type>DT2010</Type>"
+        f"<BitSize>48</BitSize><Info>{first}{MEMBERS}</Info>"
+        "<Flags><Access>rw</Access></Flags></Object>"
+    )
+    profile = imported(CONTROL + STATUS + gains, types=ARRAY)
+    assert [(p.name, p.default_raw) for k, p in profile.by_key.items() if k[:4] == "2010"] == [
+        ("Torque Controller: Controller Kp", 10), ("Torque Controller: Controller Ki", 20),
+    ]  # fmt: skip
+
+
+def test_an_array_beyond_the_subindices_is_said() -> None:
+    types = ARRAY.replace("<Elements>2<", "<Elements>512<")
+    gains = (
+        "<Object><Index>#x2010</Index><Name>Table</Name><Type>DT2010</Type><BitSize>9999</BitSize>"
+        "<Flags><Access>rw</Access></Flags></Object>"
+    )
+    result = import_file(esi(device(CONTROL + STATUS + gains, types=types)), "long.xml")
+    assert any("512 elements" in str(f) for f in result.report.findings)
+    assert sum(k.startswith("2010") for k in result.profile.by_key) == 255
+
+
+# 9, 10, 12: enumerations, access, remarks -------------------------------------------------------
+
+
+def test_the_standards_values_stay_inside_the_files_limits() -> None:
+    info = "<MinValue>0</MinValue><MaxValue>2</MaxValue>"
+    profile = imported(
+        CONTROL + STATUS + scalar(0x605A, "Quick stop option code", "INT", 16, info=info)
+        + scalar(0x6086, "Motion profile type", "INT", 16, info="<MaxValue>0</MaxValue>")
+    )  # fmt: skip
+    assert sorted(profile.by_key["605A:00"].enum) == [0, 1, 2]
+    assert sorted(profile.by_key["6086:00"].enum) == [0]
+
+
+def test_what_the_standard_only_lets_read_stays_so() -> None:
+    profile = imported(
+        CONTROL + STATUS + scalar(0x603F, "Error code", "UINT", 16, access="ro", mapping="R")
+        + scalar(0x60FF, "Target velocity", "DINT", 32, access="ro", mapping="R")
+    )  # fmt: skip
+    error = profile.by_key["603F:00"]
+    assert (error.access, error.pdo, error.motion) == ("ro", "tx", None)
+    target = profile.by_key["60FF:00"]
+    assert (target.access, target.pdo, target.motion) == ("rw", "rx", "energises")
+
+
+def remarks(restricted: int, free: int) -> list[str]:
+    limited = "".join(
+        scalar(0x2000 + n, f"O{n}", "UINT", 16).replace(
+            "<Access>", '<Access WriteRestrictions="PreOP">'
+        )
+        for n in range(restricted)
+    )
+    others = "".join(scalar(0x3000 + n, f"F{n}", "UINT", 16) for n in range(free))
+    result = import_file(esi(device(CONTROL + STATUS + limited + others)), "w.xml")
+    return [f.text for f in result.report.findings if "PreOP" in f.text]
+
+
+def test_a_remark_that_is_always_there_is_none() -> None:
+    assert remarks(20, 2) == []
+    assert remarks(7, 30) == [
+        "may be written in PreOP or SafeOP only: 2000:00, 2001:00, 2002:00, 2003:00, 2004:00 "
+        "and 2 more"
+    ]
+
+
+# 11: EDS and DCF --------------------------------------------------------------------------------
+
+EDS = """[DeviceInfo]
+VendorName=Maker
+ProductName=Drive
+VendorNumber=0xFFFFFFFF
+BaudRate_125=1
+BaudRate_1000=1
+BaudRate_500=0
+[1018]
+ParameterName=Identity
+ObjectType=9
+SubNumber=4
+[1018sub0]
+ParameterName=Count
+DataType=5
+AccessType=ro
+[1018sub1]
+ParameterName=Vendor
+DataType=7
+AccessType=ro
+DefaultValue=0x1234
+[1018sub2]
+ParameterName=Product
+DataType=7
+AccessType=ro
+DefaultValue=0x56
+[1018sub3]
+ParameterName=Revision
+DataType=7
+AccessType=ro
+DefaultValue=0xFFFFFFFF
+[6040]
+ParameterName=Controlword
+DataType=6
+AccessType=rww
+PDOMapping=1
+[6840]
+ParameterName=Controlword axis 2
+DataType=6
+AccessType=rww
+[6041]
+ParameterName=Statusword
+DataType=6
+AccessType=ro
+[603F]
+ParameterName=Error
+ObjectType=9
+[603Fsub0]
+ParameterName=Error code
+DataType=6
+AccessType=ro
+[603Fsub1]
+ParameterName=Maker's code
+DataType=7
+AccessType=ro
+[2100]
+ParameterName=Rate
+DataType=6
+AccessType=rw
+DefaultValue=7
+ParameterValue=
+"""
+
+
+def test_eds_identity_bit_rates_and_empty_values() -> None:
+    result = import_file(EDS.encode(), "d.eds")
+    profile = result.profile
+    assert (profile.identity.vendor_id, profile.identity.product_code) == (0x1234, 0x56)
+    assert profile.identity.revision is None
+    assert profile.links[0].baudrates == (125_000, 1_000_000)
+    assert profile.by_key["2100:00"].default_raw == 7
+    assert profile.by_key["603F:00"].type == "UINT16"
+    assert profile.by_key["603F:01"].type == "UINT32"
+    assert "1018:00" not in profile.by_key
+    assert profile.by_key["6840:00"].motion == "energises"
+    assert any("2 axes" in str(f) for f in result.report.findings)
+    assert [str(f) for f in check(profile)] == []
+
+
+# Hostile files ----------------------------------------------------------------------------------
+
+BOMB = (
+    b'<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;">]>'
+    b"<EtherCATInfo>&b;</EtherCATInfo>"
+)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (BOMB, "DTD or entities"),
+        (esi(NEW)[:-40], "not well-formed"),
+        (esi(NEW)[:300], "not well-formed"),
+        (HEAD.encode() + b"<Device>" * 100_000, "not well-formed|nested"),
+        (b"\x00\xff\xfe\x80" * 500, "no objects|not an EDS|no object"),
+        (b'<?xml version="1.0" encoding="utf-7"?><a/>', "not an ESI file"),
+        (esi(NEW).replace(b"UTF-8", b"UTF-16"), "not well-formed|not an ESI file"),
+        (b"", "no objects"),
+    ],
+)
+def test_hostile_files_get_one_clear_error(data: bytes, words: str) -> None:
+    with pytest.raises(ImportFailed, match=words):
+        import_file(data, "bad.xml")
