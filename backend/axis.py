@@ -55,7 +55,7 @@ class Axis(ScaledAxis):
         super().__init__(drive)
         #: A person enabled it by a transition, and nobody took that back here.
         self._left_enabled = False
-        #: Time that a brake which opens by itself takes after enabling, once a motion met it closed.
+        #: Time for a brake that opens by itself after enabling, once a motion met it closed [s].
         self.brake_wait_s = 0.0
         #: The page by which that was done; None where it was no page.
         self.enabled_by: str | None = None

@@ -18,12 +18,12 @@ from backend.api.models_scales import (
 from backend.audit.asked import note_before
 from backend.bench import Bench
 from backend.jobs import JobResult, Progress
+from backend.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.member import Member
 from backend.restoring import shielded
 from backend.scales import teaching
 from backend.scales.scale import Scale, what_to_do
 from backend.scales.taught import Taught
-from backend.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.tools.small_move import SmallMoveSettings, longest_allowed, small_move
 from backend.units import AxisUnits
 from drivers.errors import DriveError

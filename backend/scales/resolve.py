@@ -197,9 +197,7 @@ def _by_rate_unit(
             return _doubtful(quantity, Doubt.BEHIND_GEAR, unit.name, f"{source}, 6091h")
         steps = 1.0 / (unit.turns or 1.0)
     # One rpm is 1/60 rev/s; one rpm/s is 1/60 rev/s².
-    return Scale(
-        quantity, steps * seconds / 60.0 / unit.factor, unit.name, Origin.DRIVE, source
-    )
+    return Scale(quantity, steps * seconds / 60.0 / unit.factor, unit.name, Origin.DRIVE, source)
 
 
 def _seconds_of(quantity: Quantity, unit: SiUnit) -> float | None:
@@ -248,7 +246,7 @@ def _names(told: Told, *keys: str | None) -> list[str]:
 
 
 def _shown(key: str) -> str:
-    return f"{key.split(':')[0]}h"
+    return f"{key.split(':', maxsplit=1)[0]}h"
 
 
 def _joined(*parts: list[str]) -> str:

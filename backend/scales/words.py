@@ -42,8 +42,10 @@ def halt_words(halt: Halted, units: AxisUnits | None) -> str:
         HaltCause.TORQUE: (units.torque, "%"),
     }.get(halt.cause, (units.position, units.names["position"]))
     value, limit = apart(convert(halt.value), convert(halt.limit))
-    return f"{halt.quantity} {value} {unit} is beyond the limit of {limit} {unit}: " \
+    return (
+        f"{halt.quantity} {value} {unit} is beyond the limit of {limit} {unit}: "
         "the axis is braked and disabled"
+    )
 
 
 def halt_remedy(halt: Halted, otherwise: str) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import pairwise
 
 _PARTS = 5
 """Parts of a window; each is closed with its own sums, and the window slides by one part."""
@@ -134,7 +135,7 @@ class FeedbackWatch:
             return None
         told = sum(
             0.5 * (new[1] + old[1]) * (new[2] - old[2])
-            for old, new in zip(newest, newest[1:], strict=False)
+            for old, new in pairwise(newest)
         ) / time_s  # fmt: skip
         moved = _difference(newest[-1][0], newest[0][0])
         per = self._scale.velocity_per_inc_s

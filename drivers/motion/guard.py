@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from drivers.halt import HaltCause, Halted
-from drivers.motion.feedback import LIMIT_MARGIN, WINDOW_S, Contradiction, FeedbackScale, FeedbackWatch
+from drivers.motion.feedback import (
+    LIMIT_MARGIN,
+    WINDOW_S,
+    Contradiction,
+    FeedbackScale,
+    FeedbackWatch,
+)
 
 
 class SpeedGuard:

@@ -1,7 +1,7 @@
 """From a maker's file to the bytes on the bus: 60 rpm typed are 60 where the drive counts rpm.
 
-The file states 60A9h = 00B44700h (CiA 303-2: revolutions per minute). Over EtherCAT the commands are
-those of the loop that fills the process data, over CANopen the frames of the RPDO.
+The file states 60A9h = 00B44700h (CiA 303-2: revolutions per minute). Over EtherCAT the commands
+are those of the loop that fills the process data, over CANopen the frames of the RPDO.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ def speeds(position: FloatArray, late: int = 0, mean: int = 1) -> FloatArray:
 
 
 HONEST: dict[str, Callable[[FloatArray], FloatArray]] = {
-    "exact": lambda p: speeds(p),
+    "exact": speeds,
     "2 cycles late": lambda p: speeds(p, late=2),
     "mean of 3 cycles": lambda p: speeds(p, mean=3),
     "10 rpm, cut off": lambda p: np.trunc(speeds(p) / RPM / 10) * 10 * RPM,

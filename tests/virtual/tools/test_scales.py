@@ -1,7 +1,7 @@
 """Scales are certain or nothing moves: drives of other units, and drives whose 606Ch is wrong.
 
-On the EtherCAT loop (`direct`) and over CANopen frames (`can_bench`). What reached the drive is read
-from the drive, and what its shaft does from its mechanics, not from what the tools say.
+On the EtherCAT loop (`direct`) and over CANopen frames (`can_bench`). What goes out is read where it
+goes out, and what the shaft does from its mechanics, not from what the tools say.
 """
 
 from __future__ import annotations
@@ -284,8 +284,6 @@ async def test_a_small_move_of_a_blocked_axis_teaches_nothing() -> None:
         assert b.axis.small_moves is not None
         assert b.axis.small_moves.moved == 1_000
         assert b.link.highest["torque"] <= 150 + 5
-
-
 
 
 @pytest.mark.parametrize("opens_s", [0.0, 0.3])
