@@ -55,7 +55,7 @@ class AxisUnits:
             for quantity, text in (
                 (Quantity.VELOCITY, spec.velocity),
                 (Quantity.ACCELERATION, spec.acceleration),
-            )  # fmt: skip
+            )
         )
         return Scales(position, velocity, acceleration)
 

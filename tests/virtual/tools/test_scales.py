@@ -1,7 +1,7 @@
 """Scales are certain or nothing moves: drives of other units, and drives whose 606Ch is wrong.
 
-On the EtherCAT loop (`direct`) and over CANopen frames (`can_bench`). What goes out is read where it
-goes out, and what the shaft does from its mechanics, not from what the tools say.
+On the EtherCAT loop (`direct`) and over CANopen frames (`can_bench`). What goes out is read where
+it goes out, and what the shaft does from its mechanics, not from what the tools say.
 """
 
 from __future__ import annotations
