@@ -158,6 +158,17 @@ def test_a_measured_factor_is_the_usual_unit_nearby(
     assert nearest_unit(measured, counts) == (pytest.approx(expected[0]), expected[1])
 
 
+@pytest.mark.parametrize(
+    ("measured", "counts"),
+    [
+        (3.7 * 60 / 10_000, 10_000.0),  # 3.7 raw per rpm: no usual unit
+        (1_045 * 60 / 65_536, 65_536.0),  # between 0.001 rpm and increments per second (1092)
+    ],
+)
+def test_an_odd_factor_is_no_unit(measured: float, counts: float) -> None:
+    assert nearest_unit(measured, counts) is None
+
+
 def halted(cause: HaltCause, value: float, limit: float) -> str:
     units = AxisUnits(load_profile("mms7").units, 65_536.0)
     quantity = {HaltCause.POSITION: "position", HaltCause.TORQUE: "torque"}.get(cause, "speed")
