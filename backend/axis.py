@@ -38,6 +38,8 @@ class Axis(ScaledAxis):
         super().__init__(drive)
         #: A person enabled it by a transition, and nobody took that back here.
         self._left_enabled = False
+        #: Time for a brake that opens by itself after enabling, once a motion met it closed [s].
+        self.brake_wait_s = 0.0
         #: The page by which it was left enabled; None where it was no page.
         self.enabled_by: str | None = None
         self._standing: Grant | None = None
@@ -246,6 +248,8 @@ class Axis(ScaledAxis):
         with self.granted(cia402.MODE_NAMES[mode]):
             try:
                 await self.go_to_cyclic(session, State.OPERATION_ENABLED, mode, timeout_s)
+                if self.brake_wait_s:
+                    await asyncio.sleep(self.brake_wait_s)
                 yield
             except NotAllowed as error:
                 await self._name_fault(error)

@@ -63,16 +63,17 @@ class AxisUnits:
     def names(self) -> dict[str, str]:
         """Unit shown for each quantity."""
         scales, turns = self.scales, self.counts_per_rev is not None
+        position = "rev" if turns else scales.position.raw_unit or _RAW
+        fast, rising = scales.velocity, scales.acceleration
         return {
-            "position": "rev" if turns else scales.position.raw_unit or _RAW,
-            "velocity": "rpm" if scales.velocity.certain else scales.velocity.raw_unit or _RAW,
-            "acceleration": "rpm/s" if scales.acceleration.certain
-            else scales.acceleration.raw_unit or _RAW,
+            "position": position,
+            "velocity": "rpm" if fast.certain else fast.raw_unit or _RAW,
+            "acceleration": "rpm/s" if rising.certain else rising.raw_unit or _RAW,
             "torque": "%",
-            "following_error": "rev" if turns else scales.position.raw_unit or _RAW,
+            "following_error": position,
             "dc_voltage": "V",
             "temperature": "°C",
-        }  # fmt: skip
+        }
 
     def _raw_per(self, scale: Scale) -> float:
         """Raises ScaleUnknown where it is not certain."""

@@ -86,8 +86,8 @@ class Halted:
             return f"the drive left Operation enabled: {self.note}"
         if self.cause is HaltCause.CONTRADICTION and self.value is not None:
             return (
-                f"606Ch says {self.value:.6g}, the position says {self.limit or 0.0:.6g} "
-                f"(raw units of 606Ch; {self.note}): the axis is braked and disabled"
+                f"606Ch says {self.value:.6g}, the position says {self.limit or 0.0:.6g} (raw "
+                f"units of 606Ch; {self.note}): the axis is braked and disabled"
             )
         return self.note or _WORDS[self.cause]
 

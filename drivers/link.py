@@ -186,7 +186,7 @@ class Envelope:
     torque_max: float | None = None
     following_error_max: float | None = None
     feedback: FeedbackScale | None = None
-    """Scale between 606Ch and 6064h: both are compared then, and the speed limit watches both."""
+    """How 606Ch and 6064h hang together: they are compared then, the speed limit watches both."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,10 @@ from backend.scales import teaching
 from backend.scales.scale import Scale, what_to_do
 from backend.scales.taught import Taught
 
-app = typer.Typer(help="What a raw position and speed of a drive mean.", no_args_is_help=True)
+app = typer.Typer(
+    help="What a raw position and speed mean: show, state, or teach by a small move (moves).",
+    no_args_is_help=True,
+)
 
 State = Annotated[Path | None, typer.Option(help="folder of what is kept of axes")]
 _UNITS = {"position": "rev", "velocity": "rpm", "acceleration": "rpm/s"}
@@ -199,14 +202,11 @@ async def _teach_here(
 
 def _turned(increments: int) -> float | None:
     """How far the shaft turned as a person saw it; None: too little to tell, move further."""
-    answer = str(
-        typer.prompt(
-            f"moved {increments} increments. How far did the shaft turn, in revolutions? "
-            "(empty: not visible, move ten times as far)",
-            default="",
-            show_default=False,
-        )
+    question = (
+        f"moved {increments} increments. How far did the shaft turn, in revolutions? "
+        "(empty: not visible, move ten times as far)"
     )
+    answer = str(typer.prompt(question, default="", show_default=False))
     return float(answer.replace(",", ".")) if answer.strip() else None
 
 

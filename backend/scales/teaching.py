@@ -16,7 +16,8 @@ _MOST_REV = 1e6
 async def confirmed(axis: Axis, turned_rev: float) -> Taught:
     """The scales after the last small move, of which a person says how far the shaft turned.
 
-    The speed's scale is what 606Ch told meanwhile; where it told nothing, it stays unknown.
+    The speed's unit is the usual one that 606Ch told in meanwhile; where it told nothing, or in a
+    factor that is no usual unit, it stays as it was.
 
     Raises:
         NotAllowed: no small move was made, or 606Ch has the other sign.
@@ -43,13 +44,14 @@ async def confirmed(axis: Axis, turned_rev: float) -> Taught:
     counts = abs(last.moved / turned_rev)
     before = axis.taught
     per_rpm = before.raw_per_rpm if before is not None else None
-    if last.raw_per_inc_s is not None:
-        per_rpm = nearest_unit(last.raw_per_inc_s, counts)[0]
+    unit = None if last.raw_per_inc_s is None else nearest_unit(last.raw_per_inc_s, counts)
+    if unit is not None:
+        per_rpm = unit[0]
     return Taught(
         counts_per_rev=counts,
         raw_per_rpm=per_rpm,
         raw_per_rpm_s=before.raw_per_rpm_s if before is not None else None,
-        velocity_origin="user" if last.raw_per_inc_s is None else "measured",
+        velocity_origin="user" if unit is None else "measured",
         bound_to=dict((await read_told(drive)).raws),
     )
 

@@ -208,6 +208,7 @@ async def _measured(
 async def _pre_checks(axis: Axis, settings: AutotuneSettings) -> AxisFacts:
     """What must be known before anything moves."""
     drive = axis.drive
+    await axis.require_certain_scales()
     if await axis.state() in (State.FAULT, State.FAULT_REACTION):
         causes = "; ".join(await axis.blocked_by())
         raise NotAllowed(f"{drive.name}: {causes}", drive=drive.name,

@@ -159,7 +159,7 @@ async def generate(
         trajectory = bus.Trajectory(
             session.station(drive), target, raw, await _limits(axis, settings.envelope, start)
         )
-        await _play(axis, session, trajectory, len(raw) * cycle_s, progress)
+        await play_through(axis, session, trajectory, len(raw) * cycle_s, progress)
         end = await axis.position_raw()
     return {"cycles": len(raw), "moved_rev": units.position(end - start)}
 
@@ -302,7 +302,7 @@ async def _limits(axis: Axis, envelope: Envelope, start: int) -> bus.Envelope:
     )
 
 
-async def _play(
+async def play_through(
     axis: Axis,
     session: CyclicSession,
     trajectory: bus.Trajectory,

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 from backend.axis import Axis, Envelope
 from backend.jobs import JobResult, Progress
+from backend.readings import Reading
+from backend.scales.polled import PolledGuard
 from backend.units import ramp_raw
 from drivers import cia402
 from drivers.cia402 import Mode, State
@@ -73,6 +75,15 @@ async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobR
     return {"method": settings.method, "position_rev": position}
 
 
+def _integer(name: str, reading: Reading) -> int:
+    if not isinstance(reading.raw, int):
+        raise LinkTimeout(
+            f"{name}: {reading.key} could not be read while homing: {reading.error}",
+            drive=name, parameter=reading.key, remedy="check the cable",
+        )  # fmt: skip
+    return reading.raw
+
+
 async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) -> None:
     drive, units = axis.drive, await axis.units()
     own = drive.profile.quirk("own_status_word") is not None
@@ -81,6 +92,8 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
     began = time.monotonic()
     last, travelled = await axis.position_raw(), 0
     busy_seen = False
+    guard = PolledGuard(axis, units, settings.envelope.speed_rpm * 1.3 + 30.0)
+    told = [drive.require("position_actual"), drive.require("velocity_actual")]
     while True:
         status = await axis.status_word()
         if drive.decode_state(status) is not State.OPERATION_ENABLED:
@@ -103,11 +116,16 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
         # A drive that was homed before may show the old verdict until it has started anew.
         if attained and (busy_seen or elapsed > 0.3):
             return
-        position = await axis.position_raw()
+        asked_s = time.monotonic()
+        readings = await drive.read_many(told)
+        position, velocity = (_integer(drive.name, readings[key]) for key in told)
         step, last = abs(position - last), position
-        # Taking over the new origin makes the position jump; that is no travel.
+        # Taking over the new origin makes the position jump; that is no travel, and no speed.
         if step <= units.position_raw(settings.envelope.speed_rpm / 60.0 * 0.5) + 2:
             travelled += step
+            guard.look(position, velocity, asked_s)
+        else:
+            guard.interrupt()
         if units.position(travelled) > 2.5 * settings.envelope.travel_rev:
             raise NotAllowed(
                 f"{drive.name} travelled {shown.say(units.position(travelled))} without finding "

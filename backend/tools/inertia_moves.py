@@ -40,6 +40,8 @@ _WEAKER, _ATTEMPTS = 0.6, 3
 _EXPECTED, _ROUGHLY = 0.8, 0.1
 _SHARES = (1.0, 0.8, _WEAKER, 0.45, _WEAKER**2)
 _FRICTION_RAD_S = 0.5
+#: An axis that moved less than this under too much torque stood: a brake opens within this time.
+_STOOD_REV, _STOOD_SHARE, BRAKE_WAIT_S = 0.005, 0.02, 1.0
 
 
 @dataclass(frozen=True)
@@ -166,17 +168,60 @@ async def _first_move(
     facts: AxisFacts,
     speed_rpm: npt.NDArray[np.float64],
 ) -> Recording:
+    """The move; once more after a wait where the axis stood at its beginning.
+
+    A brake that opens some 100 ms after Operation enabled holds it meanwhile, and no bit tells.
+    """
+    start = await axis.position_raw()
+
+    async def moving() -> tuple[Recording, bool]:
+        recording = await speed_move(
+            axis, session, speed_rpm, envelope, facts, lambda _fraction: None
+        )
+        return recording, _stood(recording, speed_rpm)
+
     try:
-        return await speed_move(axis, session, speed_rpm, envelope, facts, lambda _fraction: None)
+        recording, stood = await moving()
     except EnvelopeExceeded as error:
+        moved = abs((await axis.units()).position(await axis.position_raw() - start))
+        waited = axis.brake_wait_s or moved > _STOOD_REV
         if error.halt.cause is not HaltCause.TORQUE:
             raise
-        raise EnvelopeExceeded(
-            f"{axis.drive.name}: a short move takes more torque than is permitted: {error.message}",
-            halt=error.halt,
-            drive=axis.drive.name,
-            remedy="look for a closed brake, a blocked axis or gains that are far too high",
-        ) from error
+        if waited:
+            raise _too_heavy(axis, error) from error
+    else:
+        if not stood or axis.brake_wait_s:
+            return recording
+    axis.brake_wait_s = BRAKE_WAIT_S
+    try:
+        await quiet(axis)
+        recording, stood = await moving()
+    except EnvelopeExceeded as error:
+        axis.brake_wait_s = 0.0
+        if error.halt.cause is not HaltCause.TORQUE:
+            raise
+        raise _too_heavy(axis, error) from error
+    if stood:
+        # It stands for another reason, such as friction: no later motion has to wait.
+        axis.brake_wait_s = 0.0
+    return recording
+
+
+def _stood(recording: Recording, speed_rpm: npt.NDArray[np.float64]) -> bool:
+    """Whether the axis had not begun to move when a third of its way was demanded."""
+    demanded = np.abs(np.cumsum(speed_rpm)) / 60.0 / recording.sample_rate_hz
+    third = int(np.argmax(demanded >= np.max(demanded) / 3.0))
+    position = recording.position_rad / _TURN
+    return bool(abs(position[third] - position[0]) < _STOOD_SHARE * demanded[third])
+
+
+def _too_heavy(axis: Axis, error: EnvelopeExceeded) -> EnvelopeExceeded:
+    return EnvelopeExceeded(
+        f"{axis.drive.name}: a short move takes more torque than is permitted: {error.message}",
+        halt=error.halt,
+        drive=axis.drive.name,
+        remedy="look for a closed brake, a blocked axis or gains that are far too high",
+    )
 
 
 async def identification_moves(

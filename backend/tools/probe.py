@@ -53,6 +53,10 @@ class Probed:
     rated_nm: float
 
 
+#: Share of the wanted speed below which an axis stood, and how long a brake may take to open then.
+_STOOD, _BRAKE_S = 0.05, 0.5
+
+
 async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -> float:
     """Mean torque in Nm that the speed loop needs to hold the axis; nothing is commanded.
 
@@ -119,6 +123,7 @@ async def probe_axis(
         needed = enough * inertia_kgm2 / (2.0 / np.pi * _DURATION_S / 4.0)
         first = max(first, min(0.5 * needed, 0.25 * highest))
     peak = min(first, highest)
+    waited = False
     async with enabled(axis, session, Mode.CST):
         while True:
             values = excite.probe(rate, peak, _DURATION_S, step)
@@ -129,10 +134,15 @@ async def probe_axis(
             moved = float(np.max(np.abs(recording.velocity_rad_s)))
             if moved >= enough or peak >= highest:
                 break
+            if moved < _STOOD * enough and not waited:
+                # A brake that opens late must not let go of an axis under ever more torque.
+                waited = True
+                await asyncio.sleep(_BRAKE_S)
+                continue
             # Doubling brings a free axis to the wanted speed without ever jumping past it.
             peak = min(2.0 * peak, highest)
     # An encoder shows a twisting shaft or play in a brake; a turning axis is another matter.
-    if moved < 0.05 * enough:
+    if moved < _STOOD * enough:
         raise NotAllowed(
             f"{drive.name} does not move with {peak / rated:.0%} of its rated torque",
             drive=drive.name,

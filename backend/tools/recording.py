@@ -249,11 +249,8 @@ async def play(
     progress: Callable[[float], None],
     *,
     until: Callable[[FloatArray], bool] | None = None,
-    raw: bool = False,
 ) -> Recording:
     """Play one sequence on an enabled axis and return the recording.
-
-    ``raw``: its signals stay in raw units, of an axis whose scales are to be found.
 
     ``until`` is called about 20 times a second with the rows [n, 3] of raw position, velocity and
     torque that came since, and ends the motion early, by braking, when it returns True.
@@ -295,7 +292,7 @@ async def play(
     )
     if limits.feedback is not None:
         _require_agreement(axis, bridged(table, valid), period_s, limits.feedback)
-    return await _in_si(axis, whole, table, valid, period_s, rated_torque_nm, raw=raw)
+    return await _in_si(axis, whole, table, valid, period_s, rated_torque_nm)
 
 
 def _require_agreement(
@@ -362,18 +359,14 @@ async def _in_si(
     valid: BoolArray,
     period_s: float,
     rated_torque_nm: float,
-    *,
-    raw: bool,
 ) -> Recording:
     units = await axis.units()
-    to_rad = 1.0 if raw else units.position(1.0) * 2 * np.pi
-    to_rad_s = 1.0 if raw else units.velocity(1.0) * 2 * np.pi / 60.0
     count = len(table)
     table = bridged(table, valid)
     return Recording(
         sample_rate_hz=1.0 / period_s,
-        position_rad=table[:, 0] * to_rad,
-        velocity_rad_s=table[:, 1] * to_rad_s,
+        position_rad=table[:, 0] * (units.position(1.0) * 2 * np.pi),
+        velocity_rad_s=table[:, 1] * (units.velocity(1.0) * 2 * np.pi / 60.0),
         torque_nm=table[:, 2] * (units.torque(1.0) / 100.0 * rated_torque_nm),
         sent=whole[:count, 0],
         offset=whole[:count, 1] if whole.shape[1] > 1 else np.zeros(count),

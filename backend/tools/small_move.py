@@ -12,12 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.axis import Axis
-from backend.cyclic import CyclicSession
+from backend.cyclic import CyclicSession, channel
 from backend.cyclic_mode import keeping_mode
 from backend.jobs import JobResult, Progress
 from backend.optional import torque_limits
-from backend.scales.compare import measured_scale
-from backend.tools.recording import Play, cycle_s, enabled, play, quiet, require_signals, share
+from backend.ports import address_of
+from backend.scales.compare import FloatArray, measured_scale
+from backend.tools.cyclic_motion import play_through
+from backend.tools.recording import cycle_s, enabled, quiet, require_signals
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
@@ -65,11 +67,17 @@ async def small_move(
         await axis.limit_torque(limits, settings.torque_percent)
         async with enabled(axis, session, Mode.CSP, by_increments=True) as start:
             await quiet(axis)
-            recording = await play(
-                axis, session, Play(Mode.CSP, start + path),
-                await _envelope(axis, settings, start), 1.0,
-                share(progress, 0.1, 0.95, "moving"), raw=True,
+            target = drive.parameter(drive.require("position_target"))
+            trajectory = bus.Trajectory(
+                session.station(drive), address_of(target), start + path,
+                await _envelope(axis, settings, start),
             )  # fmt: skip
+            seen = _Seen(axis)
+            leave = session.cyclic.blocks(seen.take)
+            try:
+                await play_through(axis, session, trajectory, len(path) * cycle, progress)
+            finally:
+                leave()
             await quiet(axis)
             moved = await axis.position_raw() - start
     if abs(moved - settings.increments) > _ARRIVED * abs(settings.increments) + 2:
@@ -78,11 +86,37 @@ async def small_move(
             drive=drive.name, value=moved, limit=str(settings.increments),
             remedy="look for a closed brake or a blocked axis, or permit a little more torque",
         )  # fmt: skip
-    scale = measured_scale(recording.position_rad, recording.velocity_rad_s, cycle)
+    scale = measured_scale(*seen.evenly(), cycle)
     axis.moved_small(moved, scale)
     return {
         "moved_increments": moved, "raw_per_inc_s": scale, "next_most": longest_allowed(axis),
     }  # fmt: skip
+
+
+class _Seen:
+    """Raw 6064h and 606Ch by the number of their cycle, as they come."""
+
+    def __init__(self, axis: Axis) -> None:
+        drive = axis.drive
+        keys = [drive.require(role) for role in ("position_actual", "velocity_actual")]
+        self._names = [channel(drive, key) for key in keys]
+        self._rows: list[tuple[float, float, float]] = []
+
+    def take(self, block: bus.ScopeBlock) -> None:
+        """Samples of the exchange; those that are lost or not trusted are left out."""
+        columns = [block.channels.index(name) for name in self._names]
+        for number, row in enumerate(block.samples[:, columns]):
+            good = block.valid is None or bool(block.valid[number])
+            if good and block.cycle is not None and not np.isnan(row).any():
+                self._rows.append((block.cycle + number, float(row[0]), float(row[1])))
+
+    def evenly(self) -> tuple[FloatArray, FloatArray]:
+        """Position and speed of every cycle; a straight line where some are missing."""
+        if len(self._rows) < 2:
+            return np.zeros(0), np.zeros(0)
+        cycle, position, speed = np.array(self._rows).T
+        grid = np.arange(cycle[0], cycle[-1] + 1)
+        return np.interp(grid, cycle, position), np.interp(grid, cycle, speed)
 
 
 def _check(axis: Axis, settings: SmallMoveSettings) -> None:

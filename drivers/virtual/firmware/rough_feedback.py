@@ -80,7 +80,7 @@ class RoughSpeed:
         self._past: deque[tuple[float, float]] = deque(maxlen=_KEPT)
 
     def __call__(self) -> Number:
-        """606Ch as this drive reports it now, in its own unit."""
+        """606Ch now, raw."""
         rough, core = self._rough, self._core
         speed = self._speed_rad_s()
         if rough.speed_step_rpm:

@@ -916,6 +916,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/small_move": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Small Move
+         * @description Move by some increments, slowly and with little torque, to see how far the shaft turns.
+         */
+        post: operations["start_small_move"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/step": {
         parameters: {
             query?: never;
@@ -1247,6 +1267,54 @@ export interface paths {
          * @description Evaluate the measurements of an axis anew and write its report. Nothing moves.
          */
         post: operations["make_report"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/scales": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read Scales
+         * @description The scales, read from the drive now.
+         */
+        get: operations["read_scales"];
+        /**
+         * State Scales
+         * @description Scales from a data sheet, stated by a person. Nothing is written to the drive.
+         */
+        put: operations["state_scales"];
+        post?: never;
+        /**
+         * Forget Taught
+         * @description Forget what a person has said; the drive, its file and its manual count again.
+         */
+        delete: operations["forget_taught"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/scales/confirm": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Confirm Scales
+         * @description How far the shaft turned in the last small move: the resolution, and the unit of 606Ch.
+         */
+        post: operations["confirm_scales"];
         delete?: never;
         options?: never;
         head?: never;
@@ -3561,6 +3629,12 @@ export interface components {
             unit: string;
         };
         /**
+         * Doubt
+         * @description Why a scale is not certain.
+         * @enum {string}
+         */
+        Doubt: "no_resolution" | "feed_of_one" | "unit_and_feed" | "linear" | "not_stated" | "unreadable" | "behind_gear" | "needs_resolution";
+        /**
          * DriveIdentification
          * @description Identification that a bit of the control word starts, while an object counts its states.
          */
@@ -5713,6 +5787,12 @@ export interface components {
             notches: (components["schemas"]["NotchShape"] | null)[];
         };
         /**
+         * Origin
+         * @description How a scale is known.
+         * @enum {string}
+         */
+        Origin: "manual" | "makers_file" | "drive" | "user" | "measured" | "unknown";
+        /**
          * OwedValue
          * @description A parameter that a motion changed and could not put back, as the link was lost.
          */
@@ -6355,6 +6435,12 @@ export interface components {
             wkc_errors: number;
         };
         /**
+         * Quantity
+         * @description What is scaled.
+         * @enum {string}
+         */
+        Quantity: "position" | "velocity" | "acceleration";
+        /**
          * ReadAllRequest
          * @description Read parameters; all readable ones where ``keys`` is None.
          */
@@ -6848,6 +6934,92 @@ export interface components {
              * @default false
              */
             overwrite: boolean;
+        };
+        /**
+         * ScaleInfo
+         * @description One scale with its origin.
+         */
+        ScaleInfo: {
+            /** @description why it is not certain */
+            doubt: components["schemas"]["Doubt"] | null;
+            /**
+             * Is Time
+             * @description a ramp given as a time in ms, which no factor converts
+             */
+            is_time: boolean;
+            origin: components["schemas"]["Origin"];
+            quantity: components["schemas"]["Quantity"];
+            /**
+             * Raw Per Unit
+             * @description null where the scale is not certain
+             */
+            raw_per_unit: number | null;
+            /**
+             * Raw Unit
+             * @description what one raw step is called; empty where unknown
+             */
+            raw_unit: string;
+            /**
+             * Remedy
+             * @description how it becomes certain, or empty
+             */
+            remedy: string;
+            /**
+             * Source
+             * @description objects, file or the manual's place
+             */
+            source: string;
+            /**
+             * Unit
+             * @description rev, rpm or rpm/s
+             */
+            unit: string;
+            /**
+             * Why
+             * @description the same in words, or empty
+             */
+            why: string;
+        };
+        /**
+         * ScalesInfo
+         * @description The scales of an axis.
+         */
+        ScalesInfo: {
+            /**
+             * Certain
+             * @description position and speed are: the axis may be moved by unit
+             */
+            certain: boolean;
+            /**
+             * Cyclic
+             * @description a small move by increments is possible on this bus
+             */
+            cyclic: boolean;
+            /**
+             * Kept
+             * @description a person has said something of them, whether it holds or not
+             */
+            kept: boolean;
+            /** Scales */
+            scales: components["schemas"]["ScaleInfo"][];
+            small_moves: components["schemas"]["SmallMovesInfo"] | null;
+            /**
+             * Taught
+             * @description a person has said something of them, and it holds now
+             */
+            taught: boolean;
+        };
+        /**
+         * ScalesUpdate
+         * @description Scales from a data sheet; what is left out stays as it was taught before.
+         */
+        ScalesUpdate: {
+            /** Counts Per Rev */
+            counts_per_rev?: number | null;
+            /** Raw Per Rpm */
+            raw_per_rpm?: number | null;
+            /** Raw Per Rpm S */
+            raw_per_rpm_s?: number | null;
         };
         /**
          * ScanRequest
@@ -7371,6 +7543,46 @@ export interface components {
             name: string;
             /** Password */
             password: string;
+        };
+        /**
+         * SmallMoveRequest
+         * @description A small move by increments; the axis moves.
+         */
+        SmallMoveRequest: {
+            /**
+             * Cycle Ms
+             * @default 1
+             */
+            cycle_ms: number;
+            /** Increments */
+            increments: number;
+            /**
+             * Torque Limit
+             * @description % of rated
+             * @default 20
+             */
+            torque_limit: number;
+        };
+        /**
+         * SmallMovesInfo
+         * @description Small moves by increments since this axis is connected.
+         */
+        SmallMovesInfo: {
+            /**
+             * Moved
+             * @description increments of the last one
+             */
+            moved: number;
+            /**
+             * Next Most
+             * @description increments that the next one may have
+             */
+            next_most: number;
+            /**
+             * Raw Per Inc S
+             * @description what 606Ch told in it, per increment per second; null where not found
+             */
+            raw_per_inc_s: number | null;
         };
         /**
          * SnapshotHeader
@@ -8012,20 +8224,12 @@ export interface components {
             mode?: number | null;
         };
         /**
-         * TurningInfo
-         * @description An axis that turns although nobody may move it.
+         * TurnedUpdate
+         * @description How far the shaft turned in the last small move, as a person saw it.
          */
-        TurningInfo: {
-            /**
-             * Kind
-             * @description without power: by hand or by gravity, or the drive's own jog; or enabled
-             * @enum {string}
-             */
-            kind: "disabled" | "without_grant";
-            /** Speed */
-            speed: number;
-            /** Unit */
-            unit: string;
+        TurnedUpdate: {
+            /** Turned Rev */
+            turned_rev: number;
         };
         /**
          * Undo
@@ -8204,6 +8408,7 @@ export type CyclicRequest = components['schemas']['CyclicRequest'];
 export type DescribedDevice = components['schemas']['DescribedDevice'];
 export type Diff = components['schemas']['Diff'];
 export type DiffRow = components['schemas']['DiffRow'];
+export type Doubt = components['schemas']['Doubt'];
 export type DriveIdentification = components['schemas']['DriveIdentification'];
 export type DriveSummary = components['schemas']['DriveSummary'];
 export type DriveUpdate = components['schemas']['DriveUpdate'];
@@ -8293,6 +8498,7 @@ export type NotchPreviewRequest = components['schemas']['NotchPreviewRequest'];
 export type NotchShape = components['schemas']['NotchShape'];
 export type NotchSlotInfo = components['schemas']['NotchSlotInfo'];
 export type NotchWrite = components['schemas']['NotchWrite'];
+export type Origin = components['schemas']['Origin'];
 export type OwedValue = components['schemas']['OwedValue'];
 export type ParameterGroup = components['schemas']['ParameterGroup'];
 export type ParameterRow = components['schemas']['ParameterRow'];
@@ -8321,6 +8527,7 @@ export type ProcedureRequest = components['schemas']['ProcedureRequest'];
 export type ProfileInfo = components['schemas']['ProfileInfo'];
 export type ProfileMatch = components['schemas']['ProfileMatch'];
 export type Quality = components['schemas']['Quality'];
+export type Quantity = components['schemas']['Quantity'];
 export type ReadAllRequest = components['schemas']['ReadAllRequest'];
 export type ReadDictionaryRequest = components['schemas']['ReadDictionaryRequest'];
 export type RealisedInfo = components['schemas']['RealisedInfo'];
@@ -8344,6 +8551,9 @@ export type RetentionBounds = components['schemas']['RetentionBounds'];
 export type Right = components['schemas']['Right'];
 export type Role = components['schemas']['Role'];
 export type SaveSetRequest = components['schemas']['SaveSetRequest'];
+export type ScaleInfo = components['schemas']['ScaleInfo'];
+export type ScalesInfo = components['schemas']['ScalesInfo'];
+export type ScalesUpdate = components['schemas']['ScalesUpdate'];
 export type ScanRequest = components['schemas']['ScanRequest'];
 export type ScopeChannel = components['schemas']['ScopeChannel'];
 export type ScopeChannelInfo = components['schemas']['ScopeChannelInfo'];
@@ -8363,6 +8573,8 @@ export type SerialPort = components['schemas']['SerialPort'];
 export type Session = components['schemas']['Session'];
 export type SessionInfo = components['schemas']['SessionInfo'];
 export type SetUp = components['schemas']['SetUp'];
+export type SmallMoveRequest = components['schemas']['SmallMoveRequest'];
+export type SmallMovesInfo = components['schemas']['SmallMovesInfo'];
 export type SnapshotHeader = components['schemas']['SnapshotHeader'];
 export type SnapshotInfo = components['schemas']['SnapshotInfo'];
 export type SnapshotTrace = components['schemas']['SnapshotTrace'];
@@ -8387,7 +8599,7 @@ export type ThreeWayRow = components['schemas']['ThreeWayRow'];
 export type TokenInfo = components['schemas']['TokenInfo'];
 export type TouchProbe = components['schemas']['TouchProbe'];
 export type TransitionRequest = components['schemas']['TransitionRequest'];
-export type TurningInfo = components['schemas']['TurningInfo'];
+export type TurnedUpdate = components['schemas']['TurnedUpdate'];
 export type Undo = components['schemas']['Undo'];
 export type ValuesChanged = components['schemas']['ValuesChanged'];
 export type VersionInfo = components['schemas']['VersionInfo'];
@@ -16163,6 +16375,149 @@ export interface operations {
             };
         };
     };
+    start_small_move: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SmallMoveRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     start_step: {
         parameters: {
             query?: never;
@@ -18733,6 +19088,570 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ReportInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    read_scales: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScalesInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    state_scales: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ScalesUpdate"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScalesInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    forget_taught: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScalesInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    confirm_scales: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["TurnedUpdate"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ScalesInfo"];
                 };
             };
             /** @description Not a request of this interface */

@@ -13,6 +13,7 @@ import { saidTexts } from './texts/said'
 import { imported } from './texts/imported'
 import { saidOfImports } from './texts/said-import'
 import { saidOfTuning } from './texts/said-tuning'
+import { scales } from './texts/scales'
 import { scene } from './texts/scene'
 import { scope } from './texts/scope'
 import { segment } from './texts/segment'
@@ -34,6 +35,7 @@ export const catalogue = {
   ...notListed,
   ...saidTexts,
   ...saidOfTuning,
+  ...scales,
   ...scene,
   ...scope,
   ...segment,

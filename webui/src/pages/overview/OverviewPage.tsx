@@ -11,6 +11,7 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { Procedures } from '../../widgets/Procedures'
 import { useAction } from '../../widgets/useAction'
 import { useRecord } from '../../widgets/useFunctions'
+import { ScalesPanel } from './ScalesPanel'
 import { SceneHere } from './SceneHere'
 import { StateMachine } from './StateMachine'
 import { travelOf } from './travel'
@@ -56,6 +57,7 @@ export function OverviewPage({ drive }: { drive: string }) {
           </Panel>
           <div className="later stack">
             <WatchPanel drive={drive} />
+            <ScalesPanel drive={drive} />
             <WhatNext drive={drive} />
             <Procedures drive={drive} />
           </div>

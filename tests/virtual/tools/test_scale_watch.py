@@ -1,7 +1,7 @@
 """Scales are certain or nothing moves: drives of other units, and drives whose 606Ch is wrong.
 
-On the EtherCAT loop (`direct`) and over CANopen frames (`can_bench`). What reached the drive is
-read from the drive, and what its shaft does from its mechanics, not from what the tools say.
+On the EtherCAT loop (`direct`) and over CANopen frames (`can_bench`). What goes out is read where
+it goes out, and what the shaft does from its mechanics, not from what the tools say.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from backend.tools.small_move import SmallMoveSettings, small_move
 from backend.tools.step_response import StepSettings, step_response
 from backend.tools.sweep import sweep
 from backend.tools.sweep_evaluation import SweepSettings
-from drivers.errors import MotionHalted, OutOfRange
+from drivers.errors import MotionHalted, NotAllowed, OutOfRange
 from drivers.halt import HaltCause
 from drivers.virtual.mechanics import MechanicsSpec
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec
@@ -272,12 +272,27 @@ async def test_what_was_taught_ends_with_another_gear() -> None:
         assert not (await b.axis.units()).scales.velocity.certain
 
 
-async def test_a_small_move_of_a_blocked_axis_ends_by_its_torque() -> None:
-    """End stops on both sides: the torque limit ends it, and nothing is taught."""
+async def test_a_small_move_of_a_blocked_axis_teaches_nothing() -> None:
+    """End stops on both sides: its torque stays within its limit, and nothing is concluded."""
     spec = mechanics((1e-4, 200.0, 0.005), travel=(-0.01, 0.01)).model_copy(
         update={"rough_feedback": RoughFeedbackSpec(lacks=("60A9",))}
     )
     async with direct(spec, drive="generic402") as b:
         b.axis.moved_small(1_000, None)
-        with pytest.raises((MotionHalted, Interrupted)):
+        with pytest.raises(NotAllowed):
             await small_move(b.axis, b.session, SmallMoveSettings(10_000, 15.0), silent())
+        assert b.axis.small_moves is not None
+        assert b.axis.small_moves.moved == 1_000
+        assert b.link.highest["torque"] <= 150 + 5
+
+
+@pytest.mark.parametrize("opens_s", [0.0, 0.3])
+async def test_a_brake_that_opens_late_is_waited_for(opens_s: float) -> None:
+    """It grips with twice the rated torque for 300 ms of Operation enabled; no bit tells of it."""
+    motor = AXIS.motor.model_copy(update={"brake": True})
+    spec = rough(brake_opens_s=opens_s).model_copy(update={"motor": motor})
+    async with direct(spec, drive="generic402") as b:
+        settings = InertiaSettings(Envelope(3.0, 600.0, 80.0, 60.0), rated_torque_nm=1.27)
+        outcome = await inertia(b.axis, b.session, settings, silent())
+    found = outcome.result.inertia_kgm2.value
+    assert found == pytest.approx(spec.total_inertia_kgm2, rel=0.03)

@@ -1,0 +1,239 @@
+"""Who states the scale of an axis, and what counts: codes of CiA 303-2, factors of CiA 402-2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from backend.axis import Axis
+from backend.axis_store import AxisRecord, AxisStore
+from backend.drive import Drive
+from backend.ports import Port
+from backend.scales import teaching
+from backend.scales.resolve import Told, scales_of
+from backend.scales.scale import Doubt, Origin, ScaleUnknown
+from backend.scales.taught import Taught
+from backend.scales.units_found import nearest_unit
+from backend.scales.words import apart, halt_words
+from backend.units import AxisUnits, read_units
+from drivers.errors import NotAllowed, OutOfRange
+from drivers.halt import HaltCause, Halted
+from drivers.link import Found
+from profiles import load_profile
+from tests.support.memory_link import MemoryLink
+
+GENERIC = load_profile("generic402").units
+INC, INC_S, INC_S2 = 0x00B50000, 0x00B50300, 0x00B55700
+RPM, TENTH_RPM, RAD_S, DEGREE_S = 0x00B44700, 0xFFB44700, 0x00100300, 0x00410300
+TENTH_DEGREE = 0xFF410000
+
+
+def velocity(code: int | None, **raws: int) -> tuple[float | None, Doubt | None]:
+    told = {"608F:01": 65_536, "608F:02": 1} | raws
+    if code is not None:
+        told["60A9:00"] = code
+    scale = scales_of(GENERIC, Told(told), None).velocity
+    return scale.raw_per_unit, scale.doubt
+
+
+@pytest.mark.parametrize(
+    ("code", "raw_per_rpm"),
+    [
+        (INC_S, 65_536 / 60),
+        (RPM, 1.0),
+        (TENTH_RPM, 10.0),
+        (0xFDB44700, 1000.0),  # 0.001 rpm
+        (0x00B40300, 1 / 60),  # rev/s
+        (DEGREE_S, 6.0),
+        (RAD_S, 0.10471975512),
+    ],
+)
+def test_codes_of_60a9h(code: int, raw_per_rpm: float) -> None:
+    assert velocity(code) == (pytest.approx(raw_per_rpm), None)
+
+
+@pytest.mark.parametrize(
+    ("code", "doubt"),
+    [
+        (None, Doubt.NOT_STATED),
+        (0, Doubt.NOT_STATED),
+        (0x00010300, Doubt.UNREADABLE),  # m/s: how far a revolution goes is not said
+        (0x12345678, Doubt.UNREADABLE),
+    ],
+)
+def test_a_unit_that_nobody_states_is_none(code: int | None, doubt: Doubt) -> None:
+    assert velocity(code) == (None, doubt)
+
+
+def test_turns_behind_a_gear_are_not_certain() -> None:
+    """6091h of 5 to 1: rpm of the motor, or of the shaft behind it?"""
+    gear = {"6091:01": 5, "6091:02": 1}
+    assert velocity(RPM, **gear) == (None, Doubt.BEHIND_GEAR)
+    assert velocity(INC_S, **gear) == (pytest.approx(65_536 / 5 / 60), None)
+
+
+@pytest.mark.parametrize(
+    ("raws", "per_rev"),
+    [
+        ({"608F:01": 131_072, "608F:02": 1}, 131_072),
+        ({"608F:01": 20_000, "608F:02": 2}, 10_000),
+        ({"608F:01": 131_072, "6092:01": 10_000, "6092:02": 1}, 10_000),
+        ({"6092:01": 36_000, "6092:02": 1, "6091:01": 10, "6091:02": 1}, 3_600),
+        ({"60A8:00": TENTH_DEGREE, "608F:01": 131_072}, 3_600),
+        ({"60A8:00": TENTH_DEGREE, "6092:01": 3_600, "6092:02": 1}, 3_600),
+        ({"60A8:00": INC, "608F:01": 4_096, "608F:02": 1}, 4_096),
+    ],
+)
+def test_increments_of_a_revolution(raws: dict[str, int], per_rev: float) -> None:
+    scale = scales_of(GENERIC, Told(raws), None).position
+    assert (scale.raw_per_unit, scale.origin) == (per_rev, Origin.DRIVE)
+
+
+@pytest.mark.parametrize(
+    ("raws", "doubt"),
+    [
+        ({}, Doubt.NO_RESOLUTION),
+        ({"6092:01": 0, "6092:02": 1}, Doubt.NO_RESOLUTION),
+        ({"6092:01": 1, "6092:02": 1, "608F:01": 131_072}, Doubt.FEED_OF_ONE),
+        ({"60A8:00": TENTH_DEGREE, "6092:01": 10_000}, Doubt.UNIT_AND_FEED),
+        ({"60A8:00": 0xFA010000}, Doubt.LINEAR),  # µm
+        ({"60A8:00": 0x00990000}, Doubt.UNREADABLE),
+    ],
+)
+def test_a_resolution_that_nobody_states_is_none(raws: dict[str, int], doubt: Doubt) -> None:
+    scale = scales_of(GENERIC, Told(raws), None).position
+    assert (scale.raw_per_unit, scale.doubt) == (None, doubt)
+
+
+def test_what_a_person_said_counts_while_the_drive_is_as_it_was() -> None:
+    raws = {"608F:01": 1_000, "60A9:00": RPM}
+    taught = Taught(counts_per_rev=10_000, raw_per_rpm=10.0, bound_to=raws)
+    scales = scales_of(GENERIC, Told(raws), taught)
+    assert (scales.position.raw_per_unit, scales.position.origin) == (10_000, Origin.USER)
+    assert (scales.velocity.raw_per_unit, scales.velocity.origin) == (10.0, Origin.USER)
+    other = scales_of(GENERIC, Told(raws | {"608F:01": 2_000}), taught)
+    assert (other.position.raw_per_unit, other.position.origin) == (2_000, Origin.DRIVE)
+
+
+def test_the_makers_file_counts_where_the_drive_is_silent() -> None:
+    spec = GENERIC.model_copy(
+        update={"velocity": "0.1 rpm", "origins": {"velocity": "makers_file"}}
+    )
+    scale = scales_of(spec, Told({"608F:01": 1_000}), None).velocity
+    assert (scale.raw_per_unit, scale.origin) == (10.0, Origin.MAKERS_FILE)
+
+
+def test_a_profile_imported_before_origins_were_kept_is_not_taken_for_a_manual() -> None:
+    old = GENERIC.model_copy(update={"origins": {}})
+    assert scales_of(old, Told({"608F:01": 1_000}), None).velocity.doubt is Doubt.NOT_STATED
+
+
+@pytest.mark.parametrize("name", ["mms7", "m6l", "r6l", "ds_c"])
+def test_units_of_listed_families_are_those_of_their_manual(name: str) -> None:
+    units = AxisUnits(load_profile(name).units, 10_000.0)
+    units.require_certain()
+    assert {s.origin for s in units.scales.all} == {Origin.MANUAL}
+
+
+def test_nothing_is_converted_by_a_scale_that_is_not_certain() -> None:
+    units = AxisUnits(GENERIC, None, scales_of(GENERIC, Told({}), None), "N axis")
+    for convert in (units.position_raw, units.velocity_raw, units.acceleration_raw):
+        with pytest.raises(ScaleUnknown, match="N axis: the scale of its"):
+            convert(3.0)
+    assert (units.position(3), units.names["velocity"]) == (3, "raw")
+
+
+@pytest.mark.parametrize(
+    ("measured", "counts", "expected"),
+    [
+        (0.997, 65_536.0, (65_536 / 60, "inc/s")),
+        (10 * 60 / 10_000 * 1.004, 10_000.0, (10.0, "0.1 rpm")),
+        (60 / 10_000, 10_000.0, (1.0, "rpm")),
+    ],
+)
+def test_a_measured_factor_is_the_usual_unit_nearby(
+    measured: float, counts: float, expected: tuple[float, str]
+) -> None:
+    assert nearest_unit(measured, counts) == (pytest.approx(expected[0]), expected[1])
+
+
+@pytest.mark.parametrize(
+    ("measured", "counts"),
+    [
+        (3.7 * 60 / 10_000, 10_000.0),  # 3.7 raw per rpm: no usual unit
+        (1_045 * 60 / 65_536, 65_536.0),  # between 0.001 rpm and increments per second (1092)
+    ],
+)
+def test_an_odd_factor_is_no_unit(measured: float, counts: float) -> None:
+    assert nearest_unit(measured, counts) is None
+
+
+def halted(cause: HaltCause, value: float, limit: float) -> str:
+    units = AxisUnits(load_profile("mms7").units, 65_536.0)
+    quantity = {HaltCause.POSITION: "position", HaltCause.TORQUE: "torque"}.get(cause, "speed")
+    return halt_words(Halted(cause, quantity, value, limit), units)  # type: ignore[arg-type]
+
+
+def test_limits_are_said_in_the_units_of_the_axis() -> None:
+    rpm = 65_536 / 60
+    assert "torque 80.4 % is beyond the limit of 80 %" in halted(HaltCause.TORQUE, 804, 800)
+    assert "speed 320 rpm is beyond the limit of 300 rpm" in halted(
+        HaltCause.SPEED, 320 * rpm, 300 * rpm
+    )
+    words = halted(HaltCause.POSITION, 16_638_901, 16_638_900)
+    assert "position 253.88948 rev is beyond the limit of 253.88947 rev" in words
+
+
+def test_a_contradiction_says_both_speeds() -> None:
+    rpm = 65_536 / 60
+    words = halted(HaltCause.CONTRADICTION, 12 * rpm, 903 * rpm)
+    assert "606Ch says 12 rpm, the position says 903 rpm: the scale of 606Ch" in words
+
+
+def test_two_figures_are_shown_apart() -> None:
+    assert apart(2.5, 2.0) == ("2.5", "2")
+    assert apart(2.500001, 2.5) == ("2.500001", "2.5")
+
+
+def plain(**objects: int) -> Axis:
+    places = {"position": (0x6064, 0), "resolution": (0x608F, 1), "unit": (0x60A9, 0)}
+    link = MemoryLink({places[n]: v.to_bytes(4, "little") for n, v in objects.items()})
+    link.kind = "canopen"
+    profile = load_profile("generic402")
+    spec = next(s for s in profile.links if s.kind == "canopen")
+    drive = Drive("n", "N axis", profile, [Port(link, 1, spec)])
+    drive.found = Found(1)
+    return Axis(drive)
+
+
+async def test_608fh_alone_is_read() -> None:
+    assert (await read_units(plain(resolution=131_072).drive)).counts_per_rev == 131_072
+
+
+async def test_a_confirmed_small_move_is_bound_to_the_drive_as_it_is() -> None:
+    """5 000 increments, half a turn, and 606Ch in 0.1 rpm: 0.06 raw per increment per second."""
+    axis = plain(resolution=1_000)
+    axis.moved_small(5_000, 0.0602)
+    taught = await teaching.confirmed(axis, 0.5)
+    assert (taught.counts_per_rev, taught.raw_per_rpm) == (10_000, 10.0)
+    assert taught.bound_to == {"608F:01": 1_000}
+
+
+async def test_what_cannot_be_confirmed() -> None:
+    axis = plain(resolution=1_000)
+    with pytest.raises(NotAllowed, match="no small move"):
+        await teaching.confirmed(axis, 1.0)
+    axis.moved_small(500, None)
+    with pytest.raises(OutOfRange, match="by eye"):
+        await teaching.confirmed(axis, 0.01)
+    axis.moved_small(500, -1.0)
+    with pytest.raises(NotAllowed, match="opposite signs"):
+        await teaching.confirmed(axis, 1.0)
+
+
+async def test_what_is_said_is_kept_with_the_axis(tmp_path: Path) -> None:
+    taught = await teaching.stated(plain(resolution=1_000), 2_000.0, None, None)
+    store = AxisStore(tmp_path)
+    store.put("x", AxisRecord(scales=taught))
+    assert AxisStore(tmp_path).get("x").scales == taught

@@ -1,0 +1,78 @@
+import type { Texts } from '../types'
+
+/** Scales of position, speed and acceleration: origins, and how a person teaches them. */
+export const scales = {
+  'scales.title': ['Scales', '标度'],
+  'scales.help': [
+    'What a raw value of this drive means, and who says so. While the scale of position or speed is not certain, no tool moves the axis by unit.',
+    '该驱动器的原始值代表什么，以及依据来源。位置或速度的标度未确定时，任何工具都不会按单位移动该轴。',
+  ],
+  'scales.certain': ['Position and speed are certain.', '位置和速度的标度已确定。'],
+  'scales.uncertain': ['The axis is not moved by unit.', '该轴不会按单位移动。'],
+  'scales.quantity.position': ['Position', '位置'],
+  'scales.quantity.velocity': ['Speed', '速度'],
+  'scales.quantity.acceleration': ['Ramps', '加减速'],
+  'scales.per': ['{value} raw per {unit}', '每 {unit} 对应 {value} 个原始值'],
+  'scales.time': ['ramps are times in ms', '加减速以毫秒时间表示'],
+  'scales.origin.manual': ['manual', '手册'],
+  'scales.origin.makers_file': ["maker's file", '厂商文件'],
+  'scales.origin.drive': ['read from the drive', '从驱动器读取'],
+  'scales.origin.user': ['stated by a person', '由人员给定'],
+  'scales.origin.measured': ['measured', '测量得出'],
+  'scales.origin.unknown': ['unknown', '未知'],
+  'scales.doubt.no_resolution': ['Increments per revolution are unknown.', '每转增量数未知。'],
+  'scales.doubt.feed_of_one': [
+    '6092h says one unit per revolution beside the encoder of 608Fh: it was never set.',
+    '6092h 为每转一个单位，与 608Fh 的编码器不符：该值从未设置。',
+  ],
+  'scales.doubt.unit_and_feed': [
+    '60A8h and 6092h give different numbers of units for a revolution.',
+    '60A8h 与 6092h 给出的每转单位数不同。',
+  ],
+  'scales.doubt.linear': [
+    'The unit is a length, and how far a revolution goes is unknown.',
+    '单位为长度，而每转行程未知。',
+  ],
+  'scales.doubt.not_stated': [
+    'Neither the drive nor its description says in which unit it is.',
+    '驱动器及其描述文件均未说明单位。',
+  ],
+  'scales.doubt.unreadable': ['The unit that is stated is not known here.', '所给单位无法识别。'],
+  'scales.doubt.behind_gear': [
+    'It counts turns, and 6091h holds a gear: of which shaft is not said.',
+    '以转数计，而 6091h 中设有减速比：未说明是哪根轴。',
+  ],
+  'scales.doubt.needs_resolution': [
+    'It counts increments, and increments per revolution are unknown.',
+    '以增量计，而每转增量数未知。',
+  ],
+  'scales.teach': ['Teach by a small move', '通过微小移动示教'],
+  'scales.teachHelp': [
+    'The axis moves by so many increments within 2 s, with little torque. Mark the shaft and look how far it turns. Begin small: each move may be ten times as long as the one before.',
+    '该轴在 2 秒内以小转矩移动所给增量数。请在轴上做标记，观察转过的角度。从小开始：每次移动最多为前一次的十倍。',
+  ],
+  'scales.increments': ['Increments', '增量数'],
+  'scales.torque': ['Torque at most', '最大转矩'],
+  'scales.move': ['Move by increments', '按增量移动'],
+  'scales.turned': ['The shaft turned by', '轴转过'],
+  'scales.turnedHelp': [
+    'After {moved} increments. Not visible? Move further.',
+    '移动 {moved} 个增量后。看不出？请移动更多。',
+  ],
+  'scales.confirm': ['That is what it turned', '确认转角'],
+  'scales.told': ['606Ch told {value} per increment per second.', '606Ch 每增量每秒对应 {value}。'],
+  'scales.toldNothing': [
+    '606Ch told nothing that goes with the position.',
+    '606Ch 的值与位置不相符。',
+  ],
+  'scales.state': ['State from a data sheet', '按数据手册给定'],
+  'scales.countsPerRev': ['Increments per revolution', '每转增量数'],
+  'scales.rawPerRpm': ['Raw speed of 1 rpm', '1 rpm 的原始速度值'],
+  'scales.rawPerRpmS': ['Raw ramp of 1 rpm/s', '1 rpm/s 的原始加速度值'],
+  'scales.keep': ['Keep', '保存'],
+  'scales.forget': ['Forget what was said', '清除给定值'],
+  'scales.expired': [
+    'What was said holds for another gear or unit of the drive, and does not count now.',
+    '给定值对应驱动器的其他减速比或单位，目前无效。',
+  ],
+} satisfies Texts
