@@ -33,8 +33,9 @@ class Watched:
         self._moves_since: float | None = None
         self._before: tuple[float, float] | None = None
 
-    def look(self, _block: object) -> None:
+    def look(self, block: object) -> None:
         """After every 20 ms of the drive."""
+        del block
         now_s = self.b.link.now_ns / 1e9
         device, counts = self.b.link.device, 65536.0
         place = int.from_bytes(device.read(0x6064, 0), "little", signed=True)
