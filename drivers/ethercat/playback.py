@@ -50,6 +50,8 @@ _RESTLESS_STILL = Halted(
 )
 _STALE_CYCLES = 3
 """Samples that may be older than what a mailbox told before an axis was enabled anew."""
+_SETTLES = 2
+"""An axis that lags behind its ramp may take so many times its length longer to be held."""
 _REST_S, _GIVE_UP = 0.05, 30
 """An axis rests after so long without motion; after so many times as long nobody waits for it."""
 
@@ -376,7 +378,7 @@ class AxisLoop:
         else:
             self._setpoint = self._setpoint - self._brake_step if self._brake_left > 0 else 0.0
             self._set(self._brake_target, round(self._setpoint))
-        if self._brake_left <= 0:
+        if self._brake_left <= 0 and not self._lags_behind():
             self.phase = Phase.IDLE
             self._speed = 0.0
             self.goal = self._after_brake
@@ -388,6 +390,12 @@ class AxisLoop:
                 if held:
                     self.halted = _RESTLESS_STILL
                     self._report(self.station, _RESTLESS_STILL.words)
+
+    def _lags_behind(self) -> bool:
+        """Whether an axis that is to be held still follows its ramp, within the time for that."""
+        held = self._after_brake is State.OPERATION_ENABLED
+        patient = self._brake_left > -_SETTLES * self._stop_cycles
+        return held and patient and self._moved > max(0.1 * self._moved_at_stop, _RESTLESS)
 
     def _control(self) -> None:
         place = self._out[CONTROL]

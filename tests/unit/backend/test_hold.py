@@ -85,9 +85,9 @@ class Held:
         return next(at for at, each in self.told if each == state and at >= after_s)
 
 
-def steady(begin_s: float, end_s: float, first: int = 1, **more: float) -> list[Sign]:
+def steady(begin_s: float, end_s: float, first: int = 1) -> list[Sign]:
     count = round((end_s - begin_s) / PERIOD_S)
-    return [Sign(first + n, begin_s + n * PERIOD_S, **more) for n in range(count)]
+    return [Sign(first + n, begin_s + n * PERIOD_S) for n in range(count)]
 
 
 def test_a_steady_hold_moves_until_it_is_released() -> None:

@@ -512,3 +512,34 @@ async def test_a_signal_outside_its_envelope_enables_nothing(x: Member, servo: S
     with pytest.raises(OutOfRange, match="envelope"):
         await generate(x.axis, Exchange(), settings, quiet())  # type: ignore[arg-type]
     assert servo.written == []
+
+
+async def test_a_gap_halts_the_polled_jog_and_a_new_target_ends_the_halt(
+    x: Member, servo: Servo
+) -> None:
+    """6040h bit 8 while no sign of life comes; afterwards a target from where it halted."""
+    now = {"s": 0.0}
+    hold = Hold(1, lambda: now["s"])
+    words: list[tuple[str, int]] = []
+
+    def note(place: tuple[int, int], value: int) -> None:
+        words.append(("target" if place == TARGET else "control", value))
+
+    servo.on_write = note
+    task = asyncio.create_task(jog(x.axis, JOG, hold, quiet()))
+    await eventually(lambda: ("control", 0x3F) in words)
+    words.clear()
+    now["s"] = 0.25
+    await eventually(lambda: ("control", 0x10F) in words)
+    assert not task.done()
+    words.clear()
+    now["s"] = 0.40
+    hold.renew(1)
+    await asyncio.sleep(0.1)
+    assert not [word for word in words if word[1] & 0x10], "one sign alone moves nothing"
+    now["s"] = 0.46
+    hold.renew(1)
+    await eventually(lambda: ("control", 0x3F) in words)
+    assert words[0][0] == "target"
+    hold.release("released", 1)
+    assert (await task)["reason"] == "released"

@@ -391,3 +391,57 @@ def test_enabling_anew_is_not_taken_back_by_a_sample_from_before_the_disabling()
     bench.status = DISABLED
     bench.obey(10)
     assert bench.axis.state is State.OPERATION_ENABLED
+
+
+def test_a_pause_brakes_and_holds_enabled_and_the_next_motion_begins_there() -> None:
+    bench = Bench().enabled()
+    bench.play(list(range(500, 6500, 10)))
+    bench.step(100)
+    bench.axis.pause()
+    bench.step(1 + round(STOP_S / CYCLE_S))
+    held = bench.axis.outputs[1]
+    assert bench.axis.phase is Phase.IDLE
+    assert bench.axis.halted is None
+    bench.obey(300)
+    assert bench.axis.state is State.OPERATION_ENABLED
+    assert bench.axis.outputs[1] == held
+    bench.play(list(range(held, held + 1000, 10)))
+    bench.step(10)
+    assert bench.axis.outputs[1] == held + 90
+
+
+def test_a_halt_while_it_brakes_to_hold_disables_it() -> None:
+    """A release in a gap comes within the ramp: nothing may stay enabled by it."""
+    bench = Bench().enabled()
+    bench.play(list(range(500, 6500, 10)))
+    bench.step(100)
+    bench.axis.pause()
+    bench.step(20)
+    bench.axis.stop(RELEASED)
+    bench.step(1 + round(STOP_S / CYCLE_S))
+    bench.obey()
+    assert bench.axis.halted == RELEASED
+    assert bench.axis.state is not State.OPERATION_ENABLED
+
+
+def test_a_pause_of_an_axis_that_does_not_come_to_rest_ends_in_a_quick_stop() -> None:
+    bench = Bench().enabled()
+    bench.play(list(range(500, 6500, 10)))
+    for _ in range(100):
+        bench.position += 10
+        bench.step()
+    bench.axis.pause()
+    for _ in range(2 + 3 * round(STOP_S / CYCLE_S)):
+        bench.position += 10
+        bench.step()
+    assert bench.axis.goal is State.QUICK_STOP_ACTIVE
+    assert bench.axis.outputs[0] == 0x02
+    assert bench.axis.halted is not None
+
+
+def test_a_pause_of_what_does_not_move_changes_nothing() -> None:
+    bench = Bench().enabled()
+    bench.axis.pause()
+    bench.obey()
+    assert bench.axis.state is State.OPERATION_ENABLED
+    assert bench.told == []
