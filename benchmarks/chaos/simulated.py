@@ -141,13 +141,16 @@ class Mix:
         over = asyncio.Event()
 
         async def look() -> None:
-            stood_s = 0.0
+            stood_s = wrong_s = 0.0
             while not over.is_set():
                 await asyncio.sleep(0.05)
                 stood_s = 0.0 if bench.shaft_rpm > 1.0 else stood_s + 0.05
                 told = bench.member.monitor.snapshot.turning
                 job = bench.bench.jobs.moving(bench.member.drive.id)
-                if told is not None and (stood_s > 1.0 or job is not None):
+                wrong = told is not None and (stood_s > 1.0 or job is not None)
+                wrong_s = wrong_s + 0.05 if wrong else 0.0
+                # What was read before a job began is shown until the next poll.
+                if told is not None and wrong_s > 0.3:
                     self.found(bench, f"told to turn at {told.speed:.0f}, without a reason")
                     return
 
