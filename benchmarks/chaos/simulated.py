@@ -206,6 +206,7 @@ def main() -> int:
         findings += len(mix.findings)
         for text in mix.findings:
             print(f"seed {seed}: {text}", flush=True)
+        print(f"seed {seed}: {mix.episodes} episodes", flush=True)
     print(f"{wanted.seeds} seeds, {episodes} episodes, {findings} findings")
     return 1 if findings else 0
 
