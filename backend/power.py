@@ -54,6 +54,7 @@ class PowerState:
         self.permits = 0
         #: A stop did not reach the drive; `repeat_stop` sends it again once the drive answers.
         self.owes_stop = False
+        self._repeating = asyncio.Lock()
         #: What STOP has done since it was pressed, and when that was (monotonic).
         self.stop_steps: list[StopStep] = []
         self._stop_began_s = time.monotonic()
@@ -396,13 +397,15 @@ class PowerState:
 
     async def repeat_stop(self) -> bool:
         """Send the stop that is owed; returns whether one was owed and is delivered now."""
-        if not self.owes_stop:
-            return False
-        try:
-            await self.quick_stop()
-        except DriveError:
-            return False
-        return True
+        # Monitor and the watch over STOP both repeat it; once is enough.
+        async with self._repeating:
+            if not self.owes_stop:
+                return False
+            try:
+                await self.quick_stop()
+            except DriveError:
+                return False
+            return True
 
     async def require_stop_delivered(self) -> None:
         """A stop that did not reach the drive comes before any new command.

@@ -68,15 +68,14 @@ class StopWatch:
     async def run(self, problem: str = "") -> AxisStop:
         """Until the verdict. ``problem`` says why the first word did not go out."""
         axis, self._began_s = self._axis, time.monotonic()
-        stood_at = axis.drive.readings.get(axis.drive.key("position_actual") or "")
+        before = self._resting_at()
         try:
             units = await units_of(axis)
             self._watch = SpeedWatch(axis, units)
             first = await self._watch.look()
         except DriveError as error:
             return await self._silent(problem or error.message)
-        if not problem and self._stood(first, stood_at.raw if stood_at else None,
-                                       stood_at.time if stood_at else None):  # fmt: skip
+        if not problem and before is not None and self._stood(first, *before):
             return self._verdict(Verdict.STOPPED)
         self._until_s = self._began_s + SHORTEST_S
         await self._know_ramp()
@@ -92,14 +91,26 @@ class StopWatch:
             except TimeoutError:
                 return
 
-    def _stood(self, sample: Sample, raw: object, at_epoch_s: float | None) -> bool:
-        """It stood before STOP, has no power, and stands: no need to look for longer."""
-        if sample.state in _POWERED or not isinstance(raw, int) or at_epoch_s is None:
-            return False
-        ago_s = time.time() - at_epoch_s
+    def _resting_at(self) -> tuple[int, float] | None:
+        """Position and age of what was read before STOP, of an axis that had no power then."""
+        drive = self._axis.drive
+        position, status = (
+            drive.readings.get(drive.key(role) or "") for role in ("position_actual", "status_word")
+        )
+        if position is None or status is None or position.time is None:
+            return None
+        if not isinstance(position.raw, int) or not isinstance(status.raw, int):
+            return None
+        ago_s = time.time() - position.time
         if not _BEFORE_S[0] <= ago_s <= _BEFORE_S[1]:
+            return None
+        return None if drive.decode_state(status.raw) in _POWERED else (position.raw, ago_s)
+
+    def _stood(self, sample: Sample, position: int, ago_s: float) -> bool:
+        """It had no power and stood before STOP, and does so now: no need to look for longer."""
+        if sample.state in _POWERED:
             return False
-        self._watch.take(Sample(sample.at_s - ago_s, sample.state, raw, sample.velocity))
+        self._watch.take(Sample(sample.at_s - ago_s, sample.state, position, sample.velocity))
         self._watch.take(sample)
         return self._watch.stands(0.0)
 

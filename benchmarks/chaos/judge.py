@@ -109,8 +109,9 @@ class Judge:
         return made
 
     def end_claims(self, *, axis: int | None = None, person: str | None = None,
-                   before: float | None = None, at: float | None = None) -> None:  # fmt: skip
-        """These have no force any more."""
+                   before: float | None = None, at: float | None = None,
+                   stands: bool = False) -> None:  # fmt: skip
+        """These have no force any more; ``stands``: nor have they time to brake."""
         at = time.monotonic() if at is None else at
         with self._lock:
             for claim in self.claims:
@@ -118,6 +119,8 @@ class Judge:
                     before is None or claim.began < before
                 ):  # fmt: skip
                     claim.end(at)
+                    if stands:
+                        claim.brake_s = 0.0
 
     def forget_claims(self) -> None:
         with self._lock:

@@ -289,7 +289,8 @@ class Person:
             return
         for number, drive in enumerate(self.drives):
             if drive in answer.json()["stopped"]:
-                self.judge.end_claims(axis=number, before=sent)
+                # STOP's answer is by the measured speed: it stands now.
+                self.judge.end_claims(axis=number, before=sent, stands=True)
 
     async def lease(self, axis: int) -> None:
         drive = self.drives[axis]

@@ -114,7 +114,10 @@ function Failed({
         <ul>
           {axis.steps.map((step, place) => (
             <li key={place}>
-              {step.at_s.toFixed(2)} s: {t(`stop.step.${step.code}`)}
+              {t('stop.stepAt', {
+                seconds: step.at_s.toFixed(2),
+                what: t(`stop.step.${step.code}`),
+              })}
               {step.parameter && <> ({step.parameter})</>}
               {!step.done && (
                 <>

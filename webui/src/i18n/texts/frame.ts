@@ -31,6 +31,7 @@ export const frame = {
   ],
   'stop.still_moving': ['{name} is still moving, {speed}!', '{name} 仍在运动，{speed}！'],
   'stop.keepAway': ['Keep away until it stands.', '静止之前请勿靠近。'],
+  'stop.stepAt': ['{seconds} s: {what}', '{seconds} 秒：{what}'],
   'stop.inVain': ['in vain:', '未成功：'],
   'stop.step.quick_stop': ['quick stop sent', '已发送快速停止'],
   'stop.step.halt': ['brakes by halt', '用暂停（halt）制动'],
