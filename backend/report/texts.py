@@ -148,8 +148,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "loop.verdict": (
         "{kind}: {verdict}. Measured from {low} to {high}: phase margin {pm}, gain margin {gm}, "
         "Ms {ms}, bandwidth {bw}. A figure that is missing lies outside of that band.",
-        "{kind}：{verdict}。测量频段 {low} 至 {high}：相位裕度 {pm}，增益裕度 {gm}，Ms {ms}，带宽 {bw}。"
-        "缺少的数值位于该频段之外。",
+        "{kind}：{verdict}。测量频段 {low} 至 {high}：相位裕度 {pm}，增益裕度 {gm}，"
+        "Ms {ms}，带宽 {bw}。缺少的数值位于该频段之外。",
     ),
     "loop.rule": (
         "Sound: phase margin 45° or more, gain margin 8 dB or more, Ms below 2. "

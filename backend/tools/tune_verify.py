@@ -328,9 +328,9 @@ def unseen(last_hz: float | None, verified: Verified) -> str:
         top = 0.0 if verdict.measured is None else verdict.measured.high_hz
         return (
             f"the loop may cross 0 dB up to {verdict.last_crossover_hz:.0f} Hz, above the "
-            f"{top:.0f} Hz that this cycle time shows: its margins there are predicted, and bounded by the "
-            f"loop being stable with {verdict.shown_gain_db:.1f} dB more gain; a shorter cycle "
-            "measures them"
+            f"{top:.0f} Hz that this cycle time shows: its margins there are predicted, and "
+            f"bounded by the loop being stable with {verdict.shown_gain_db:.1f} dB more gain; a "
+            "shorter cycle measures them"
         )
     frf = verified.sweep.frf
     lines = frf.frequency_hz[frf.in_band & (frf.coherence > COHERENT)]
