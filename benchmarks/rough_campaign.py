@@ -38,6 +38,8 @@ from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE
 
 _CI95 = 1.96
+#: An axis that takes longer is given up.
+_LONGEST_S = 150.0
 FAMILIES = ("mms7", "m6l", "r6l", "generic402")
 #: One class of behaviour each: how it is drawn.
 CLASSES: dict[str, dict[str, tuple[float, float] | bool | str]] = {
@@ -207,8 +209,12 @@ async def run(cases: list[Case], tune: float, until_s: float) -> dict[str, Tally
         work = tuned if tunes and case.drive != "generic402" else measured
         begun = time.process_time()
         try:
-            await work(case, tally)
+            # By the drive's clock, which `direct` makes the program's.
+            await asyncio.wait_for(work(case, tally), _LONGEST_S)
             word = "ok"
+        except TimeoutError:
+            word = f"refused: no answer within {_LONGEST_S:.0f} s of the drive's time"
+            tally.refused.append(f"{case.number} {case.drive}: {word}")
         except (DriveError, ValueError) as error:
             word = f"refused: {getattr(error, 'message', str(error))}"
             tally.refused.append(f"{case.number} {case.drive}: {word}")

@@ -92,7 +92,7 @@ _ORDINARY_HZ, _SLOW_HZ = (450.0, 1600.0), 300.0
 #: A torque that is the mechanics' leaves less delay (s) than this, and less of itself
 #: unexplained by hold, corner and delay (relative RMS; rounding to 0.1 % leaves 0.001 to 0.005 on
 #: the axes of `benchmarks.tune_accuracy`).
-_LEFT_BY_TORQUE_S, _TORQUE_LEFT = 60e-6, 0.02
+_LEFT_BY_TORQUE_S, _TORQUE_LEFT, _ROUNDED = 60e-6, 0.02, 0.005
 #: Lines whose phase is beyond ±90° by more than this, and their share, are not those of a passive
 #: axis; lines that take part.
 _PASSIVE_DEG, _PASSIVE_SHARE, _COHERENT, _FEW = 12.0, 0.1, 0.9, 12
@@ -229,11 +229,11 @@ def _suspect(task: _Task, trial: _Trial, corner_known: bool) -> bool:
     path, fit = trial.path, trial.fit
     corner = path.current_bandwidth_hz or USUAL_CURRENT_HZ
     odd = not corner_known and not _ORDINARY_HZ[0] < corner < _ORDINARY_HZ[1]
+    left = torque_left(task.records, path)
     late = abs(fit.delay_s) > _LEFT_BY_TORQUE_S
-    return (
-        odd or late or not at_whole_cycles(path) or _beyond_passive(trial)
-        or torque_left(task.records, path) > _TORQUE_LEFT
-    )  # fmt: skip
+    # Parts of a cycle are no reason where they explain the torque to its rounding.
+    parts = not at_whole_cycles(path) and left > _ROUNDED
+    return odd or late or parts or left > _TORQUE_LEFT or _beyond_passive(trial)
 
 
 def _beyond_passive(trial: _Trial) -> bool:
