@@ -114,6 +114,55 @@ def test_an_edited_profile_is_used_without_a_restart(station: Station) -> None:
     assert not profiles["mms7"]["own"]
 
 
+def test_a_person_classifies_an_object_of_an_imported_profile(station: Station) -> None:
+    extra = b"[2F01]\r\nParameterName=Gain\r\nDataType=0x0006\r\nAccessType=rw\r\n"
+    imported(station, makers_eds() + extra, "nova.eds", profile="classified")
+    drive = station.add(5, CAN, "classified", "C")
+    where = "/profiles/classified/parameters/2F01:00/motion"
+    try:
+        before = station.ok(station.http.get(where))
+        assert (before["motion"], before["origin"]) == ("energises", "unclassified")
+        assert before["changeable"]
+        wrong = {"motion": "energises", "safe_in_motion": True, "reason": "page 1"}
+        assert station.http.put(where, json=wrong).status_code == 422
+        assert station.http.put(where, json={"motion": "none"}).status_code == 422
+        body = {"motion": "at_enable", "safe_in_motion": True, "reason": "page 12"}
+        now = station.ok(station.http.put(where, json=body))
+        assert (now["motion"], now["origin"], now["reason"]) == ("at_enable", "person", "page 12")
+        told = station.ok(station.http.get("/audit"))["events"]
+        line = next(each for each in told if each["target"] == where)
+        assert (line["action"], line["kind"]) == ("changed", "station")
+        assert "energises" in str(line["old"])
+        assert "page 12" in str(line["new"])
+        # The drive on the bench has it at once.
+        bench = station.bench
+        assert bench is not None
+        assert bench.members[drive].drive.profile.by_key["2F01:00"].motion == "at_enable"
+        back = station.ok(station.http.delete(where))
+        assert (back["motion"], back["origin"]) == ("energises", "unclassified")
+        assert bench.members[drive].drive.profile.by_key["2F01:00"].motion == "energises"
+    finally:
+        station.remove(drive)
+
+
+@pytest.mark.parametrize(
+    ("profile", "key", "status"),
+    [
+        ("generic402", "6040:00", 409),
+        ("m6l", "2003:02", 409),
+        ("m6l", "9999:00", 404),
+        ("nobody", "6040:00", 404),
+    ],
+)
+def test_classes_of_manual_and_standard_are_nobodys_to_change(
+    station: Station, profile: str, key: str, status: int
+) -> None:
+    where = f"/profiles/{profile}/parameters/{key}/motion"
+    answer = station.http.put(where, json={"motion": "none", "reason": "I say so"})
+    assert answer.status_code == status, answer.text
+    assert station.http.delete(where).status_code == status
+
+
 def test_a_broken_own_profile_spoils_only_itself(station: Station) -> None:
     made = imported(station, makers_eds(), "nova.eds", profile="broken_one")
     path = Path(made["path"])

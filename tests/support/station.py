@@ -67,6 +67,8 @@ class Station:
             steady=steady,
         )  # fmt: skip
         self._server: uvicorn.Server | None = None
+        #: The running server's; made in its thread.
+        self.bench: Bench | None = None
         self._thread: threading.Thread | None = None
         self.http = httpx.Client()
         self.port = 0
@@ -84,6 +86,7 @@ class Station:
             async def main() -> None:
                 self.loop = asyncio.get_running_loop()
                 bench = Bench(self.folder / "state", self.drives.wires, **self._records)
+                self.bench = bench
                 config = uvicorn.Config(
                     make_app(bench, hosts=LOOPBACK, people=self.people),
                     log_level="warning",

@@ -49,6 +49,7 @@ def make_device(
     build = FAMILIES.get(profile.drive)
     if build is None and profile.from_description:
         _require_known_units(profile)
+        _require_whole_bytes(profile)
         build = FAMILIES["generic402"]
     if build is None:
         raise ValueError(f"no virtual {profile.drive!r}; there are: {', '.join(sorted(FAMILIES))}")
@@ -87,6 +88,16 @@ def _require_known_units(profile: Profile) -> None:
             raise ValueError(
                 f"no virtual {profile.drive!r}: its {quantity} are in {text!r}; a virtual drive "
                 "has increments and rpm, with or without a power of ten"
+            )
+
+
+def _require_whole_bytes(profile: Profile) -> None:
+    """Raises ValueError where process data hold single bits, which this firmware cannot map."""
+    for pdo in profile.pdo.sets if profile.pdo is not None else ():
+        if any(part.bits % 8 for part in pdo.layout):
+            raise ValueError(
+                f"no virtual {profile.drive!r}: its PDO {pdo.index:04X}h holds single bits, which "
+                "a virtual drive does not map"
             )
 
 

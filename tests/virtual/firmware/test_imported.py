@@ -9,7 +9,7 @@ import pytest
 from drivers.virtual.firmware import make_device
 from drivers.virtual.firmware.servo import VirtualServo
 from profiles.importer import import_file
-from profiles.schema import Profile
+from profiles.schema import PdoPart, PdoSet, PdoSpec, Profile
 
 from .servo_bench import Bench, rigid
 
@@ -85,3 +85,16 @@ def test_units_that_the_firmware_has_not_are_refused() -> None:
         make_device(profile(x60A9=0x00410300))
     with pytest.raises(ValueError, match="60A9h = 00AC4700h"):
         make_device(profile(x60A9=0x00AC4700))
+
+
+def test_single_bits_in_process_data_are_refused() -> None:
+    known = profile()
+    one = PdoSet(
+        index=0x1A00, direction="tx", entries=("6041:00",), fixed=True, source="drive.xml",
+        layout=(PdoPart(key="6041:00", bits=16), PdoPart(bits=1), PdoPart(bits=7)),
+    )  # fmt: skip
+    spec = PdoSpec(
+        sets=(one,), default_rx=0x1600, default_tx=0x1A00, max_entries=8, source="drive.xml"
+    )
+    with pytest.raises(ValueError, match="1A00h holds single bits"):
+        make_device(known.model_copy(update={"pdo": spec}))

@@ -24,7 +24,7 @@ from drivers.virtual.device import (
     SdoAbort,
 )
 from drivers.virtual.wires.ethercat.registers import AlState
-from profiles.schema import DataType, Parameter
+from profiles.schema import DataType, Parameter, PdoPart
 
 ABORT_COUNT_NOT_ZERO = 0x06010003
 """Subindex cannot be written, subindex 0 must be 0 for it (ETG.1000.6 table 40)."""
@@ -112,7 +112,9 @@ class CoeDictionary:
         pdo = device.profile.pdo
         objects = {0x1C00: NetworkObject(device, 0x1C00, _SM_TYPES, "UINT8", (1, 2, 3, 4))}
         for pdo_set in pdo.sets if pdo else ():
-            words = [self.mapping_word(key) for key in pdo_set.entries]
+            words = [self._part_word(part) for part in pdo_set.layout] or [
+                self.mapping_word(key) for key in pdo_set.entries
+            ]
             words += [0] * ((pdo.max_entries if pdo else 0) - len(words))
             name = ("RxPDO" if pdo_set.direction == "rx" else "TxPDO") + " mapping"
             objects[pdo_set.index] = NetworkObject(device, pdo_set.index, name, "UINT32", words)
@@ -129,6 +131,10 @@ class CoeDictionary:
         """Profile key to the 32-bit mapping entry."""
         index, subindex = int(key[:4], 16), int(key[5:], 16)
         return index << 16 | subindex << 8 | self._device.entry(index, subindex).bit_length
+
+    def _part_word(self, part: PdoPart) -> int:
+        """Mapping entry of a stretch; padding has index 0 (ETG.2000 clause 6.10)."""
+        return part.bits if part.key is None else self.mapping_word(part.key) & ~0xFF | part.bits
 
     def mapping(self, pdo_index: int) -> tuple[int, ...]:
         """Active entries of one mapping object."""
