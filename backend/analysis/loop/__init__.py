@@ -1,0 +1,1 @@
+"""Closed loops: structure, margins, gain and notch design."""

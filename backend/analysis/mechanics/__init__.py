@@ -1,0 +1,1 @@
+"""Models of mechanics, inertia and friction, and their fits."""

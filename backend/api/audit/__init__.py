@@ -1,0 +1,1 @@
+"""Search, export and check of the audit; the record of every change."""

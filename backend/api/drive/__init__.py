@@ -1,0 +1,1 @@
+"""One drive: state, parameters, motion, functions, terminals, pending restores."""

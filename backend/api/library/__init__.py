@@ -1,0 +1,1 @@
+"""The library: search, versions, tags, contents."""

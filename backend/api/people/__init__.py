@@ -1,0 +1,1 @@
+"""Accounts, sessions, and people who are here."""

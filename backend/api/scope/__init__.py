@@ -1,0 +1,1 @@
+"""Scope set-ups, recordings, rerun and the 3D scene."""

@@ -1,0 +1,1 @@
+"""Buses, interfaces, scan, connected drives, jobs, log, STOP, EtherCAT segments, descriptions."""

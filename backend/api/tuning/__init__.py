@@ -1,0 +1,1 @@
+"""Measurements, notches, gains, design and the automatic tuning."""

@@ -1,0 +1,1 @@
+"""One drive: identity, ports, readings, writes, faults, terminals, and what waits to be restored."""

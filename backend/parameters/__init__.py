@@ -1,0 +1,1 @@
+"""Parameter sets as files, and as lists of other tools."""

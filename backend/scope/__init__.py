@@ -1,0 +1,1 @@
+"""Scope: delivery of samples, units of traces, stored set-ups and snapshots."""

@@ -1,0 +1,1 @@
+"""One running server: buses, connected drives, exchanges, records."""

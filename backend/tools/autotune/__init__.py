@@ -1,0 +1,1 @@
+"""From an unknown axis to a tuned and verified one."""

@@ -1,0 +1,1 @@
+"""Inertia and friction from moves made by the host."""

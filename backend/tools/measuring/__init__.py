@@ -1,0 +1,1 @@
+"""What measuring tools share: waveforms, recording, alignment, repeats."""

@@ -1,0 +1,1 @@
+"""Moves in profile modes, homing, the drive's own procedures and identification."""

@@ -1,0 +1,1 @@
+"""Notches of a drive: read, write, and measure what their values do."""

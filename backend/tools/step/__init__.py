@@ -1,0 +1,1 @@
+"""Step and move responses with their figures."""

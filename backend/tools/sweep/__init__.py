@@ -1,0 +1,1 @@
+"""Frequency response of an axis: plan, excitation, evaluation."""

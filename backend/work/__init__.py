@@ -1,0 +1,1 @@
+"""Jobs, the station's log, and a clock that only goes forward."""

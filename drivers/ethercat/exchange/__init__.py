@@ -1,0 +1,1 @@
+"""Process data: mapping, preparation, the cyclic exchange, samples, recovery."""
