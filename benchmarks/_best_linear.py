@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from backend.analysis.excitation import BaseMotion, Excitation, multisine, scaled
+from backend.analysis.signals.excitation import BaseMotion, Excitation, multisine, scaled
 from drivers.virtual.mechanics import MechanicsSpec
 
 _FloatArray = npt.NDArray[np.float64]

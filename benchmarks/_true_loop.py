@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.loop_goals import Worst, worst_of
+from backend.analysis.loop.loop_goals import Worst, worst_of
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import analytic_response
 

@@ -27,8 +27,8 @@ from random_axes import (  # noqa: E402
     result_of,
 )
 
-from backend.analysis.frf import Frf  # noqa: E402
-from backend.tools.sweep_evaluation import SweepResult  # noqa: E402
+from backend.analysis.response.frf import Frf  # noqa: E402
+from backend.tools.sweep.evaluation import SweepResult  # noqa: E402
 
 #: Fewer coherent lines than this say nothing of a band.
 _FEW = 6

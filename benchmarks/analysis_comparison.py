@@ -25,14 +25,14 @@ from drive_sim import Mechanics, simulate  # noqa: E402
 from measured_axes import NAMED, Measurement, measure, tuned_drive  # noqa: E402
 from scipy.signal import csd, find_peaks, welch  # noqa: E402
 
-from backend.analysis.arrays import ComplexArray, FloatArray  # noqa: E402
-from backend.analysis.chirp import chirp  # noqa: E402
-from backend.analysis.excitation import scaled  # noqa: E402
-from backend.analysis.frf_stepped import estimate_stepped  # noqa: E402
-from backend.analysis.identify import Identification, identify_mechanics  # noqa: E402
-from backend.analysis.line_spectra import Record  # noqa: E402
-from backend.analysis.sampling import SignalPath  # noqa: E402
-from backend.analysis.stepped_sine import stepped_sine  # noqa: E402
+from backend.analysis.mechanics.identify import Identification, identify_mechanics  # noqa: E402
+from backend.analysis.response.frf_stepped import estimate_stepped  # noqa: E402
+from backend.analysis.response.sampling import SignalPath  # noqa: E402
+from backend.analysis.signals.arrays import ComplexArray, FloatArray  # noqa: E402
+from backend.analysis.signals.chirp import chirp  # noqa: E402
+from backend.analysis.signals.excitation import scaled  # noqa: E402
+from backend.analysis.signals.line_spectra import Record  # noqa: E402
+from backend.analysis.signals.stepped_sine import stepped_sine  # noqa: E402
 
 _Answer = TypeVar("_Answer")
 

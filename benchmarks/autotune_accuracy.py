@@ -6,18 +6,18 @@ import time
 
 import numpy as np
 
-from backend.analysis.design import Candidate
-from backend.analysis.measured_plant import measured_plant
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools.autotune import AutotuneResult, AutotuneSettings, autotune
-from backend.tools.axis_facts import read_facts
-from backend.tools.inertia_evaluation import Scheme
-from backend.tools.recording import cycle_s
-from backend.tools.sweep_evaluation import completed
-from backend.tools.temporary import put_back
-from backend.tools.tune_candidates import candidates_for
+from backend.analysis.loop.design import Candidate
+from backend.analysis.loop.measured_plant import measured_plant
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.autotune.candidates import candidates_for
+from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
+from backend.tools.inertia.evaluation import Scheme
+from backend.tools.measuring.recording import cycle_s
+from backend.tools.measuring.temporary import put_back
+from backend.tools.sweep.evaluation import completed
+from backend.work.jobs import Progress
 from benchmarks._tune_figures import marked, true_modes
 from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.rig import WIDE

@@ -38,7 +38,7 @@ from profiles.schema import DataType
 _BARE = textwrap.dedent(
     """
     import ctypes, gc, json, os, sys, time, pysoem
-    from drivers.ethercat.cyclic import percentile_us
+    from drivers.ethercat.exchange.cyclic import percentile_us
     rate, seconds = int(sys.argv[1]), float(sys.argv[2])
     ctypes.CDLL(None).prctl(29, 1, 0, 0, 0)
     try:
@@ -158,7 +158,7 @@ async def ours(
 
 
 def _percentile(late: list[int], fraction: float) -> int:
-    from drivers.ethercat.cyclic import percentile_us
+    from drivers.ethercat.exchange.cyclic import percentile_us
 
     return percentile_us(late, fraction)
 

@@ -20,8 +20,8 @@ from multiprocessing.synchronize import Event
 
 from pymodbus.client import ModbusSerialClient
 
-from backend.drive import Drive
-from backend.ports import Port
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
 from drivers.modbus.link import modbus_link
 from drivers.modbus.registers import words_of
 from drivers.urls import line_settings, parse_url

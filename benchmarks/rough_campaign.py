@@ -23,12 +23,12 @@ from typing import Any
 
 import numpy as np
 
-from backend.jobs import Progress
-from backend.tools.autotune import AutotuneResult, AutotuneSettings, autotune
-from backend.tools.inertia import inertia
-from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepResult, SweepSettings
+from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
+from backend.tools.inertia.evaluation import InertiaSettings
+from backend.tools.inertia.run import inertia
+from backend.tools.sweep.evaluation import SweepResult, SweepSettings
+from backend.tools.sweep.run import sweep
+from backend.work.jobs import Progress
 from benchmarks._true_loop import true_margins
 from benchmarks._tune_figures import true_modes
 from benchmarks.tune_accuracy import drawn

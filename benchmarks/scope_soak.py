@@ -36,8 +36,8 @@ import numpy as np
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from backend.commands.serve import settle
-from backend.demo import DemoBench
 from backend.recording.reader import RecordingReader
+from backend.station.demo import DemoBench
 from benchmarks._aims import Aim, print_verdict
 from tests.support.station import Station
 
@@ -156,7 +156,8 @@ def fieldbus(server: int) -> dict[str, int]:
     while more := {pid for pid, parent in parents.items() if parent in beneath} - beneath:
         beneath |= more
     modules = {
-        "virtual segment": b"drivers.virtual.wires.ethercat", "host": b"drivers.ethercat.host",
+        "virtual segment": b"drivers.virtual.wires.ethercat",
+        "host": b"drivers.ethercat.process.host",
     }  # fmt: skip
     return {
         part: pid

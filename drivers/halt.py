@@ -131,6 +131,6 @@ class LoopState(NamedTuple):
     state: str
     """CiA 402 power state, a value of `drivers.cia402.State`."""
     phase: str
-    """What the setpoints do, a value of `drivers.ethercat.motion.Phase`."""
+    """What the setpoints do, a value of `drivers.motion.setpoint_plan.Phase`."""
     halted: Halted | None
     """Why the last motion was ended by force; None while none was."""

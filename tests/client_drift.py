@@ -16,9 +16,12 @@ from pathlib import Path
 
 from pydantic.json_schema import models_json_schema
 
-from backend.api import live_messages, live_people_messages, models_bench, models_description
 from backend.api.app import make_app
-from backend.bench import Bench
+from backend.api.live import messages as live_messages
+from backend.api.live import people_messages as live_people_messages
+from backend.api.station import models as models_bench
+from backend.api.station import models_description
+from backend.station.bench import Bench
 
 ROOT = Path(__file__).resolve().parents[1]
 DESCRIPTION = ROOT / "webui" / "openapi.json"

@@ -13,45 +13,43 @@ from fastapi.responses import FileResponse
 from fastapi.routing import APIRoute
 
 import backend
-from backend.api import (
-    errors,
-    routes_accounts,
-    routes_audit,
-    routes_bench,
-    routes_description,
-    routes_drive,
-    routes_ethercat,
-    routes_functions,
-    routes_io,
-    routes_library,
-    routes_lists,
-    routes_motion_class,
-    routes_owed,
-    routes_recordings,
-    routes_rerun,
-    routes_scales,
-    routes_scene,
-    routes_scope,
-    routes_session,
-    routes_sets,
-    routes_support,
-    routes_tune,
-)
-from backend.api.audited import AuditedAnswers
+from backend.api import errors
+from backend.api.audit import routes as routes_audit
+from backend.api.audit.audited import AuditedAnswers
 from backend.api.described import DescribedApp
+from backend.api.drive import functions as routes_functions
+from backend.api.drive import motion_class as routes_motion_class
+from backend.api.drive import restore as routes_owed
+from backend.api.drive import routes as routes_drive
+from backend.api.drive import scales as routes_scales
+from backend.api.drive import terminals as routes_io
 from backend.api.errors import NotFound
-from backend.api.live import LiveHub
+from backend.api.library import routes as routes_library
+from backend.api.live.live import LiveHub
 from backend.api.models import Problem
-from backend.api.security import Gate
-from backend.api.security_origin import Addresses
-from backend.api.security_socket import OpenSockets
-from backend.bench import Bench
-from backend.forcing import ForcingSessions
+from backend.api.people import accounts as routes_accounts
+from backend.api.people import session as routes_session
+from backend.api.people import support as routes_support
+from backend.api.scope import recordings as routes_recordings
+from backend.api.scope import rerun as routes_rerun
+from backend.api.scope import routes as routes_scope
+from backend.api.scope import scene as routes_scene
+from backend.api.security.gate import Gate
+from backend.api.security.origin import Addresses
+from backend.api.security.socket import OpenSockets
+from backend.api.sets import lists as routes_lists
+from backend.api.sets import routes as routes_sets
+from backend.api.station import description as routes_description
+from backend.api.station import ethercat as routes_ethercat
+from backend.api.station import routes as routes_bench
+from backend.api.tuning import measure as routes_tune
+from backend.functions.forcing import ForcingSessions
 from backend.people.station import People
 from backend.recording.rerun_assets import ViewerAssets
 from backend.recording.rerun_feed import RerunFeed
 from backend.recording.service import Recordings
 from backend.scene.feed import SceneFeed
+from backend.station.bench import Bench
 from drivers import scheduling
 
 PREFIX = "/api/v1"

@@ -11,11 +11,11 @@ from typing import Annotated
 from fastapi import Depends, Header, Request
 
 from backend.api.errors import NotFound
-from backend.bench import Bench
-from backend.member import Member
 from backend.people.errors import NotLoggedIn
 from backend.people.identity import Identity, acting
 from backend.people.station import People
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
 from drivers.errors import NotAllowed
 
 #: Sent by the page with every change: the id of its live connection, which may hold a lease. The
@@ -75,5 +75,5 @@ TheMember = Annotated[Member, Depends(member_of)]
 
 
 #: The drive that a path names, for a route that changes it. The gate has made sure that nobody
-#: else has control (backend.api.rights).
+#: else has control (backend.api.security.rights).
 Controlled = TheMember

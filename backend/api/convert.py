@@ -4,22 +4,25 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-from backend.api import models, models_axis, models_bench, models_parameters, models_sets
-from backend.api.convert_stop import turning
+from backend.api import models
+from backend.api.drive import models_axis, models_parameters
+from backend.api.drive.convert_stop import turning
 from backend.api.errors import problem_of
-from backend.bench import Bench
-from backend.drive import Drive
-from backend.elapsed import moment_of
-from backend.jobs import Job
-from backend.journal import Entry
-from backend.matching import match_profiles
-from backend.member import Member
-from backend.monitor import Snapshot
+from backend.api.sets import models as models_sets
+from backend.api.station import models as models_bench
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
 from backend.motion.classes import motion_of
 from backend.motion.doors import door_of
-from backend.parameter_set import Difference
-from backend.readings import Reading
-from backend.tools.procedures import describe
+from backend.parameters.set_file import Difference
+from backend.people.elapsed import moment_of
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.station.matching import match_profiles
+from backend.station.monitor import Snapshot
+from backend.tools.moves.procedures import describe
+from backend.work.jobs import Job
+from backend.work.journal import Entry
 from drivers import cia402
 from drivers.cia402 import Mode
 from drivers.link import Found, Link, LinkQuality

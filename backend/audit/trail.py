@@ -15,9 +15,9 @@ from sqlalchemy.orm import Session
 
 from backend.audit.chain import Anchor, Verdict, verify
 from backend.audit.facts import Kind, Value, stamp
-from backend.spreadsheet import as_text
 from backend.store.audit_tables import AuditEntry, AuditHead
 from backend.store.database import Store
+from backend.store.spreadsheet import as_text
 
 Format = Literal["csv", "jsonl"]
 _CHUNK = 500

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from backend.access import Holder
 from backend.audit.asked import settings_now
 from backend.audit.facts import Fact, Kind, Value
 from backend.audit.log import AuditLog
-from backend.jobs import Job
-from backend.readings import CommandRecord, Refusal, WriteRecord
+from backend.drive.readings import CommandRecord, Refusal, WriteRecord
+from backend.people.lease import Holder
+from backend.work.jobs import Job
 
 #: Jobs that only read what the pages show anyway.
 _UNREMARKABLE = frozenset({"reread", "read_all"})

@@ -12,17 +12,17 @@ import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 
-from backend import restoring
-from backend.cyclic import CyclicSession
-from backend.drive import Drive
+from backend.axis import restoring
+from backend.axis.cyclic import CyclicSession
+from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.axis.scaled import ScaledAxis
+from backend.drive.drive import Drive
+from backend.drive.optional import existing, torque_limits
 from backend.motion.authority import UNATTENDED_S
 from backend.motion.envelope import Envelope
 from backend.motion.grant import Grant
-from backend.optional import existing, torque_limits
 from backend.people.identity import acting
-from backend.quick_stop import quick_stop_keys, raise_quick_stop
-from backend.restoring import CLEANUP_TIMEOUT_S, shielded
-from backend.scales.of_axis import ScaledAxis
+from backend.stopping.quick_stop import quick_stop_keys, raise_quick_stop
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError

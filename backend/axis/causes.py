@@ -6,9 +6,9 @@ of state was refused, when a person looks for the reason.
 
 from __future__ import annotations
 
-from backend.drive import Drive
-from backend.faults import integer
-from backend.io_functions import read_terminals
+from backend.drive.drive import Drive
+from backend.drive.faults import integer
+from backend.drive.terminals import read_terminals
 from drivers.errors import DriveError
 
 #: Words in the names of input functions that stop an axis (tables of the manuals' DI functions).

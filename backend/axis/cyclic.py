@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.drive import Drive
-from backend.ports import Port, address_of
+from backend.drive.drive import Drive
+from backend.drive.ports import Port, address_of
 from drivers.errors import Busy, DriveError, NotAllowed
 from drivers.link import (
     Cyclic,

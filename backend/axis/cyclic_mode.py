@@ -11,12 +11,12 @@ import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.drive import Drive
-from backend.drive_identity import confirm_identity
-from backend.motion import loop
-from backend.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
+from backend.axis import loop
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.axis.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
+from backend.drive.drive import Drive
+from backend.drive.identity import confirm_identity
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
 

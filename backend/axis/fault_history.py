@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.faults import integer
-from backend.functions import functions_of
-from backend.readings import Reading
+from backend.axis.axis import Axis
+from backend.drive.catalog import functions_of
+from backend.drive.drive import Drive
+from backend.drive.faults import integer
+from backend.drive.readings import Reading
 from drivers.errors import NotAllowed
 from profiles.functions import FaultHistory, HistorySlot
 from profiles.schema import Fault

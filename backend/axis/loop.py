@@ -10,8 +10,8 @@ from drivers.errors import NotAllowed
 from drivers.link import OwnsPowerState, Trajectory
 
 if TYPE_CHECKING:
-    from backend.cyclic import CyclicSession
-    from backend.drive import Drive
+    from backend.axis.cyclic import CyclicSession
+    from backend.drive.drive import Drive
 
 
 async def drive_to(

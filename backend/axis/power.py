@@ -8,17 +8,17 @@ import time
 from contextlib import AbstractContextManager
 from functools import partial
 
-from backend.causes import hints
-from backend.cyclic import CyclicSession
-from backend.drive import Drive
-from backend.faults import read_active_faults
-from backend.motion import loop
+from backend.axis import loop
+from backend.axis.causes import hints
+from backend.axis.cyclic import CyclicSession
+from backend.axis.restoring import shielded
+from backend.drive.drive import Drive
+from backend.drive.faults import read_active_faults
+from backend.drive.ports import address_of
 from backend.motion.authority import Ended
 from backend.motion.envelope import Envelope
 from backend.motion.grant import Grant
 from backend.motion.stopping import stops
-from backend.ports import address_of
-from backend.restoring import shielded
 from backend.stopping.braking import brake_then_quick_stop, quick_stop_coasts
 from backend.stopping.facts import StepCode, StopStep
 from backend.stopping.settings import settings_keys

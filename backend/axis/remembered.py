@@ -10,9 +10,9 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from backend.files import write_atomically
-from backend.mechanics_calc import Mechanics
+from backend.functions.gear_calculator import Mechanics
 from backend.scales.taught import Taught
+from backend.store.files import write_atomically
 
 
 class AxisRecord(BaseModel):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from backend.drive import Drive
-from backend.power import PowerState
-from backend.readings import Reading
+from backend.axis.power import PowerState
+from backend.axis.units import AxisUnits, read_units
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
 from backend.scales.taught import Taught
-from backend.units import AxisUnits, read_units
 from profiles.schema import Raw
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from backend.drive import Drive
-from backend.optional import existing
+from backend.drive.drive import Drive
+from backend.drive.optional import existing
 from backend.scales.resolve import by_text, origin_of, read_told, scales_of
 from backend.scales.scale import Doubt, Origin, Quantity, Scale, Scales, ScaleUnknown
 from backend.scales.taught import Taught

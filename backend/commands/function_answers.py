@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from backend.api.models_axis import ActiveFault
-from backend.mechanics_calc import GearPlan
+from backend.api.drive.models_axis import ActiveFault
+from backend.functions.gear_calculator import GearPlan
 from profiles.schema import Raw
 
 

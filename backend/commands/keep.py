@@ -12,19 +12,19 @@ from typing import Annotated, Literal
 
 import typer
 
-from backend import parameter_set
 from backend.audit.chain import Anchor
 from backend.audit.export_check import check_lines
 from backend.audit.trail import Filter
 from backend.commands.options import Json
 from backend.commands.session import told
 from backend.commands.state import state_folder
-from backend.journal import Journal
 from backend.library.entries import KINDS, Kind, Query
+from backend.parameters import set_file as parameter_set
 from backend.people.identity import LOCAL, Actor, acting
-from backend.records import Records
+from backend.station.records import Records
 from backend.store.backup import make_backup
 from backend.store.restore import restore as restore_archive
+from backend.work.journal import Journal
 from drivers.errors import NotAllowed
 
 audit = typer.Typer(help="Check and export the audit trail.", no_args_is_help=True)

@@ -22,7 +22,7 @@ from pydantic import TypeAdapter, ValidationError
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 
-from backend.api.live_messages import Hello, JogEnded, Refused, ScopeInfo
+from backend.api.live.messages import Hello, JogEnded, Refused, ScopeInfo
 from backend.commands.options import Profile, Server, Station, Url, server_for
 from backend.commands.remote import authorisation, remote
 from backend.commands.samples import Samples, decode

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from backend import gear as gears
-from backend.api.models_axis import ActiveFault
-from backend.axis import Axis
+from backend.api.drive.models_axis import ActiveFault
+from backend.axis.axis import Axis
+from backend.axis.fault_history import history_of, read_history
 from backend.commands.function_answers import Faults, Gear, Past, Terminal, of_plan
 from backend.commands.options import Place
 from backend.commands.session import drive_at
-from backend.fault_history import history_of, read_history
-from backend.faults import read_active_faults
-from backend.io_functions import read_terminals
-from backend.mechanics_calc import Mechanics
+from backend.drive.faults import read_active_faults
+from backend.drive.terminals import read_terminals
+from backend.functions import gear as gears
+from backend.functions.gear_calculator import Mechanics
 
 
 async def terminals(place: Place) -> list[Terminal]:

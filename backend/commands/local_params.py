@@ -6,21 +6,22 @@ import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend import parameter_set
-from backend.axis import Axis
+from backend.axis.axis import Axis
 from backend.commands import values
 from backend.commands.options import Place
 from backend.commands.restoring import require_own_values, show_restored, stop_what_was_moved
 from backend.commands.session import drive_and_pending, drive_at, progress, show_progress
 from backend.commands.values import Compared
-from backend.drive import Drive
-from backend.files import write_atomically
+from backend.drive.drive import Drive
 from backend.library import SetLibrary
 from backend.motion.classes import motion_of
 from backend.motion.doors import refused
-from backend.parameter_set import ParameterSet
-from backend.tools import parameters, procedures
-from backend.tools.settling import settle
+from backend.parameters import set_file as parameter_set
+from backend.parameters.set_file import ParameterSet
+from backend.store.files import write_atomically
+from backend.tools import parameters
+from backend.tools.measuring.restore import settle
+from backend.tools.moves import procedures
 from drivers.errors import NotAllowed
 from profiles.schema import Raw
 

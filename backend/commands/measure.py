@@ -11,13 +11,13 @@ from typing import Annotated
 
 import typer
 
-from backend.api.models_bench import DriveSummary
-from backend.axis import Axis, Envelope
+from backend.api.station.models import DriveSummary
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
 from backend.commands.remote import Remote, remote
 from backend.commands.restoring import restore_first
 from backend.commands.session import drive_and_pending, progress, run_in_order
-from backend.cyclic import CyclicSession
-from backend.files import write_atomically
+from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 
 Url = Annotated[str | None, typer.Argument(metavar="[BUS_URL]")]
@@ -109,8 +109,8 @@ def sweep(
 
     async def here() -> dict[str, object]:
         # The analysis takes seconds to import; no other command shall wait for it.
-        from backend.tools import sweep as sweep_tool
-        from backend.tools import sweep_evaluation
+        from backend.tools.sweep import evaluation as sweep_evaluation
+        from backend.tools.sweep import run as sweep_tool
 
         settings = sweep_evaluation.SweepSettings(
             Envelope(travel_rev, speed_rpm, torque_percent, 60.0), kind.value, loop.value,
@@ -157,8 +157,8 @@ def inertia(
     }  # fmt: skip
 
     async def here() -> dict[str, object]:
-        from backend.tools import inertia_evaluation
-        from backend.tools.inertia import inertia as measure_inertia
+        from backend.tools.inertia import evaluation as inertia_evaluation
+        from backend.tools.inertia.run import inertia as measure_inertia
 
         settings = inertia_evaluation.InertiaSettings(
             Envelope(travel_rev, speed_rpm, torque_percent, 60.0), scheme.value, ends,
@@ -183,7 +183,7 @@ async def exchanging(
 ) -> AsyncIterator[tuple[Axis, CyclicSession]]:  # fmt: skip
     """The drive with its bus exchanging process data, all of it ended afterwards."""
     from backend.commands.scales import take_taught
-    from backend.tools import profile_speed
+    from backend.tools.sweep import profile_speed
 
     if url is None:
         raise NotAllowed("give a bus URL, or --server and --axis", remedy="see --help")

@@ -13,9 +13,9 @@ from backend.commands import local_params, remote_params
 from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
 from backend.commands.session import run
 from backend.commands.values import bytes_of
-from backend.files import write_atomically
-from backend.parameter_list import export_list, import_list
-from backend.parameter_set import SUFFIX, parse
+from backend.parameters.lists import export_list, import_list
+from backend.parameters.set_file import SUFFIX, parse
+from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 from profiles import load_profile
 

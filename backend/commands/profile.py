@@ -17,8 +17,8 @@ from backend.audit import Fact
 from backend.audit.facts import Value
 from backend.commands.keep import station_records
 from backend.commands.session import opened, show_progress, told
-from backend.description import profile_of_drive
-from backend.files import write_atomically
+from backend.station.description import profile_of_drive
+from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 from profiles import drive_names, load_profile
 from profiles.check import check as check_profile

@@ -17,7 +17,7 @@ import httpx
 from pydantic import TypeAdapter, ValidationError
 
 from backend.api.models import JobInfo, Problem
-from backend.api.models_bench import Bus, DriveSummary, FoundDrive
+from backend.api.station.models import Bus, DriveSummary, FoundDrive
 from backend.commands.session import show_progress
 from drivers.errors import DriveError, LinkLost, NotAllowed, ProtocolError
 from drivers.urls import parse_url

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from backend.api.models_axis import ActiveFault
-from backend.api.models_functions import FaultHistoryInfo, GearPlanInfo, GearWritten, IoInfo
+from backend.api.drive.models_axis import ActiveFault
+from backend.api.drive.models_functions import FaultHistoryInfo, GearPlanInfo, GearWritten, IoInfo
 from backend.commands.function_answers import Faults, Gear, Past, Terminal
 from backend.commands.options import Place
 from backend.commands.remote_params import remote_drive
-from backend.mechanics_calc import Mechanics
+from backend.functions.gear_calculator import Mechanics
 
 
 async def terminals(place: Place) -> list[Terminal]:

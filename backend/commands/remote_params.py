@@ -9,17 +9,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import quote
 
-from backend.api.models_bench import DriveSummary, FoundDrive
-from backend.api.models_library import StoredSet
-from backend.api.models_parameters import ParameterRow, ParameterValue
-from backend.api.models_sets import Diff
+from backend.api.drive.models_parameters import ParameterRow, ParameterValue
+from backend.api.library.models import StoredSet
+from backend.api.sets.models import Diff
+from backend.api.station.models import DriveSummary, FoundDrive
 from backend.commands import values
 from backend.commands.options import Place
 from backend.commands.remote import Remote, remote
 from backend.commands.restoring import show_restored
 from backend.commands.values import Compared
-from backend.files import write_atomically
-from backend.parameter_set import parse
+from backend.parameters.set_file import parse
+from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 
 

@@ -12,14 +12,14 @@ import httpx
 import typer
 
 from backend.commands.session import run
-from backend.files import write_atomically
-from backend.measurements import SUFFIX, BadMeasurement, Head, MeasurementStore, unpack
+from backend.library.measurements import SUFFIX, BadMeasurement, Head, MeasurementStore, unpack
 from backend.report.gather import About, choose, facts_of_files, measured_from
 from backend.report.store import FORMATS, Format, render
+from backend.store.files import write_atomically
 from drivers.errors import DriveError, LinkLost, NotAllowed
 
 if TYPE_CHECKING:
-    from backend.evaluation import Evaluation
+    from backend.station.evaluation import Evaluation
 
 Files = Annotated[list[Path] | None, typer.Argument(metavar="[FILE.sdmeas]...")]
 Out = Annotated[Path, typer.Option(help="report to write; .html or .pdf")]
@@ -129,7 +129,7 @@ def recompute(
                                  remedy="check the name and the rights") from error  # fmt: skip
         found = unpack(data, file.name)
         # The analysis takes seconds to import; no other command shall wait for it.
-        from backend.evaluation import evaluate
+        from backend.station.evaluation import evaluate
 
         made = evaluate(found)
         head = found.head

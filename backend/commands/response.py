@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from backend.commands.session import reported
-from backend.files import write_atomically
+from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 
 app = typer.Typer(help="Frequency responses from recordings of other programs. Nothing moves.",

@@ -6,14 +6,14 @@ import sys
 from collections.abc import Mapping
 from datetime import datetime
 
-from backend.axis import Axis
+from backend.axis.axis import Axis
 from backend.commands.state import state_folder
-from backend.drive import Drive
-from backend.files import StorageFailed
+from backend.drive.drive import Drive
 from backend.restore.identity import identity_of
 from backend.restore.keep import keep_list
 from backend.restore.store import Pending, RestoreStore
-from backend.tools.settling import settle
+from backend.store.files import StorageFailed
+from backend.tools.measuring.restore import settle
 from drivers.errors import Busy, NotAllowed
 
 

@@ -1,4 +1,4 @@
-"""Scope blocks of the live connection, taken apart; `backend.api.live_messages` has the form."""
+"""Scope blocks of the live connection, taken apart; `backend.api.live.messages` has the form."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.api.scope_blocks import BASES, HEADER, MAGIC, TRUE_TIMES
+from backend.api.live.scope_blocks import BASES, HEADER, MAGIC, TRUE_TIMES
 from drivers.errors import ProtocolError
 
 

@@ -12,18 +12,18 @@ from typing import Annotated
 import typer
 from pydantic import ValidationError
 
-from backend.api.models_scales import ScalesInfo
-from backend.axis import Axis
+from backend.api.drive.models_scales import ScalesInfo
+from backend.axis.axis import Axis
 from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
 from backend.commands.remote_params import remote_drive
 from backend.commands.session import drive_at, progress, run, run_in_order
 from backend.commands.state import state_folder
-from backend.drive import Drive
-from backend.drive_identity import read_serial
-from backend.files import write_atomically
+from backend.drive.drive import Drive
+from backend.drive.identity import read_serial
 from backend.scales import teaching
 from backend.scales.scale import Scale, what_to_do
 from backend.scales.taught import Taught
+from backend.store.files import write_atomically
 
 app = typer.Typer(
     help="What a raw position and speed mean: show, state, or teach by a small move (moves).",
@@ -179,8 +179,8 @@ async def _teach_there(where: Place, increments: int, torque: float, cycle_ms: f
 async def _teach_here(
     where: Place, increments: int, torque: float, cycle_ms: float, state: Path | None
 ) -> None:
-    from backend.cyclic import CyclicSession
-    from backend.tools.small_move import SmallMoveSettings, small_move
+    from backend.axis.cyclic import CyclicSession
+    from backend.tools.moves.small_move import SmallMoveSettings, small_move
 
     async with _axis_at(where, state) as axis:
         session = CyclicSession(axis.drive.ports[0].link, [axis.drive])

@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 from backend.commands.options import Json, Server, Url, server_for
 from backend.commands.session import opened, run, show_progress
-from backend.matching import match_profiles
+from backend.station.matching import match_profiles
 from drivers.urls import parse_url
 
 

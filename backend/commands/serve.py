@@ -15,13 +15,13 @@ import uvicorn
 
 from backend.api.admission.accepting import AcceptingSocket
 from backend.api.app import make_app
-from backend.api.security_protocol import AcceptingConfig, PatientProtocol, PatientSocket
-from backend.bench import Bench
-from backend.journal import Entry
+from backend.api.security.protocol import AcceptingConfig, PatientProtocol, PatientSocket
 from backend.people.login.marker import AccountsMarker
 from backend.people.station import People
 from backend.people.tls import Certificate, machine_names, own_certificate, station_certificate
+from backend.station.bench import Bench
 from backend.store.database import FILE
+from backend.work.journal import Entry
 from drivers import scheduling
 from drivers.errors import NotAllowed
 from profiles import load_all

@@ -14,11 +14,11 @@ from typing import ParamSpec, TypeVar
 import typer
 
 from backend.commands.restoring import recall
-from backend.drive import Drive
-from backend.jobs import Progress
-from backend.matching import match_profiles, profile_for
-from backend.ports import Port
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
 from backend.restore.store import Pending
+from backend.station.matching import match_profiles, profile_for
+from backend.work.jobs import Progress
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link, NeedsProfile
 from drivers.urls import link_for

@@ -8,13 +8,13 @@ from typing import Annotated
 
 import typer
 
-from backend.bench import Bench
 from backend.commands.keep import BlobPlace, Database
 from backend.commands.serve import Serving
 from backend.commands.serve import serve as run_server
 from backend.commands.session import until_interrupted
 from backend.commands.state import state_folder
-from backend.demo import DemoBench
+from backend.station.bench import Bench
+from backend.station.demo import DemoBench
 
 Host = Annotated[
     str,

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from backend.axis import Envelope
+from backend.axis.axis import Envelope
 from backend.commands.measure import (
     AxisName,
     Consent,
@@ -31,7 +31,7 @@ from backend.commands.measure import (
 )
 from backend.commands.remote import remote
 from backend.commands.session import progress, run_in_order
-from backend.files import write_atomically
+from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 
 Answer = Mapping[str, object]
@@ -98,8 +98,8 @@ def autotune(
 
     async def here() -> Answer:
         # The analysis takes seconds to import; no other command shall wait for it.
-        from backend.tools import autotune as tool
-        from backend.tools.tune_apply import take_back
+        from backend.tools.autotune import run as tool
+        from backend.tools.autotune.apply import take_back
 
         envelope = Envelope(travel_rev, speed_rpm, torque_percent, 60.0)
         settings = tool.AutotuneSettings(

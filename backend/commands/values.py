@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol, TypeVar
 
 import typer
 
-from backend import parameter_set
+from backend.parameters import set_file as parameter_set
 from backend.tools.parameters import without
 from drivers.errors import NotAllowed
 from profiles.schema import Raw

@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from backend.commands.session import until_interrupted
-from backend.demo import DemoBench
+from backend.station.demo import DemoBench
 from drivers.errors import NotAllowed
 from drivers.urls import parse_url
 from drivers.virtual.mechanics.spec import load_mechanics, standard_mechanics

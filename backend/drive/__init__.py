@@ -1,1 +1,1 @@
-"""One drive: identity, ports, readings, writes, faults, terminals, and what waits to be restored."""
+"""One drive: identity, ports, readings, writes, faults, terminals, pending restores."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Sequence
 
-from backend.ports import Port, address_of
-from backend.rest import Rest, Resting
+from backend.drive.exclusive import Rest, Resting
+from backend.drive.ports import Port, address_of
 from drivers.errors import DriveError, LinkTimeout, NotAsked
 from profiles.schema import Parameter
 

@@ -10,20 +10,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from backend.batches import asked_in_batches
-from backend.change_marks import ChangeMarks
-from backend.drive_listeners import DriveListeners
+from backend.drive.batches import asked_in_batches
+from backend.drive.change_marks import ChangeMarks
+from backend.drive.exclusive import Rest
+from backend.drive.listeners import DriveListeners
+from backend.drive.motion_keys import command_keys, motion_keys
+from backend.drive.pending_restore import Owed
+from backend.drive.ports import Port, address_of, carries
+from backend.drive.readings import CommandRecord, Reading, Refusal, WriteRecord
+from backend.drive.value_check import checked, named
 from backend.motion.authority import MotionAuthority
 from backend.motion.classes import held_still, motion_of
 from backend.motion.doors import refused
 from backend.motion.grant import Grant
 from backend.motion.stopping import stops
-from backend.motion_keys import command_keys, motion_keys
-from backend.owed import Owed
-from backend.ports import Port, address_of, carries
-from backend.readings import CommandRecord, Reading, Refusal, WriteRecord
-from backend.rest import Rest
-from backend.value_check import checked, named
 from drivers import cia402
 from drivers.codec import decode, encode
 from drivers.errors import (
@@ -325,7 +325,7 @@ class Drive:
         """A raw value as it will be written.
 
         Raises:
-            NotAllowed, OutOfRange: as `backend.value_check.checked`.
+            NotAllowed, OutOfRange: as `backend.drive.value_check.checked`.
         """
         return checked(self.name, parameter, raw)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from backend.drive import Drive
-from backend.readings import Reading
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
 from profiles.schema import Fault
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backend.drive import Drive
+from backend.drive.drive import Drive
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address
 

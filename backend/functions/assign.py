@@ -10,13 +10,13 @@ from __future__ import annotations
 import asyncio
 import time
 
-from backend.axis import Axis
-from backend.io_functions import TerminalState, read_terminals
+from backend.axis.axis import Axis
+from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.drive.readings import Reading
+from backend.drive.terminals import TerminalState, read_terminals
 from backend.motion.classes import motion_of
 from backend.motion.doors import door_of
 from backend.motion.grant import NotGranted
-from backend.readings import Reading
-from backend.restoring import CLEANUP_TIMEOUT_S, shielded
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
 from profiles.schema import Parameter, Raw

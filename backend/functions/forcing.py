@@ -13,14 +13,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
-from backend.access import Leases
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.functions import functions_of
-from backend.jobs import Job, JobResult, JobRunner, Progress
+from backend.axis.axis import Axis
+from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.drive.catalog import functions_of
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
 from backend.motion.grant import Grant
-from backend.readings import Reading
-from backend.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.people.lease import Leases
+from backend.work.jobs import Job, JobResult, JobRunner, Progress
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange, Rejected
 from profiles.functions import Forcing, TerminalBits

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from backend.axis import Axis
-from backend.mechanics_calc import GearPlan, GearValue, Mechanics, plan_gear
-from backend.restoring import CLEANUP_TIMEOUT_S, shielded
-from backend.units import encoder_counts
+from backend.axis.axis import Axis
+from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.axis.units import encoder_counts
+from backend.functions.gear_calculator import GearPlan, GearValue, Mechanics, plan_gear
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed, Rejected
 from profiles.schema import Raw

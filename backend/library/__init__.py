@@ -3,6 +3,6 @@
 from backend.library.catalogue import Library, NotInLibrary
 from backend.library.folder import SetLibrary, SetStore
 from backend.library.sets import LibrarySets
-from backend.parameter_set import BadSet
+from backend.parameters.set_file import BadSet
 
 __all__ = ["BadSet", "Library", "LibrarySets", "NotInLibrary", "SetLibrary", "SetStore"]

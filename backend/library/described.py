@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend import measurements
+from backend.library import measurements
 from backend.library.entries import Addition, AxisIdentity, Kind
 from backend.library.index import Described, Folder
 from backend.recording.chunks import SUFFIX as RECORDING

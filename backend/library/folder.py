@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
-from backend import parameter_set
-from backend.files import checked_name, write_atomically
-from backend.parameter_set import SUFFIX, ParameterSet
+from backend.parameters import set_file as parameter_set
+from backend.parameters.set_file import SUFFIX, ParameterSet
+from backend.store.files import checked_name, write_atomically
 from drivers.errors import NotAllowed
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.drive import Drive
-from backend.parameter_set import ParameterSet
+from backend.drive.drive import Drive
+from backend.parameters.set_file import ParameterSet
 
 What = Literal["vendor", "product", "serial", "revision", "firmware"]
 #: What makes it another drive: writing needs consent. The others are only told.

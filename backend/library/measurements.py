@@ -1,7 +1,7 @@
 """Stored measurements: the raw signals, how they were made, and what was concluded.
 
 One file each (``.sdmeas``, a zip as numpy writes it): ``meta`` is JSON, every other member an
-array. Whoever opens it can evaluate it anew; see `backend.evaluation`.
+array. Whoever opens it can evaluate it anew; see `backend.station.evaluation`.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 import backend
-from backend.drive import Drive
-from backend.files import checked_name, write_atomically
+from backend.drive.drive import Drive
+from backend.store.files import checked_name, write_atomically
 from drivers.errors import NotAllowed
 from profiles.schema import Profile
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from datetime import UTC
 from pathlib import Path
 
-from backend import parameter_set
-from backend.files import StorageFailed, checked_name
 from backend.library.catalogue import Library
 from backend.library.entries import Addition, AxisIdentity, Entry
-from backend.parameter_set import SUFFIX, BadSet, ParameterSet
+from backend.parameters import set_file as parameter_set
+from backend.parameters.set_file import SUFFIX, BadSet, ParameterSet
+from backend.store.files import StorageFailed, checked_name
 from drivers.errors import NotAllowed
 
 _TAKEN = "imported"

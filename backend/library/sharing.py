@@ -9,11 +9,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from backend.files import StorageFailed, write_atomically
 from backend.library.catalogue import Library
 from backend.library.described import require_usable
 from backend.library.entries import Addition, Entry
 from backend.library.index import Index
+from backend.store.files import StorageFailed, write_atomically
 from drivers.errors import NotAllowed
 
 #: Contents pass through the memory on their way to and from the store.

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.drive import Drive
-from backend.parameter_set import Row, compare
-from backend.readings import Reading
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
+from backend.parameters.set_file import Row, compare
 from profiles.schema import Parameter, Raw
 
 Status = Literal[

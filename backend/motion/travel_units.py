@@ -1,7 +1,8 @@
 """The unit in which a person types and reads travel: motor revolutions, or mm or ° of the load.
 
 The tools work in revolutions, rpm and rpm/s. A request in another unit is converted once, on its
-way in (`backend.api.convert_motion`), and its messages are written in the unit of the request.
+way in (`backend.api.drive.convert_motion`), and its messages are written in the unit of
+the request.
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from backend.mechanics_calc import Mechanics
+from backend.functions.gear_calculator import Mechanics
 from drivers.errors import NotAllowed
 
 if TYPE_CHECKING:
-    from backend.units import AxisUnits
+    from backend.axis.units import AxisUnits
 
 
 @dataclass(frozen=True, slots=True)

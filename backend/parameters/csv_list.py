@@ -14,9 +14,9 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from backend.parameter_set import MAX_BYTES, BadSet, Row
-from backend.readings import Reading
-from backend.spreadsheet import as_text
+from backend.drive.readings import Reading
+from backend.parameters.set_file import MAX_BYTES, BadSet, Row
+from backend.store.spreadsheet import as_text
 from profiles.schema import Parameter, Profile, Raw
 
 _MAX_LINES = 20_000

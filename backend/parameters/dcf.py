@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from datetime import datetime
 
-from backend.parameter_csv import ParameterList
-from backend.parameter_set import BadSet, Row
-from backend.readings import Reading
+from backend.drive.readings import Reading
+from backend.parameters.csv_list import ParameterList
+from backend.parameters.set_file import BadSet, Row
 from profiles.importer import (
     ImportFailed,
     ImportReport,

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal
 
-from backend.drive import Drive
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
 from backend.motion.classes import motion_of
 from backend.motion.doors import refused
-from backend.readings import Reading
 from drivers.errors import DriveError, NotAllowed
 from profiles.schema import Parameter, Profile, Raw
 

@@ -9,9 +9,8 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend.elapsed import moment_of
-from backend.files import StorageFailed
 from backend.people.accounts import Accounts
+from backend.people.elapsed import moment_of
 from backend.people.errors import NotLoggedIn
 from backend.people.identity import LOCAL, Identity
 from backend.people.login.devices import KnownDevices
@@ -21,6 +20,7 @@ from backend.people.records import Account, LoginSession
 from backend.people.rights import RIGHTS
 from backend.people.support import Support
 from backend.store import Store
+from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed
 
 log = logging.getLogger(__name__)

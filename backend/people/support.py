@@ -14,8 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.elapsed import elapsed_s
 from backend.people.credentials import checked_person, digest, new_secret, same_code, spoken_code
+from backend.people.elapsed import elapsed_s
 from backend.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
 from backend.people.identity import Identity
 from backend.people.rights import GRANTABLE, MOVING, RIGHTS, Right, Role
@@ -23,7 +23,7 @@ from backend.people.throttle import Throttle
 from drivers.errors import NotAllowed
 
 #: The enabling button counts as released this long after the last sign of life. With the 20 ms
-#: between looks (`backend.api.live_watch`) a silent page stops the motion within 200 ms.
+#: between looks (`backend.api.live.watch`) a silent page stops the motion within 200 ms.
 ENABLING_TIMEOUT_S = 0.17
 LONGEST_INVITATION_S = 24 * 3600.0
 LONGEST_GRANT_S = 8 * 3600.0

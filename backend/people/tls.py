@@ -15,7 +15,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from backend.files import write_atomically
+from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 
 LIFETIME = timedelta(days=5 * 365)

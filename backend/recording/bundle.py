@@ -15,13 +15,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from backend.files import StorageFailed
 from backend.recording import chunks
 from backend.recording.bundle_page import drawings_of, log_line, page, when
 from backend.recording.evidence import Evidence, Value
 from backend.recording.export import NICE, to_csv
 from backend.recording.reader import RecordingReader
-from backend.spreadsheet import as_text
+from backend.store.files import StorageFailed
+from backend.store.spreadsheet import as_text
 
 
 async def build_apart(evidence: Evidence, target: Path) -> None:

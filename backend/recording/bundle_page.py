@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from backend.journal import Entry
 from backend.recording.evidence import Evidence
 from backend.recording.export import shown
 from backend.recording.reader import RecordingReader
 from backend.recording.table import merged
+from backend.work.journal import Entry
 
 PLOT_WIDTH, PLOT_HEIGHT = 900, 120
 #: Fewer points are no curve; more curves are no page any more.

@@ -14,17 +14,17 @@ from functools import partial
 from pathlib import Path
 
 from backend import __version__
-from backend.bench import Bench
-from backend.cyclic import INPUT_ROLES, OUTPUT_ROLES
-from backend.files import StorageFailed, checked_name
-from backend.monitor import Snapshot
-from backend.readings import Reading
+from backend.axis.cyclic import INPUT_ROLES, OUTPUT_ROLES
+from backend.drive.readings import Reading
 from backend.recording import facts
 from backend.recording.bundle import build_apart
 from backend.recording.evidence import Evidence, Value
 from backend.recording.streams import describe_streams
 from backend.recording.writer import RESERVE_BYTES, free_bytes
-from backend.scope import Subscription
+from backend.scope.hub import Subscription
+from backend.station.bench import Bench
+from backend.station.monitor import Snapshot
+from backend.store.files import StorageFailed, checked_name
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import ScopeBlock
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from backend.bench import Bench
-from backend.cyclic import OUTPUT_ROLES
-from backend.drive import Drive
-from backend.readings import Reading
+from backend.axis.cyclic import OUTPUT_ROLES
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
+from backend.station.bench import Bench
 
 #: Commands, which a motion writes twenty times a second, are no settings; the mode is one.
 _COMMANDS = tuple(role for role in OUTPUT_ROLES if role != "mode")

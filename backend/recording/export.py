@@ -23,7 +23,7 @@ import numpy as np
 
 from backend.recording.reader import Channel, RecordingReader
 from backend.recording.table import merged
-from backend.spreadsheet import as_text
+from backend.store.spreadsheet import as_text
 
 #: The process writes text for seconds; the bus and the pages go first.
 NICE = 10

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from backend import parameter_set
-from backend.bench import Bench
-from backend.drive import Drive
-from backend.fault_history import PastFault, history_of, read_history
-from backend.member import Member
-from backend.readings import Reading
+from backend.axis.fault_history import PastFault, history_of, read_history
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
+from backend.parameters import set_file as parameter_set
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
 from drivers.errors import DriveError
 
 #: A mute drive must not keep the samples of the others waiting.

@@ -9,9 +9,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from backend.files import checked_name, write_atomically
 from backend.recording.chunks import SUFFIX
 from backend.recording.reader import BadRecording, RecordingReader, Summary
+from backend.store.files import checked_name, write_atomically
 from drivers.errors import NotAllowed
 
 _NOTES = ".json"

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from backend.bench import Bench
-from backend.journal import Entry
-from backend.readings import Reading
+from backend.drive.readings import Reading
 from backend.recording.changed_settings import ChangedSettings
 from backend.recording.reader import Channel
 from backend.recording.streams import describe_streams
-from backend.scope import Subscription
+from backend.scope.hub import Subscription
+from backend.station.bench import Bench
+from backend.work.journal import Entry
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock
 

@@ -9,16 +9,16 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend.bench import Bench
-from backend.files import StorageFailed
-from backend.jobs import Job, JobResult, Progress
-from backend.journal import Entry
-from backend.readings import Reading
+from backend.drive.readings import Reading
 from backend.recording.capture import FaultCapture
 from backend.recording.changed_settings import ChangedSettings
 from backend.recording.library import RecordingLibrary
 from backend.recording.recorder import Recorder, Settings
 from backend.recording.writer import free_bytes
+from backend.station.bench import Bench
+from backend.store.files import StorageFailed
+from backend.work.jobs import Job, JobResult, Progress
+from backend.work.journal import Entry
 from drivers.errors import Busy, NotAllowed
 
 #: Running at once; each has a file and a thread.

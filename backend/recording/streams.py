@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from backend.bench import Bench
-from backend.scope_units import axis_scale
+from backend.scope.units import axis_scale
+from backend.station.bench import Bench
 
 
 def describe_streams(

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
-from backend.files import StorageFailed
 from backend.recording import chunks
+from backend.store.files import StorageFailed
 from drivers.link import ScopeBlock
 
 #: Blocks that may wait for the disk. At 16 channels × 4 kHz it holds two minutes.

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import backend
-from backend.bench import Bench
-from backend.drive import Drive
-from backend.evaluation import evaluate
-from backend.measurements import BadMeasurement, Head, MeasurementStore, profile_version
-from backend.member import Member
+from backend.drive.drive import Drive
+from backend.library.measurements import BadMeasurement, Head, MeasurementStore, profile_version
 from backend.report.changes import Change, net
 from backend.report.facts import ChangedSetting, Facts, Identity, Measured
 from backend.report.views import view_of
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.station.evaluation import evaluate
 from drivers.errors import DriveError, NotAllowed
 from profiles.schema import Parameter
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from backend.measurements import BadMeasurement
+from backend.library.measurements import BadMeasurement
 
 
 class View(BaseModel):

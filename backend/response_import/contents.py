@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray
+from backend.analysis.signals.arrays import FloatArray
 from backend.response_import.errors import BadRecording
 from backend.response_import.matlab import read_matlab
 

@@ -7,11 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray
-from backend.analysis.design import design
-from backend.analysis.loop_goals import LoadClass
-from backend.analysis.loop_structure import DriveLoops
-from backend.analysis.measured_plant import measured_plant
+from backend.analysis.loop.design import design
+from backend.analysis.loop.loop_goals import LoadClass
+from backend.analysis.loop.loop_structure import DriveLoops
+from backend.analysis.loop.measured_plant import measured_plant
 from backend.analysis.response.collocated import (
     Contradiction,
     RigidPart,
@@ -21,6 +20,7 @@ from backend.analysis.response.collocated import (
     rigid_part,
 )
 from backend.analysis.response.foreign import ForeignResponse, NoResponse, evaluate
+from backend.analysis.signals.arrays import FloatArray
 from backend.response_import.contents import Table, read_table
 from backend.response_import.errors import BadRecording
 from backend.response_import.signals import Signals, signals_of

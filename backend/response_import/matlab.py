@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.arrays import FloatArray
+from backend.analysis.signals.arrays import FloatArray
 from backend.response_import.errors import BadRecording
 
 _MAX_UNPACKED = 512 << 20

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray
 from backend.analysis.response.foreign import LEAST_SAMPLES
+from backend.analysis.signals.arrays import FloatArray
 from backend.response_import.contents import Table
 from backend.response_import.errors import BadRecording
 

@@ -9,7 +9,7 @@ from datetime import datetime
 import numpy as np
 import numpy.typing as npt
 
-from backend.measurements import pack_other
+from backend.library.measurements import pack_other
 from backend.response_import.evaluation import ImportSettings, evaluate_signals
 from backend.response_import.signals import Signals
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from backend.drive import Drive
+from backend.drive.drive import Drive
 
 
 @dataclass(frozen=True, slots=True)

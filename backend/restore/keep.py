@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from backend.drive import Drive
-from backend.files import StorageFailed
+from backend.drive.drive import Drive
 from backend.restore.identity import identity_of
 from backend.restore.store import RestoreList
+from backend.store.files import StorageFailed
 
 
 def keep_list(

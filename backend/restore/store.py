@@ -18,10 +18,10 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from backend.files import StorageFailed, write_atomically
-from backend.owed import Debt
+from backend.drive.pending_restore import Debt
 from backend.restore.identity import DriveIdentity
 from backend.restore.process import lives, this_process
+from backend.store.files import StorageFailed, write_atomically
 from profiles.schema import Raw
 
 #: What moves is this long after the last note still the doing of the process that was killed;

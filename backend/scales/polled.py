@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 
-from backend.scales.of_axis import ScaledAxis
+from backend.axis.scaled import ScaledAxis
+from backend.axis.units import AxisUnits
 from backend.scales.words import halt_remedy, halt_words
-from backend.units import AxisUnits
 from drivers.errors import motion_halted
 from drivers.motion.guard import SpeedGuard
 

@@ -11,8 +11,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from backend.drive import Drive
-from backend.optional import existing
+from backend.drive.drive import Drive
+from backend.drive.optional import existing
 from backend.scales.scale import Doubt, Origin, Quantity, Scale, Scales
 from backend.scales.taught import Taught
 from profiles.schema import UnitSpec

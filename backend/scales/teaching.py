@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backend.axis import Axis
+from backend.axis.axis import Axis
 from backend.scales.resolve import read_told
 from backend.scales.taught import Taught
 from backend.scales.units_found import nearest_unit

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from backend.bench import Bench
-from backend.drive import Drive
-from backend.mechanics_calc import Mechanics
-from backend.member import Member
+from backend.axis.units import AxisUnits
+from backend.drive.drive import Drive
+from backend.functions.gear_calculator import Mechanics
 from backend.scene.geometry import Track, Travel, track_of, travel_of
-from backend.scope import Subscription
-from backend.units import AxisUnits
+from backend.scope.hub import Subscription
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock

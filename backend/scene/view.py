@@ -1,7 +1,7 @@
 """The parts of the scene on a viser server, and their movement.
 
 viser is the library of the customer's choice for 3D; its server listens on loopback only and is
-reached through ours (`backend.api.routes_scene`).
+reached through ours (`backend.api.scope.scene`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import viser
 
-from backend.mechanics_calc import Mechanics
+from backend.functions.gear_calculator import Mechanics
 from backend.scene.geometry import HALF_TRACK, Track, Travel, turn
 
 #: Distance of two axes; the page's camera knows it too (webui/src/pages/scene/SceneFrame.tsx).

@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from backend.axis import Axis
-from backend.readings import Reading
+from backend.axis.axis import Axis
+from backend.drive.readings import Reading
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock
 

@@ -10,32 +10,32 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from backend.access import Leases
 from backend.audit.witness import Witness
-from backend.axis import Axis
-from backend.axis_store import AxisStore
-from backend.buses import Buses
-from backend.cyclic import CyclicSession
-from backend.drive import Drive
-from backend.drive_identity import read_serial
-from backend.drive_list import DriveList, SavedDrive, SavedPort
-from backend.exchanges import Exchanges
-from backend.files import StorageFailed
-from backend.jobs import Job, JobRunner
-from backend.journal import Journal, Level
-from backend.matching import profile_for
-from backend.measurements import MeasurementStore
-from backend.member import Member
-from backend.monitor import Monitor, Snapshot
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.axis.remembered import AxisStore
+from backend.drive.drive import Drive
+from backend.drive.identity import read_serial
+from backend.drive.ports import Port
+from backend.drive.readings import Reading
+from backend.library.measurements import MeasurementStore
 from backend.motion.authority import MotionAuthority
-from backend.motion.axes import Motion
-from backend.naming import PlaceNames, new_id
-from backend.ports import Port
-from backend.readings import Reading
-from backend.records import Records
+from backend.people.lease import Leases
 from backend.restore.store import RestoreStore
-from backend.returning import Returning
-from backend.scope import ScopeHub
+from backend.scope.hub import ScopeHub
+from backend.station.buses import Buses
+from backend.station.connected_drive import Member
+from backend.station.drive_list import DriveList, SavedDrive, SavedPort
+from backend.station.exchanges import Exchanges
+from backend.station.matching import profile_for
+from backend.station.monitor import Monitor, Snapshot
+from backend.station.motion import Motion
+from backend.station.naming import PlaceNames, new_id
+from backend.station.records import Records
+from backend.station.returning import Returning
+from backend.store.files import StorageFailed
+from backend.work.jobs import Job, JobRunner
+from backend.work.journal import Journal, Level
 from drivers.errors import Busy, DriveError, NotAllowed
 from drivers.link import Found, Link, NeedsProfile
 from profiles.loader import ProfileError

@@ -6,16 +6,16 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from backend.drive import Drive
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
 from backend.people.identity import by_itself
-from backend.ports import Port
 from drivers.errors import Busy, NotAllowed
 from drivers.link import Found, Link, LinkEvent
 from drivers.modbus.link import RegisterLink
 from drivers.urls import link_for
 
 if TYPE_CHECKING:
-    from backend.bench import Bench
+    from backend.station.bench import Bench
 
 
 class Buses:

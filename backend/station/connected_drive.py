@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.monitor import Monitor
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from backend.station.monitor import Monitor
 
 
 class Member:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
 from drivers.errors import NotAllowed, Rejected
-from drivers.ethercat.information import EntryDescription, ObjectInfo
+from drivers.ethercat.wire.information import EntryDescription, ObjectInfo
 from drivers.link import Address, Found, Link, Progress
 from profiles.importer import (
     ImportedProfile,

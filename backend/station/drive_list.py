@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from backend.files import write_atomically
+from backend.store.files import write_atomically
 
 VERSION = 1
 

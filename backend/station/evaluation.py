@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.axis import Envelope
-from backend.measurements import BadMeasurement, Measurement
+from backend.axis.axis import Envelope
+from backend.library.measurements import BadMeasurement, Measurement
 from backend.response_import import stored as response_import
-from backend.tools import inertia_evaluation, sweep_evaluation
-from backend.tools import step_response as step_tool
-from backend.tools.recording import Recording
+from backend.tools.inertia import evaluation as inertia_evaluation
+from backend.tools.measuring.recording import Recording
+from backend.tools.step import run as step_tool
+from backend.tools.sweep import evaluation as sweep_evaluation
 
 #: Numbers nearer than this share are the same: another computer sums in another order.
 _SAME = 1e-6

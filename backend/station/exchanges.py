@@ -8,12 +8,12 @@ from collections import Counter
 from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
-from backend.cyclic import CyclicSession
+from backend.axis.cyclic import CyclicSession
 from drivers.errors import Busy, DriveError, NotAllowed
 
 if TYPE_CHECKING:
-    from backend.bench import Bench
-    from backend.member import Member
+    from backend.station.bench import Bench
+    from backend.station.connected_drive import Member
 
 #: Why no motion may begin on a bus at present.
 _CHANGING = "the cyclic exchange is just being changed"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from backend.bench import Bench
+from backend.station.bench import Bench
 from drivers.errors import Busy, NotAllowed
 from drivers.modbus.search import LineFound, search_line_settings
 from drivers.urls import parse_url

@@ -6,12 +6,12 @@ import asyncio
 import contextlib
 from dataclasses import dataclass
 
-from backend.bench import Bench
-from backend.cyclic import CyclicSession
-from backend.jobs import Job
-from backend.member import Member
-from backend.ports import Port
-from backend.tools import profile_speed
+from backend.axis.cyclic import CyclicSession
+from backend.drive.ports import Port
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.tools.sweep import profile_speed
+from backend.work.jobs import Job
 from drivers.errors import DriveError
 
 #: Ending an exchange, and starting the one that had to give way.

@@ -11,13 +11,13 @@ import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from backend.axis import Axis
-from backend.faults import active_faults, fault_keys, integer
-from backend.journal import Journal, Level
+from backend.axis.axis import Axis
+from backend.axis.units import AxisUnits
+from backend.drive.faults import active_faults, fault_keys, integer
+from backend.drive.readings import Reading
 from backend.people.identity import by_itself
-from backend.readings import Reading
 from backend.stopping.turning import Turning, TurnWatch, told
-from backend.units import AxisUnits
+from backend.work.journal import Journal, Level
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import DriveError

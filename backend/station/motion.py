@@ -9,15 +9,15 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from backend.member import Member
+from backend.station.connected_drive import Member
 from backend.stopping.facts import AxisStop, Verdict
 from backend.stopping.told import told
 from backend.stopping.watch import StopWatch
 from drivers.errors import Busy, DriveError
 
 if TYPE_CHECKING:
-    from backend.bench import Bench
-    from backend.jobs import Job
+    from backend.station.bench import Bench
+    from backend.work.jobs import Job
 
 log = logging.getLogger(__name__)
 

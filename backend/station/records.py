@@ -9,14 +9,14 @@ from pathlib import Path
 
 from backend.audit import AuditLog
 from backend.audit.trail import Trail
-from backend.files import StorageFailed
-from backend.journal import Journal
 from backend.library import Library, LibrarySets
 from backend.library.described import folders
 from backend.library.index import Index
 from backend.store import DatabaseFailed, Store
 from backend.store.blobs import Blobs
+from backend.store.files import StorageFailed
 from backend.store.lock import FolderLock
+from backend.work.journal import Journal
 from drivers.errors import Busy
 
 #: How long a start waits for a database on a server.

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.drive_identity import confirm_identity
-from backend.files import StorageFailed
-from backend.jobs import Job, JobResult, Progress
-from backend.monitor import Snapshot
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from backend.drive.identity import confirm_identity
 from backend.restore.identity import identity_of
 from backend.restore.keep import keep_list
 from backend.restore.store import RestoreStore
-from backend.tools.settling import settle
+from backend.station.monitor import Snapshot
+from backend.store.files import StorageFailed
+from backend.tools.measuring.restore import settle
+from backend.work.jobs import Job, JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import Busy, NotAllowed
 from drivers.link import Found
 
 if TYPE_CHECKING:
-    from backend.bench import Bench
-    from backend.member import Member
+    from backend.station.bench import Bench
+    from backend.station.connected_drive import Member
 
 _STANDS_S, _STANDS_RPM = 0.5, 5.0
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from backend.drive import Drive
-from backend.parameter_set import storable
-from backend.ports import Port, carries
+from backend.drive.drive import Drive
+from backend.drive.ports import Port, carries
+from backend.parameters.set_file import storable
 from drivers.errors import LinkTimeout, NotAllowed
 from profiles.schema import LinkKind
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from backend.drive import Drive
+from backend.drive.drive import Drive
 from backend.stopping.facts import StepCode
 from backend.stopping.settings import OPTION, braking_option, known_settings
 from drivers import cia402
@@ -17,7 +17,7 @@ from drivers.cia402 import Mode, State
 from drivers.errors import DriveError
 
 if TYPE_CHECKING:
-    from backend.power import PowerState
+    from backend.axis.power import PowerState
 
 #: A status word that was read longer ago says nothing of now.
 _SEEN_S = 2.5

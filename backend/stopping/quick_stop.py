@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from backend.drive import Drive
-from backend.optional import existing
+from backend.axis.units import AxisUnits
+from backend.drive.drive import Drive
+from backend.drive.optional import existing
 from backend.stopping.settings import COAST, OPTION, braking_option
-from backend.units import AxisUnits
 from profiles.schema import Parameter, Raw
 
-#: From any permitted speed to standstill, as `drivers.ethercat.playback` ramps set-points down.
+#: From any permitted speed to standstill, as `drivers.motion.playback` ramps set-points down.
 STOP_S = 0.1
 
 

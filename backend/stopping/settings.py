@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from backend.drive import Drive
-from backend.readings import Reading
-from backend.units import AxisUnits
+from backend.axis.units import AxisUnits
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
 
 OPTION, HALT_OPTION = "605A:00", "605D:00"
 COAST = 0

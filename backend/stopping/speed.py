@@ -8,9 +8,9 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
-from backend.axis import Axis
-from backend.faults import integer
-from backend.units import AxisUnits
+from backend.axis.axis import Axis
+from backend.axis.units import AxisUnits
+from backend.drive.faults import integer
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout
 

@@ -13,8 +13,8 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable
 
-from backend.axis import Axis
-from backend.restoring import shielded
+from backend.axis.axis import Axis
+from backend.axis.restoring import shielded
 from backend.stopping.facts import AxisStop, StepCode, Verdict
 from backend.stopping.settings import (
     OPTION,

@@ -22,9 +22,9 @@ from typing import IO, BinaryIO
 
 import backend
 from backend.audit.trail import Trail
-from backend.files import StorageFailed
 from backend.store.copy import copy_rows
 from backend.store.database import FILE, Store
+from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed
 
 FORMAT = "servodeck backup"

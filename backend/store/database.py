@@ -25,8 +25,8 @@ from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from backend.files import StorageFailed
 from backend.store import migrate
+from backend.store.files import StorageFailed
 
 P = ParamSpec("P")
 T = TypeVar("T")

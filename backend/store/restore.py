@@ -10,11 +10,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from backend.audit.trail import Trail
-from backend.files import StorageFailed
 from backend.store import backup
 from backend.store.backup import SHARED, BackupFailed
 from backend.store.copy import copy_rows
 from backend.store.database import FILE, Store
+from backend.store.files import StorageFailed
 from backend.store.lock import FolderLock
 
 

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 
-from backend import parameter_set
-from backend.drive import Drive
-from backend.drive_identity import confirm_identity
-from backend.jobs import JobResult
+from backend.drive.drive import Drive
+from backend.drive.identity import confirm_identity
+from backend.drive.readings import Reading
 from backend.library import SetStore
 from backend.library.identity import doubts
 from backend.motion.grant import NotGranted
-from backend.parameter_set import ParameterSet
-from backend.readings import Reading
+from backend.parameters import set_file as parameter_set
+from backend.parameters.set_file import ParameterSet
+from backend.work.jobs import JobResult
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
 from drivers.link import Progress
 from profiles.schema import Raw

@@ -34,11 +34,11 @@ time.time = _jumping_time
 import uvicorn  # noqa: E402
 from argon2 import PasswordHasher  # noqa: E402
 
-from backend.bench import Bench  # noqa: E402
 from backend.commands.serve import Serving, _config, _listen  # noqa: E402
 from backend.people.passwords import Passwords  # noqa: E402
 from backend.people.rights import Role  # noqa: E402
 from backend.people.station import People  # noqa: E402
+from backend.station.bench import Bench  # noqa: E402
 from benchmarks.chaos.station import PASSWORD  # noqa: E402
 from drivers.errors import DriveError  # noqa: E402
 from drivers.ethercat.link import EthercatLink  # noqa: E402

@@ -18,7 +18,7 @@ from typing import Any
 
 import httpx
 
-from backend.demo import DemoBench
+from backend.station.demo import DemoBench
 from drivers import cia402
 from drivers.errors import DriveError
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
@@ -168,7 +168,7 @@ class TrialStation:
             with contextlib.suppress(OSError):
                 command = (entry / "cmdline").read_bytes()
                 parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-                if b"drivers.ethercat.host" in command and parent == self.process.pid:
+                if b"drivers.ethercat.process.host" in command and parent == self.process.pid:
                     return int(entry.name)
         return None
 

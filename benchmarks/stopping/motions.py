@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
-from backend.axis import Envelope
-from backend.jobs import Progress
-from backend.tools.cyclic_motion import jog_cyclic
-from backend.tools.jog import Hold, JogSettings, jog
+from backend.axis.axis import Envelope
+from backend.tools.jog.cyclic import jog_cyclic
+from backend.tools.jog.run import Hold, JogSettings, jog
+from backend.work.jobs import Progress
 from benchmarks.stopping.rig import Rig
 
 FAMILIES = ("mms7", "m6l", "r6l", "ep3e", "ds_c")

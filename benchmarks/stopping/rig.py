@@ -14,8 +14,8 @@ from typing import Any
 import httpx
 
 from backend.api.app import make_app
-from backend.bench import Bench
-from backend.member import Member
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
 from drivers.errors import LinkTimeout
 from drivers.link import Address
 from drivers.virtual.device import Device

@@ -24,11 +24,11 @@ from drivers.canopen.trajectory import motion_of
 from drivers.canopen.url import CanUrl
 from drivers.cia402 import Dialect, Mode, State
 from drivers.errors import DriveError, LinkLost, NotAllowed
-from drivers.ethercat.motion import Phase
-from drivers.ethercat.playback import AxisLoop
 from drivers.halt import HaltCause, Halted, LoopState
 from drivers.link import CyclicSignal, LinkEvent, ScopeBlock, Trajectory, Unsubscribe
-from drivers.setpoints import require_fits
+from drivers.motion.playback import AxisLoop
+from drivers.motion.setpoint_plan import Phase
+from drivers.motion.setpoints import require_fits
 
 SHORTEST_CYCLE_S = 0.001
 _MODE = 0x6060

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from drivers import cia402
 from drivers.canopen.pdo import PdoPlan
 from drivers.codec import decode, encode, size_of
-from drivers.ethercat.playback import AxisLoop
 from drivers.halt import Halted
+from drivers.motion.playback import AxisLoop
 from profiles.schema import INTEGER_RANGE, DataType
 
 Key = tuple[int, int, int]

@@ -1,6 +1,6 @@
 """The SYNC loop: one thread, absolute deadlines, samples in and setpoints out.
 
-What an axis does with its setpoints is the same on every bus: `drivers.ethercat.playback`.
+What an axis does with its setpoints is the same on every bus: `drivers.motion.playback`.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from drivers.canopen.frames import HEARTBEAT, SYNC, Frame
 from drivers.canopen.images import Images, Key
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout
-from drivers.ethercat.motion import Motion, Phase
-from drivers.ethercat.playback import AxisLoop
 from drivers.halt import HaltCause, Halted
 from drivers.link import LinkEvent, ScopeBlock
+from drivers.motion.playback import AxisLoop
+from drivers.motion.setpoint_plan import Motion, Phase
 
 _BLOCK_S = 0.025
 _HEARTBEAT_S = 0.05

@@ -5,13 +5,13 @@ from __future__ import annotations
 import array
 import math
 
-from drivers.ethercat.motion import Limits, Motion
 from drivers.link import Trajectory
-from drivers.setpoints import longest_step
+from drivers.motion.setpoint_plan import Limits, Motion
+from drivers.motion.setpoints import longest_step
 
 
 def motion_of(trajectory: Trajectory, cycle_s: float) -> Motion:
-    """A trajectory whose values fit (`drivers.setpoints.require_fits`), in cycles of the loop."""
+    """A trajectory whose values fit (`drivers.motion.setpoints.require_fits`), in cycles."""
     envelope = trajectory.envelope
     offsets = trajectory.offset_values
     return Motion(

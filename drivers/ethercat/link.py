@@ -12,14 +12,14 @@ from typing import Any
 
 from drivers import cia402
 from drivers.errors import DriveError, NotAllowed
-from drivers.ethercat import firmware, permissions
-from drivers.ethercat.al_status import AlState
-from drivers.ethercat.hostprocess import HostProcess
-from drivers.ethercat.information import EntryDescription, ObjectInfo
-from drivers.ethercat.listing import Item, fitted, object_of, read_list
-from drivers.ethercat.protocol import Message
-from drivers.ethercat.segmentcyclic import EthercatCyclic
-from drivers.ethercat.survey import ExchangeFigures, Survey, exchange_from, survey_from
+from drivers.ethercat.exchange.segmentcyclic import EthercatCyclic
+from drivers.ethercat.process import firmware, permissions
+from drivers.ethercat.process.hostprocess import HostProcess
+from drivers.ethercat.process.protocol import Message
+from drivers.ethercat.process.survey import ExchangeFigures, Survey, exchange_from, survey_from
+from drivers.ethercat.wire.al_status import AlState
+from drivers.ethercat.wire.information import EntryDescription, ObjectInfo
+from drivers.ethercat.wire.listing import Item, fitted, object_of, read_list
 from drivers.link import Address, Cyclic, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
 from profiles.schema import LinkKind, Profile
 

@@ -16,7 +16,9 @@ from collections.abc import Callable, Sequence
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
-from drivers.ethercat.motion import (
+from drivers.halt import HaltCause, Halted
+from drivers.motion.guard import SpeedGuard
+from drivers.motion.setpoint_plan import (
     ACTUAL_POSITION,
     ACTUAL_TORQUE,
     ACTUAL_VELOCITY,
@@ -33,8 +35,6 @@ from drivers.ethercat.motion import (
     Motion,
     Phase,
 )
-from drivers.halt import HaltCause, Halted
-from drivers.motion.guard import SpeedGuard
 
 STOP_S = 0.1
 """From any speed to standstill; shorter than the 200 ms in which a lost setpoint must end."""

@@ -6,9 +6,9 @@ from dataclasses import asdict
 
 import numpy as np
 
-from drivers.ethercat.protocol import Message
+from drivers.ethercat.process.protocol import Message
 from drivers.link import Trajectory
-from drivers.setpoints import longest_step, require_fits, require_within_envelope
+from drivers.motion.setpoints import longest_step, require_fits, require_within_envelope
 
 
 def message_of(trajectory: Trajectory) -> Message:

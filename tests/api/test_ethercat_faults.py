@@ -384,7 +384,7 @@ def host_process() -> int:
             parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
         except OSError:
             continue
-        if parent == os.getpid() and b"drivers.ethercat.host" in command:
+        if parent == os.getpid() and b"drivers.ethercat.process.host" in command:
             return int(entry.name)
     raise AssertionError("there is no host process")
 

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from backend.cli import app
-from backend.demo import DemoBench
+from backend.station.demo import DemoBench
 
 runner = CliRunner()
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from backend import forcing
+from backend.functions import forcing
 from tests.support.station import Station, until
 
 

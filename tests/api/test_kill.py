@@ -14,7 +14,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from backend.demo import DemoBench
+from backend.station.demo import DemoBench
 from drivers.link import Address
 from drivers.urls import link_for
 from profiles.schema import DataType

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from backend.demo import DemoBench
+from backend.station.demo import DemoBench
 from drivers.virtual.wires.netns import child_environment, unavailable
 from tests.api.test_kill import ServerProcess
 from tests.support.station import HANG_S, until

@@ -13,7 +13,7 @@ import httpx
 import pytest
 
 from backend.api.app import make_app
-from backend.bench import Bench
+from backend.station.bench import Bench
 from drivers.link import Found
 from tests.support.servo import Servo, bench_with
 

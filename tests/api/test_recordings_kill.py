@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from backend.demo import DemoBench
+from backend.station.demo import DemoBench
 from tests.api.test_kill import ServerProcess, add_drive
 from tests.support.station import until
 

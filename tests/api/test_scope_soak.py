@@ -18,9 +18,10 @@ import httpx
 import numpy as np
 import pytest
 
-from backend.api import live_connection, live_scope
-from backend.demo import DemoBench
+from backend.api.live import connection as live_connection
+from backend.api.live import scope as live_scope
 from backend.recording.reader import RecordingReader
+from backend.station.demo import DemoBench
 from drivers.virtual.wires.netns import unavailable
 from tests.api.test_scope_streams import heads
 from tests.support.station import Live, Station, until

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.api import routes_scope
+from backend.api.scope import routes as routes_scope
 from tests.support.station import Station
 
 SETUP: dict[str, Any] = {
@@ -25,7 +25,7 @@ SETUP: dict[str, Any] = {
 
 
 def snapshot(rows: int = 5, **change: object) -> bytes:
-    """A file, put together by hand after the layout in backend/scope_store.py."""
+    """A file, put together by hand after the layout in backend/scope/stored.py."""
     header = {
         "created": "2026-11-21T08:00:00Z", "notes": "belt loose", "origin_s": 12.5,
         "setup": SETUP,

@@ -15,8 +15,9 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from backend.api import live_connection, live_scope
-from backend.demo import DemoBench
+from backend.api.live import connection as live_connection
+from backend.api.live import scope as live_scope
+from backend.station.demo import DemoBench
 from drivers.virtual.wires.netns import unavailable
 from tests.api.test_ethercat import BENCH, URL
 from tests.browser.cable import Cable
@@ -78,7 +79,7 @@ def begin(page: Live, drive: str, keys: tuple[str, ...], number: int = 1) -> Any
 
 
 def blocks(frame: bytes) -> Iterator[tuple[tuple[Any, ...], bytes]]:
-    """Head and rest of the blocks of a frame, by the layout in `backend.api.live_messages`."""
+    """Head and rest of the blocks of a frame, by the layout in `backend.api.live.messages`."""
     at = 0
     while at < len(frame):
         head = struct.unpack_from("<IIIIHHIdd", frame, at)

@@ -17,7 +17,7 @@ import httpx
 from PIL import Image
 from playwright.sync_api import Page, expect, sync_playwright
 
-from backend.demo import DemoBench
+from backend.station.demo import DemoBench
 from tests.browser.conftest import FLAGS, LAPTOP, PHONE, ROOT
 from tests.browser.test_scope import (
     BENCH,

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from backend.demo import DemoBench
+from backend.station.demo import DemoBench
 from drivers.virtual.wires.netns import unavailable
 from tests.browser.cable import Cable
 from tests.browser.conftest import LAPTOP, PHONE, _open

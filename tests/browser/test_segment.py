@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from backend.demo import DemoBench
+from backend.station.demo import DemoBench
 from drivers.virtual.wires.netns import unavailable
 from tests.api.test_ethercat_faults import host_process
 from tests.browser.driving import Bench, open_axis

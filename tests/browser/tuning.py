@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from backend.demo import DemoBench
+from backend.station.demo import DemoBench
 from drivers.virtual.wires.netns import unavailable
 from tests.browser.conftest import PATIENCE_MS
 from tests.browser.driving import open_axis

@@ -15,7 +15,7 @@ from pathlib import Path
 from playwright.sync_api import Page, expect, sync_playwright
 
 import drivers.virtual
-from backend.demo import DemoBench
+from backend.station.demo import DemoBench
 from tests.browser.conftest import FLAGS, LAPTOP
 from tests.browser.test_scope import (
     TORQUE,

@@ -6,11 +6,11 @@ from collections import Counter
 
 import pytest
 
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.jobs import Progress
-from backend.ports import Port
-from backend.tools.procedures import run_procedure
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
+from backend.tools.moves.procedures import run_procedure
+from backend.work.jobs import Progress
 from drivers.link import Found
 from profiles import load_profile
 from profiles.check import check

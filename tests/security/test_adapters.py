@@ -16,7 +16,7 @@ from urllib.parse import quote
 
 import pytest
 
-from backend.bench import Bench
+from backend.station.bench import Bench
 from drivers.adapters import require_channel, require_serial_form, serial_device
 from drivers.canopen.adapter import open_bus
 from drivers.canopen.url import CanUrl

@@ -14,7 +14,8 @@ import httpx
 import pytest
 from argon2 import PasswordHasher
 
-from backend.api import security_body, security_protocol
+from backend.api.security import body as security_body
+from backend.api.security import protocol as security_protocol
 from backend.people.passwords import DEFAULT, Passwords
 from backend.people.rights import Right, Role
 from backend.people.throttle import LONGEST_WAIT_S, Throttle

@@ -1,7 +1,7 @@
 """Every route and message that changes something leaves its line in the audit: who, what, values.
 
-Routes tell it in one of two ways (see `backend.api.audited`): where it happens, which is asked
-of each of them here with a real request, or by the wrapper around all routes, which is asked with
+Routes tell it in one of two ways (see `backend.api.audit.audited`): where it happens, which is
+asked of each of them here with a real request, or by the wrapper around all routes, which is asked with
 every route that there is.
 """
 
@@ -16,9 +16,9 @@ from typing import Any
 
 import pytest
 
-from backend.api.audited import CHANGES_NOTHING, TOLD_THERE, AuditedAnswers
+from backend.api.audit.audited import CHANGES_NOTHING, TOLD_THERE, AuditedAnswers
 from backend.api.models import JobInfo
-from backend.api.rights import API, ROUTES
+from backend.api.security.rights import API, ROUTES
 from backend.audit import Fact
 from backend.people.rights import Role
 from tests.security.conftest import Cast

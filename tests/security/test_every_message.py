@@ -14,9 +14,9 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from backend.api import live_messages as live
-from backend.api import security_socket
-from backend.api.security_messages import MESSAGES
+from backend.api.live import messages as live
+from backend.api.security import socket as security_socket
+from backend.api.security.messages import MESSAGES
 from backend.commands.serve import PING_S, PONG_S
 from backend.people.identity import Actor, acting
 from backend.people.rights import RIGHTS, Right, Role

@@ -11,7 +11,7 @@ import pytest
 from fastapi import APIRouter
 from websockets.exceptions import ConnectionClosed
 
-from backend.api.rights import API, ROUTES, Need
+from backend.api.security.rights import API, ROUTES, Need
 from backend.people.rights import RIGHTS, Right, Role
 from tests.security.conftest import Cast
 from tests.support.guarded import PASSWORD, Caller, GuardedServer, Page
@@ -50,7 +50,9 @@ def may(need: Need, rights: frozenset[Right]) -> bool:
 def test_every_route_is_declared_and_nothing_else(server: GuardedServer) -> None:
     declared = {key for key in ROUTES if key.split(" ")[1].startswith(API)}
     own = {f"GET {API}/openapi.json", f"WS {API}/live"}
-    assert set(operations(server)) - declared == set(), "say in backend/api/rights.py who may"
+    assert set(operations(server)) - declared == set(), (
+        "say in backend/api/security/rights.py who may"
+    )
     assert declared - own - set(operations(server)) == set(), "no such route any more"
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from backend.api.security_body import has_half_characters
+from backend.api.security.body import has_half_characters
 from backend.recording.bundle import _table
-from backend.spreadsheet import as_text
+from backend.store.spreadsheet import as_text
 from tests.security.conftest import Cast
 from tests.support.guarded import Caller, GuardedServer
 

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from schemathesis.checks import CHECKS, load_all_checks
 from schemathesis.core.failures import FailureGroup
 
-from backend.api.rights import ROUTES
+from backend.api.security.rights import ROUTES
 from backend.people.rights import Right, Role
 from tests.support.guarded import Caller, GuardedServer
 

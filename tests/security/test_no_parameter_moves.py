@@ -15,13 +15,13 @@ from typing import Any
 
 import pytest
 
-from backend import parameter_set
-from backend.bench import Bench
 from backend.commands import local_params, remote_params, session
 from backend.commands.options import Place
-from backend.member import Member
+from backend.drive.readings import Reading
+from backend.parameters import set_file as parameter_set
 from backend.people.rights import Right, Role
-from backend.readings import Reading
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from profiles.schema import LinkKind, Parameter, Profile, Raw

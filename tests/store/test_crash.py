@@ -22,12 +22,12 @@ from sqlalchemy import event, select
 
 from backend.audit import AuditLog, Fact
 from backend.audit.trail import Filter, Trail
-from backend.journal import Journal
 from backend.library.entries import Addition
 from backend.recording.reader import RecordingReader
-from backend.records import Records
+from backend.station.records import Records
 from backend.store import DatabaseFailed, Store
 from backend.store.library_tables import Version
+from backend.work.journal import Journal
 from tests.support.postgres import Postgres
 from tests.support.station import until
 

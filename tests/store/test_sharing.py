@@ -14,8 +14,8 @@ from backend.library import Library
 from backend.library.described import folders
 from backend.library.entries import Addition, Entry, Query
 from backend.library.index import Index
+from backend.library.measurements import MeasurementStore
 from backend.library.sharing import fetch, share
-from backend.measurements import MeasurementStore
 from backend.store import Store
 from backend.store.blobs import BlobFailed, Blobs
 from drivers.errors import NotAllowed

@@ -27,12 +27,12 @@ from typing import Any
 from sqlalchemy import Engine, event
 
 from backend.audit import Fact
-from backend.files import write_atomically
-from backend.journal import Journal
 from backend.library.catalogue import INLINE
 from backend.library.entries import Addition, AxisIdentity
 from backend.recording.writer import RecordingWriter
-from backend.records import Records
+from backend.station.records import Records
+from backend.store.files import write_atomically
+from backend.work.journal import Journal
 from tests.unit.recording.support import block, header
 
 SET = """format = "servodeck parameter set"

@@ -14,12 +14,12 @@ import httpx
 import uvicorn
 from argon2 import PasswordHasher
 
-from backend.bench import Bench
 from backend.commands.serve import Serving, _config, _listen
-from backend.member import Member
 from backend.people.passwords import Passwords
 from backend.people.rights import Right, Role
 from backend.people.station import People
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
 from tests.support.servo import Servo, bench_with
 from tests.support.station import HANG_S, Live
 

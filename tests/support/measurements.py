@@ -11,14 +11,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
-from backend.axis import Envelope
-from backend.drive import Drive
-from backend.measurements import pack
-from backend.tools import excite
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.step_response import StepSettings, _demand
-from backend.tools.sweep_evaluation import SweepSettings
+from backend.axis.axis import Envelope
+from backend.drive.drive import Drive
+from backend.library.measurements import pack
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.inertia.evaluation import InertiaSettings
+from backend.tools.measuring import excite
+from backend.tools.step.run import StepSettings, _demand
+from backend.tools.sweep.evaluation import SweepSettings
 
 RATE_HZ = 1000.0
 #: Corner of the loop: its −3 dB bandwidth, and a rise time of ln 9 / (2π · 60 Hz).

@@ -10,8 +10,8 @@ import asyncio
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from backend.bench import Bench
-from backend.member import Member
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
 from drivers.codec import size_of
 from drivers.errors import DriveError, LinkTimeout
 from drivers.link import Address

@@ -19,10 +19,10 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from backend.api.app import make_app
-from backend.bench import Bench
 from backend.commands.serve import LOOPBACK, _listen
-from backend.demo import DemoBench
 from backend.people.station import People
+from backend.station.bench import Bench
+from backend.station.demo import DemoBench
 
 #: What takes longer hangs. It is no check of the product: where that promises a time, a test says
 #: so with a time of its own.
@@ -56,7 +56,8 @@ class Station:
         blobs: str | None = None,
     ) -> None:
         """With ``steady`` replies on EtherCAT are awaited, as in the demo: a busy machine is then
-        no trouble for the drives. ``database`` and ``blobs`` are those of `backend.bench.Bench`.
+        no trouble for the drives. ``database`` and ``blobs`` are those of
+        `backend.station.bench.Bench`.
         """
         self._records = {"database": database, "blobs": blobs}
         self.people = people

@@ -12,9 +12,9 @@ from types import SimpleNamespace
 import pytest
 
 from drivers.errors import LinkLost, LinkTimeout
-from drivers.ethercat import protocol
-from drivers.ethercat.hostprocess import HostProcess
-from drivers.ethercat.ring import Ring
+from drivers.ethercat.exchange.ring import Ring
+from drivers.ethercat.process import protocol
+from drivers.ethercat.process.hostprocess import HostProcess
 
 
 def host() -> HostProcess:

@@ -53,7 +53,7 @@ ALLOWED: dict[tuple[str, str], str] = {
         "if error.args[0] == errno.EINTR:",
     ): "termios.error is no OSError: its number is its first argument",
     (
-        "drivers/ethercat/recovery.py",
+        "drivers/ethercat/exchange/recovery.py",
         "if error.message != last:",
     ): "the log does not repeat a line; the attempts go on in any case",
     (

@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.drive import Drive
-from backend.ports import Port
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
 from backend.scales.scale import Doubt, Origin, ScaleUnknown
-from backend.tools.cyclic_motion import GeneratorSettings, generate
+from backend.tools.jog.cyclic import GeneratorSettings, generate
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec
 from profiles import load_profile

@@ -12,16 +12,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.loop_goals import Goals, LoadClass, Mark, Worst, goals_for, worst_of
-from backend.analysis.loop_search import (
+from backend.analysis.loop.loop_goals import Goals, LoadClass, Mark, Worst, goals_for, worst_of
+from backend.analysis.loop.loop_search import (
     BEGUN,
     INTEGRAL_RATIO,
     TRIED_AT_LAST,
     Found,
     LoopSearch,
 )
-from backend.analysis.loop_structure import (
+from backend.analysis.loop.loop_structure import (
     TURN,
     DriveLoops,
     Gains,
@@ -31,10 +30,11 @@ from backend.analysis.loop_structure import (
     speed_loop,
     step_of_closed_loop,
 )
-from backend.analysis.margins import Margins, bandwidth, closed_from_open, margins
-from backend.analysis.measured_plant import MeasuredPlant
-from backend.analysis.notch import Notch
-from backend.analysis.step import step_metrics
+from backend.analysis.loop.margins import Margins, bandwidth, closed_from_open, margins
+from backend.analysis.loop.measured_plant import MeasuredPlant
+from backend.analysis.loop.notch import Notch
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.signals.step import step_metrics
 
 MARKS: tuple[Mark, ...] = ("robust", "balanced", "fast")
 _POSITION_GOALS = Goals(8.0, 60.0, 1.6)

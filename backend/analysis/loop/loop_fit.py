@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.mechanical_model import TURN
-from backend.analysis.sampled_model import LoopModel
-from backend.analysis.sampling import DIRECT_SHARE, SignalPath, delay_response, lag_response
+from backend.analysis.mechanics.mechanical_model import TURN
+from backend.analysis.response.sampled_model import LoopModel
+from backend.analysis.response.sampling import (
+    DIRECT_SHARE,
+    SignalPath,
+    delay_response,
+    lag_response,
+)
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 
 def fit_loop(

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from backend.analysis.arrays import BoolArray, ComplexArray
+from backend.analysis.signals.arrays import BoolArray, ComplexArray
 
 LoadClass = Literal["stiff", "medium", "compliant"]
 Mark = Literal["robust", "balanced", "fast"]

@@ -15,18 +15,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.loop_goals import (
+from backend.analysis.loop.loop_goals import (
     Goals,
     Worst,
     sensitivity_peak,
     stable_with_less_gain,
     worst_of,
 )
-from backend.analysis.loop_structure import TURN, DriveLoops, NotchResponse
-from backend.analysis.measured_plant import BEYOND, MeasuredPlant
-from backend.analysis.mechanical_model import MechanicalModel
-from backend.analysis.notch import Notch
+from backend.analysis.loop.loop_structure import TURN, DriveLoops, NotchResponse
+from backend.analysis.loop.measured_plant import BEYOND, MeasuredPlant
+from backend.analysis.loop.notch import Notch
+from backend.analysis.mechanics.mechanical_model import MechanicalModel
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: The PI's corner is the speed bandwidth divided by this.
 INTEGRAL_RATIO = 10.0

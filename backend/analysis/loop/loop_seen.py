@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray
-from backend.analysis.margins import open_from_closed
-from backend.analysis.measured_plant import AS_THE_MODEL, MeasuredPlant
+from backend.analysis.loop.margins import open_from_closed
+from backend.analysis.loop.measured_plant import AS_THE_MODEL, MeasuredPlant
+from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 
 #: What a line of a closed loop may be off by, whatever its scatter says (logarithm): half of the
 #: 0.4 dB and 3° that such a measurement is held to.

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.notch import Notch
-from backend.analysis.sampling import delay_response, lag_response
+from backend.analysis.loop.notch import Notch
+from backend.analysis.response.sampling import delay_response, lag_response
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 TURN = 2.0 * np.pi
 NotchResponse = Callable[[Notch, FloatArray], ComplexArray]

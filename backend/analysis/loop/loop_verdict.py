@@ -15,8 +15,8 @@ from typing import Literal
 
 import numpy as np
 
-from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray
-from backend.analysis.loop_goals import Goals, sensitivity_peak, stable, worst_of
+from backend.analysis.loop.loop_goals import Goals, sensitivity_peak, stable, worst_of
+from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 
 #: Deviations to either side that hold 95 of 100 cases.
 _CI95 = 1.96

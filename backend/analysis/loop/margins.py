@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray, magnitude_db, phase_deg
+from backend.analysis.signals.arrays import ComplexArray, FloatArray, magnitude_db, phase_deg
 
 
 def open_from_closed(closed: ComplexArray) -> ComplexArray:

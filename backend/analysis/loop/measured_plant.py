@@ -7,9 +7,9 @@ from itertools import product
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.frf import Frf
-from backend.analysis.mechanical_model import MechanicalModel
+from backend.analysis.mechanics.mechanical_model import MechanicalModel
+from backend.analysis.response.frf import Frf
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: Modes may move by this factor in frequency and this in damping after the measurement.
 FREQUENCY_FACTORS = (0.95, 1.0, 1.05)

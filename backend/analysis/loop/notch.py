@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 TURN = 2.0 * np.pi
 

@@ -18,15 +18,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.notch import Notch
-from backend.analysis.sampled_model import LoopModel
-from backend.analysis.sampling import (
+from backend.analysis.loop.notch import Notch
+from backend.analysis.response.sampled_model import LoopModel
+from backend.analysis.response.sampling import (
     SignalPath,
     command_response,
     delay_response,
     lag_response,
 )
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: Images that are counted on each side, multiples of the sample rate.
 _IMAGES = 25

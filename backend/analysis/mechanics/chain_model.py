@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.mechanical_model import (
+from backend.analysis.mechanics.mechanical_model import (
     MODE_PARAMETERS,
     RIGID_PARAMETERS,
     TURN,
     MechanicalModel,
     Mode,
 )
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 LOAD_PARAMETERS = 3
 

@@ -13,15 +13,13 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray
-from backend.analysis.chain_model import (
+from backend.analysis.mechanics.chain_model import (
     LOAD_PARAMETERS,
     chain_response_and_slopes,
     loads_of,
     model_of_chain,
 )
-from backend.analysis.frf import Frf
-from backend.analysis.mechanical_model import (
+from backend.analysis.mechanics.mechanical_model import (
     MODE_PARAMETERS,
     RIGID_PARAMETERS,
     TURN,
@@ -29,9 +27,11 @@ from backend.analysis.mechanical_model import (
     model_of,
     response_and_slopes,
 )
-from backend.analysis.robust_fit import minimise
-from backend.analysis.sampled_model import LoopModel, Sampler
-from backend.analysis.sampling import SignalPath, delay_response, lag_response
+from backend.analysis.mechanics.robust_fit import minimise
+from backend.analysis.response.frf import Frf
+from backend.analysis.response.sampled_model import LoopModel, Sampler
+from backend.analysis.response.sampling import SignalPath, delay_response, lag_response
+from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 
 #: Delays that no path tells are small: this one standard deviation, in s, beside the lines.
 _USUAL_DELAY_S = 60e-6

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from backend.analysis.arrays import ComplexArray, FloatArray, neighbour_mean
-from backend.analysis.line_spectra import (
+from backend.analysis.response.sampling import SignalPath
+from backend.analysis.signals.arrays import ComplexArray, FloatArray, neighbour_mean
+from backend.analysis.signals.line_spectra import (
     LineSpectra,
     Quantity,
     continuous_input,
     friction_input,
     instrument_estimate,
 )
-from backend.analysis.sampling import SignalPath
 
 #: No line is weighed as if its noise were less than this share of an ordinary line's.
 _LEAST_NOISE = 0.1

@@ -14,17 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray
-from backend.analysis.distortion import Distortion, distortion
-from backend.analysis.doubt import Doubt, Shifted
-from backend.analysis.doubt import doubt as joint_doubt
-from backend.analysis.fit_problem import KnownInertia
-from backend.analysis.frf import Frf, estimate_periodic
-from backend.analysis.line_spectra import Quantity, Record, loop_spectra, speed_lag_s
-from backend.analysis.loop_fit import fit_loop
-from backend.analysis.mode_doubt import ModeDoubt, mode_doubts
-from backend.analysis.model_fit import Solution, fit_sampled_model, views_of
-from backend.analysis.path_fit import (
+from backend.analysis.loop.loop_fit import fit_loop
+from backend.analysis.mechanics.fit_problem import KnownInertia
+from backend.analysis.mechanics.mode_uncertainty import ModeDoubt, mode_doubts
+from backend.analysis.mechanics.model_fit import Solution, fit_sampled_model, views_of
+from backend.analysis.mechanics.reversals import with_balanced_reversals
+from backend.analysis.response.distortion import Distortion, distortion
+from backend.analysis.response.frf import Frf, estimate_periodic
+from backend.analysis.response.path_fit import (
     at_whole_cycles,
     find_paths,
     moved_path,
@@ -32,10 +29,9 @@ from backend.analysis.path_fit import (
     path_covariance,
     torque_left,
 )
-from backend.analysis.reference_gain import ReferenceLoop
-from backend.analysis.reversals import with_balanced_reversals
-from backend.analysis.sampled_model import LoopModel, SampledFit
-from backend.analysis.sampling import (
+from backend.analysis.response.reference_gain import ReferenceLoop
+from backend.analysis.response.sampled_model import LoopModel, SampledFit
+from backend.analysis.response.sampling import (
     DIRECT_SHARE,
     STEP_LEAD_S,
     USUAL_CURRENT_HZ,
@@ -44,8 +40,7 @@ from backend.analysis.sampling import (
     delay_response,
     lag_response,
 )
-from backend.analysis.settling import settled
-from backend.analysis.stated_band import (
+from backend.analysis.response.stated_band import (
     distorted,
     ended_where_unknown,
     pooled,
@@ -53,7 +48,12 @@ from backend.analysis.stated_band import (
     widened,
     without_images,
 )
-from backend.analysis.two_signals import ways_of
+from backend.analysis.response.two_signals import ways_of
+from backend.analysis.response.uncertainty import Doubt, Shifted
+from backend.analysis.response.uncertainty import doubt as joint_doubt
+from backend.analysis.signals.arrays import ComplexArray
+from backend.analysis.signals.line_spectra import Quantity, Record, loop_spectra, speed_lag_s
+from backend.analysis.signals.transient_removal import settled
 
 #: A model whose median relative misfit is larger, and larger than the noise, corrects nothing.
 TRUSTED_ERROR = 0.03

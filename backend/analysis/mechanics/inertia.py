@@ -15,9 +15,8 @@ import numpy as np
 from scipy.ndimage import convolve1d
 from scipy.stats import t as student_t
 
-from backend.analysis.arrays import BoolArray, FloatArray
-from backend.analysis.load_swing import find_swings, lag_of_load, lag_slopes
-from backend.analysis.load_terms import (
+from backend.analysis.mechanics.load_swing import find_swings, lag_of_load, lag_slopes
+from backend.analysis.mechanics.load_terms import (
     NOTHING_BESIDE,
     Beside,
     Motion,
@@ -25,7 +24,8 @@ from backend.analysis.load_terms import (
     find_terms,
     independent_share,
 )
-from backend.analysis.place_torque import angle_of
+from backend.analysis.mechanics.position_torque import angle_of
+from backend.analysis.signals.arrays import BoolArray, FloatArray
 
 #: Shares of J, viscous, Coulomb and gravity torque by which compliance, timing and the smoothing
 #: of standstill bend the answer however little noise there is; part of every interval.

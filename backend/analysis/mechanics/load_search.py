@@ -11,15 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.chain_model import (
+from backend.analysis.mechanics.chain_model import (
     LOAD_PARAMETERS,
     chain_of_modes,
     loads_of,
     responses_with_load,
     with_load,
 )
-from backend.analysis.fit_problem import (
+from backend.analysis.mechanics.fit_problem import (
     HIGHEST_TRIED,
     USUAL_DAMPING,
     Found,
@@ -27,8 +26,9 @@ from backend.analysis.fit_problem import (
     View,
     best_view,
 )
-from backend.analysis.mechanical_model import RIGID_PARAMETERS, TURN
-from backend.analysis.sampling import delay_response
+from backend.analysis.mechanics.mechanical_model import RIGID_PARAMETERS, TURN
+from backend.analysis.response.sampling import delay_response
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: Antiresonances that are tried, from this multiple of the lowest line.
 _LOWEST_TRIED = 1.3

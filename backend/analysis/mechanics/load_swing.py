@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
-from backend.analysis.arrays import BoolArray, FloatArray, IntArray
+from backend.analysis.signals.arrays import BoolArray, FloatArray, IntArray
 
 #: What the search looks at: ratios of neighbouring frequencies, and dampings.
 _STEP, _DAMPINGS = 1.07, (0.008, 0.03, 0.1)

@@ -13,8 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import BoolArray, FloatArray
-from backend.analysis.place_torque import COGGING_RAD, Smooth, find_period, place_columns
+from backend.analysis.mechanics.position_torque import (
+    COGGING_RAD,
+    Smooth,
+    find_period,
+    place_columns,
+)
+from backend.analysis.signals.arrays import BoolArray, FloatArray
 
 #: A term that takes this share of the power that is left is there, whatever the noise.
 _PLAIN = 0.5

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 TURN = 2.0 * np.pi
 

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.fit_problem import Problem, robust_rows
+from backend.analysis.mechanics.fit_problem import Problem, robust_rows
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: What path and interpolation leave of frequency and damping however long one measures, and of
 #: damping where the friction that every axis has did not show, and so is still in the lines.

@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import BoolArray, FloatArray
-from backend.analysis.chain_model import modal_start
-from backend.analysis.fit_problem import (
+from backend.analysis.mechanics.chain_model import modal_start
+from backend.analysis.mechanics.fit_problem import (
     CHAIN,
     MODAL,
     USUAL_CORNER,
@@ -24,11 +23,12 @@ from backend.analysis.fit_problem import (
     View,
     best_view,
 )
-from backend.analysis.frf import Frf, valid_band_hz
-from backend.analysis.load_search import telling_lines, with_one_more, with_one_more_mode
-from backend.analysis.mechanical_model import RIGID_PARAMETERS, TURN
-from backend.analysis.sampled_model import LoopModel, SampledFit
-from backend.analysis.sampling import SignalPath
+from backend.analysis.mechanics.load_search import telling_lines, with_one_more, with_one_more_mode
+from backend.analysis.mechanics.mechanical_model import RIGID_PARAMETERS, TURN
+from backend.analysis.response.frf import Frf, valid_band_hz
+from backend.analysis.response.sampled_model import LoopModel, SampledFit
+from backend.analysis.response.sampling import SignalPath
+from backend.analysis.signals.arrays import BoolArray, FloatArray
 
 #: One more load must gain this much, free modes instead of a chain that much.
 _WORTHWHILE, _MODES_GAIN = 10.0, 60.0

@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from backend.analysis.arrays import BoolArray, FloatArray
+from backend.analysis.signals.arrays import BoolArray, FloatArray
 
 _TURN = 2 * np.pi
 #: The longest period looked for, in ways of the move: a sine is a straight line and a bow there.

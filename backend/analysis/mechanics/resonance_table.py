@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray
-from backend.analysis.mechanical_model import MechanicalModel
-from backend.analysis.mode_doubt import ModeDoubt
-from backend.analysis.resonance import Resonance
+from backend.analysis.mechanics.mechanical_model import MechanicalModel
+from backend.analysis.mechanics.mode_uncertainty import ModeDoubt
+from backend.analysis.mechanics.resonance import Resonance
+from backend.analysis.signals.arrays import FloatArray
 
 #: Weak modes below this are artefacts of friction more often than mechanics.
 _LOWEST_MODE_HZ = 15.0

@@ -16,10 +16,10 @@ import numpy as np
 from scipy.fft import next_fast_len
 from scipy.signal import lfilter
 
-from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray
-from backend.analysis.line_spectra import Quantity, Record, own_torque
-from backend.analysis.sampled_model import SampledFit
-from backend.analysis.sampling import STEP_LEAD_S, SignalPath, delay_response, lag_response
+from backend.analysis.response.sampled_model import SampledFit
+from backend.analysis.response.sampling import STEP_LEAD_S, SignalPath, delay_response, lag_response
+from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
+from backend.analysis.signals.line_spectra import Quantity, Record, own_torque
 
 #: Where the balance is off by more than this (one deviation, of the Coulomb torque) the sampled
 #: speed tells more. It tells an interval to 0.3; but errors of the balance are those of speeds at

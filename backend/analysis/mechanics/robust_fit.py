@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray
+from backend.analysis.signals.arrays import FloatArray
 
 Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 

@@ -11,11 +11,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray
-from backend.analysis.frf import Frf
-from backend.analysis.mechanical_model import MechanicalModel, Mode
+from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
 from backend.analysis.response.foreign import ForeignResponse
+from backend.analysis.response.frf import Frf
 from backend.analysis.response.product_model import TURN, ProductModel
+from backend.analysis.signals.arrays import FloatArray
 
 #: Lines beyond ±90° by more than this and their band contradict; so many in a row are no chance.
 _TOLERATED_DEG, _IN_A_ROW = 12.0, 4

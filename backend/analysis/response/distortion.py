@@ -13,10 +13,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray, IntArray, neighbour_mean
-from backend.analysis.excitation import Excitation
-from backend.analysis.frf import Frf
-from backend.analysis.line_spectra import (
+from backend.analysis.response.frf import Frf
+from backend.analysis.response.sampling import SignalPath, delay_response, reported_response
+from backend.analysis.signals.arrays import (
+    BoolArray,
+    ComplexArray,
+    FloatArray,
+    IntArray,
+    neighbour_mean,
+)
+from backend.analysis.signals.excitation import Excitation
+from backend.analysis.signals.line_spectra import (
     Quantity,
     Record,
     friction_direction,
@@ -26,7 +33,6 @@ from backend.analysis.line_spectra import (
     speed_lag_s,
     velocity_from_position,
 )
-from backend.analysis.sampling import SignalPath, delay_response, reported_response
 
 #: Empty bins that a level is taken over, to each side, and the fewest that tell anything.
 _REACH, _FEWEST = 6, 12

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from scipy.signal import stft
 
-from backend.analysis.arrays import BoolArray, FloatArray, IntArray
+from backend.analysis.signals.arrays import BoolArray, FloatArray, IntArray
 
 Excited = Literal["periodic", "chirp", "noise"]
 

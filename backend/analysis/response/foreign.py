@@ -7,13 +7,6 @@ from typing import Literal
 
 import numpy as np
 
-from backend.analysis.arrays import (
-    ComplexArray,
-    FloatArray,
-    magnitude_db,
-    neighbour_mean,
-    phase_deg,
-)
 from backend.analysis.response.excitation_found import (
     Excited,
     excited_lines,
@@ -24,6 +17,13 @@ from backend.analysis.response.local_polynomial import local_polynomial
 from backend.analysis.response.modes_found import FoundMode, modes_of
 from backend.analysis.response.product_model import ProductFit, fit_product
 from backend.analysis.response.repeat_band import RepeatBand, line_scatter, repeat_band
+from backend.analysis.signals.arrays import (
+    ComplexArray,
+    FloatArray,
+    magnitude_db,
+    neighbour_mean,
+    phase_deg,
+)
 
 Method = Literal["periods", "local polynomial"]
 

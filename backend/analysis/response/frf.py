@@ -11,7 +11,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from scipy.stats import t as student_t
 
-from backend.analysis.arrays import (
+from backend.analysis.mechanics.friction import estimate_coulomb, scatter_left
+from backend.analysis.response.sampling import DIRECT_SHARE, MODEL_SHARE, SignalPath
+from backend.analysis.signals.arrays import (
     BoolArray,
     ComplexArray,
     FloatArray,
@@ -19,8 +21,7 @@ from backend.analysis.arrays import (
     neighbour_mean,
     phase_deg,
 )
-from backend.analysis.friction import estimate_coulomb, scatter_left
-from backend.analysis.line_spectra import (
+from backend.analysis.signals.line_spectra import (
     LineSpectra,
     Quantity,
     Record,
@@ -28,7 +29,6 @@ from backend.analysis.line_spectra import (
     continuous_input,
     instrument_estimate,
 )
-from backend.analysis.sampling import DIRECT_SHARE, MODEL_SHARE, SignalPath
 
 #: What friction did to a line is off by this share where only the speed tells its direction, and
 #: where the balance of torques does at reversals: all lines alike, as too little or too much

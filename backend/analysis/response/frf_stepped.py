@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import t as student_t
 
-from backend.analysis.frf import Frf, valid_band_hz
-from backend.analysis.line_spectra import (
+from backend.analysis.response.frf import Frf, valid_band_hz
+from backend.analysis.response.sampling import SignalPath
+from backend.analysis.signals.line_spectra import (
     LineSpectra,
     Quantity,
     Record,
@@ -14,7 +15,6 @@ from backend.analysis.line_spectra import (
     own_torque,
     tone_amplitudes,
 )
-from backend.analysis.sampling import SignalPath
 
 
 def estimate_stepped(record: Record, path: SignalPath, quantity: Quantity) -> Frf:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray, IntArray
+from backend.analysis.signals.arrays import ComplexArray, FloatArray, IntArray
 
 _ORDER = 2
 #: Unknowns of a window: both polynomials. So many equations more tell the scatter.

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import find_peaks
 
-from backend.analysis.arrays import FloatArray
-from backend.analysis.resonance import Resonance
+from backend.analysis.mechanics.resonance import Resonance
 from backend.analysis.response.product_model import ProductFit
+from backend.analysis.signals.arrays import FloatArray
 
 #: A peak or valley stands out so much from the curve, without its slope.
 _LEAST_DB = 3.0

@@ -11,10 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares, minimize_scalar
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.line_spectra import Record, mean_spectra
-from backend.analysis.sampled_model import LoopModel, SampledFit
-from backend.analysis.sampling import (
+from backend.analysis.response.sampled_model import LoopModel, SampledFit
+from backend.analysis.response.sampling import (
     STEP_LEAD_S,
     Hold,
     SignalPath,
@@ -22,6 +20,8 @@ from backend.analysis.sampling import (
     lag_response,
     sampled_command_response,
 )
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.signals.line_spectra import Record, mean_spectra
 
 #: Set-points are in force after this many cycles at most.
 _MOST_CYCLES = 3.5

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 TURN = 2.0 * np.pi
 #: A further pair must leave less than this of what the lines differ by from the model.

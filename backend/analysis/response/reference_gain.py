@@ -11,16 +11,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.line_spectra import Record
-from backend.analysis.path_fit import PathFit, ranked
-from backend.analysis.sampled_model import LoopModel, SampledFit
-from backend.analysis.sampling import (
+from backend.analysis.response.path_fit import PathFit, ranked
+from backend.analysis.response.sampled_model import LoopModel, SampledFit
+from backend.analysis.response.sampling import (
     Hold,
     SignalPath,
     sampled_command_response,
     sampled_integral_response,
 )
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.signals.line_spectra import Record
 
 _TURN = 2 * np.pi
 #: A torque of which more than this share (power) is not made of the reference does not follow it.

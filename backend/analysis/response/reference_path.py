@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.sampling import Hold, hold_response
+from backend.analysis.response.sampling import Hold, hold_response
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: What a line may be off by, whatever its scatter says (logarithm).
 _OFF = 0.02

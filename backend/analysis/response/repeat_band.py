@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray, neighbour_mean
 from backend.analysis.response.local_polynomial import smooth_residual
 from backend.analysis.response.modes_found import FoundMode
 from backend.analysis.response.product_model import ProductModel, jacobian
+from backend.analysis.signals.arrays import ComplexArray, FloatArray, neighbour_mean
 
 #: Lines to each side of the local parabola, and of the mean of what it leaves.
 _REACH, _POOL = 6, 8

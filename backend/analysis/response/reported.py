@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.frf import Frf
-from backend.analysis.line_spectra import Record, good_periods, period_spectra
-from backend.analysis.sampling import SignalPath, lag_response
+from backend.analysis.response.frf import Frf
+from backend.analysis.response.sampling import SignalPath, lag_response
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.signals.line_spectra import Record, good_periods, period_spectra
 
 #: A speed may be a mean over so many cycles; it is one where half of the upper
 #: lines differ by less.

@@ -13,15 +13,15 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.mechanical_model import MechanicalModel
-from backend.analysis.sampling import (
+from backend.analysis.mechanics.mechanical_model import MechanicalModel
+from backend.analysis.response.sampling import (
     SignalPath,
     delay_response,
     hold_response,
     lag_response,
     reported_response,
 )
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 TURN = 2.0 * np.pi
 #: Nothing comes back from above this, whatever the sample rate.

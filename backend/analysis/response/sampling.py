@@ -3,7 +3,7 @@
 The bus sends one value per cycle of length T; the drive holds it (zero-order), or interpolates
 towards it when 60C2h is in use (linear, one cycle later), passes it through the current loop
 (first order here) and a delay. All of that is known and can be divided out; what sampling folds
-back above half the sample rate is not, see :mod:`backend.analysis.sampled_model`.
+back above half the sample rate is not, see :mod:`backend.analysis.response.sampled_model`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from scipy.signal import lfilter
 
-from backend.analysis.arrays import ComplexArray, FloatArray
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 Hold = Literal["zero", "linear"]
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import median_filter
 
-from backend.analysis.arrays import ComplexArray, FloatArray, neighbour_mean
-from backend.analysis.frf import Frf, valid_band_hz
-from backend.analysis.model_fit import Solution
-from backend.analysis.sampling import DIRECT_SHARE, hold_response
+from backend.analysis.mechanics.model_fit import Solution
+from backend.analysis.response.frf import Frf, valid_band_hz
+from backend.analysis.response.sampling import DIRECT_SHARE, hold_response
+from backend.analysis.signals.arrays import ComplexArray, FloatArray, neighbour_mean
 
 #: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
 SYSTEMATIC_DB = 0.05

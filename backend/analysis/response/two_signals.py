@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.doubt import Doubt
-from backend.analysis.frf import Frf
-from backend.analysis.sampled_model import SampledFit
-from backend.analysis.sampling import SignalPath, delay_response, lag_response
+from backend.analysis.response.frf import Frf
+from backend.analysis.response.sampled_model import SampledFit
+from backend.analysis.response.sampling import SignalPath, delay_response, lag_response
+from backend.analysis.response.uncertainty import Doubt
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: Of what the two are folded differently by, so much may be wrong: a drive's speed is not quite a
 #: filter of first order.

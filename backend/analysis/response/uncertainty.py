@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.fit_problem import Problem, View, robust_rows
-from backend.analysis.mechanical_model import RIGID_PARAMETERS, TURN
+from backend.analysis.mechanics.fit_problem import Problem, View, robust_rows
+from backend.analysis.mechanics.mechanical_model import RIGID_PARAMETERS, TURN
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: Places of the delays and of the speed filter among a fit's parameters.
 _DELAY, _POSITION_DELAY, _FILTER = 2, 3, 4

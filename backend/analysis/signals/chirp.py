@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray, IntArray
-from backend.analysis.excitation import Excitation, falling_amplitude
-from backend.analysis.ramps import cosine_ramp, settled_ramp
+from backend.analysis.signals.arrays import FloatArray, IntArray
+from backend.analysis.signals.excitation import Excitation, falling_amplitude
+from backend.analysis.signals.ramps import cosine_ramp, settled_ramp
 
 
 def chirp_period(

@@ -17,9 +17,9 @@ from typing import Literal
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray, IntArray
-from backend.analysis.low_crest import low_crest_period
-from backend.analysis.ramps import ramped_periods
+from backend.analysis.signals.arrays import FloatArray, IntArray
+from backend.analysis.signals.low_crest import low_crest_period
+from backend.analysis.signals.ramps import ramped_periods
 
 Kind = Literal["multisine", "chirp", "prbs", "stepped_sine"]
 Spacing = Literal["log", "linear"]

@@ -1,7 +1,8 @@
 """Recordings as spectra on the excited lines, and what really drove the axis there.
 
 What the torque was between two bus cycles is reconstructed from the sent sequence, see
-:mod:`backend.analysis.sampling`. Periods with a lost cycle are left out, never interpolated.
+:mod:`backend.analysis.response.sampling`. Periods with a lost cycle are left
+out, never interpolated.
 """
 
 from __future__ import annotations
@@ -12,9 +13,7 @@ from typing import Literal
 import numpy as np
 from scipy.signal import resample_poly
 
-from backend.analysis.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from backend.analysis.excitation import Excitation, Segment
-from backend.analysis.sampling import (
+from backend.analysis.response.sampling import (
     SignalPath,
     command_response,
     delay_response,
@@ -22,6 +21,8 @@ from backend.analysis.sampling import (
     reported_response,
     sampled_command,
 )
+from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from backend.analysis.signals.excitation import Excitation, Segment
 
 #: *torque_mode*: nothing but the injection makes torque. *torque_injection*: a speed or position
 #: loop adds its own torque. *closed_loop*: from the loop's reference to the response.

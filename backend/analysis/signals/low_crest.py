@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import minimize
 
-from backend.analysis.arrays import FloatArray, IntArray
+from backend.analysis.signals.arrays import FloatArray, IntArray
 
 
 def low_crest_period(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray
-from backend.analysis.excitation import Excitation, choose_lines
-from backend.analysis.ramps import ramped_periods
+from backend.analysis.signals.arrays import FloatArray
+from backend.analysis.signals.excitation import Excitation, choose_lines
+from backend.analysis.signals.ramps import ramped_periods
 
 #: Feedback taps of maximum-length shift registers (Xilinx XAPP052, table 3).
 _PRBS_TAPS: dict[int, tuple[int, ...]] = {

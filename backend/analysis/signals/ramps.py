@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray
+from backend.analysis.signals.arrays import FloatArray
 
 
 def cosine_ramp(n: int) -> FloatArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal as dsp
 
-from backend.analysis.arrays import FloatArray
+from backend.analysis.signals.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray
+from backend.analysis.signals.arrays import FloatArray
 
 
 @dataclass(frozen=True)

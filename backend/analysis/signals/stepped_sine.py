@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.analysis.arrays import FloatArray
-from backend.analysis.excitation import Excitation, Segment
-from backend.analysis.ramps import cosine_ramp
+from backend.analysis.signals.arrays import FloatArray
+from backend.analysis.signals.excitation import Excitation, Segment
+from backend.analysis.signals.ramps import cosine_ramp
 
 
 def stepped_sine(

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray, IntArray
-from backend.analysis.excitation import Excitation
-from backend.analysis.line_spectra import Record
+from backend.analysis.signals.arrays import ComplexArray, FloatArray, IntArray
+from backend.analysis.signals.excitation import Excitation
+from backend.analysis.signals.line_spectra import Record
 
 #: At most so many swings; each must stand so far above what lies around it (power).
 _MOST, _ABOVE = 5, 40.0

@@ -12,7 +12,7 @@ from urllib.parse import parse_qsl
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from backend.api.rights import API, Matched, Policy
+from backend.api.security.rights import API, Matched, Policy
 from backend.audit import AuditLog, Fact
 from backend.audit.asked import MOST_BYTES, Asked, asked, fields_of
 from backend.audit.facts import Kind

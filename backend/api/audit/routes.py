@@ -9,8 +9,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 from fastapi.responses import StreamingResponse
 
-from backend.api.context import TheBench
-from backend.api.models_audit import (
+from backend.api.audit.models import (
     AuditEvent,
     AuditKind,
     AuditNames,
@@ -18,6 +17,7 @@ from backend.api.models_audit import (
     AuditStatus,
     AuditVerdict,
 )
+from backend.api.context import TheBench
 from backend.api.times import in_utc
 from backend.audit.chain import Anchor
 from backend.audit.facts import KINDS

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from backend.api.live_messages import JogStart
-from backend.api.models_motion import GenerateRequest, HomeRequest, MoveRequest, SequenceRequest
-from backend.axis import Envelope
-from backend.bench import Bench
-from backend.member import Member
-from backend.tools.cyclic_motion import GeneratorSettings
-from backend.tools.homing import HomingSettings
-from backend.tools.jog import JogSettings
-from backend.tools.move import MoveSettings, SequenceSettings
-from backend.travel_units import REVOLUTIONS, TravelUnit, travel_unit
+from backend.api.drive.models_motion import (
+    GenerateRequest,
+    HomeRequest,
+    MoveRequest,
+    SequenceRequest,
+)
+from backend.api.live.messages import JogStart
+from backend.axis.axis import Envelope
+from backend.motion.travel_units import REVOLUTIONS, TravelUnit, travel_unit
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.tools.jog.cyclic import GeneratorSettings
+from backend.tools.jog.run import JogSettings
+from backend.tools.moves.homing import HomingSettings
+from backend.tools.moves.move import MoveSettings, SequenceSettings
 
 #: Speed limit of an envelope whose request names no speed: margin over the drive's own limits.
 _SPEED_UNLIMITED_RPM = 20_000.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from backend.api import models_axis
-from backend.bench import Bench
+from backend.api.drive import models_axis
+from backend.station.bench import Bench
 from backend.stopping.facts import AxisStop, Verdict
 from backend.stopping.told import told
 from backend.stopping.turning import Turning

@@ -7,12 +7,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request
 
-from backend import gear, regeneration
 from backend.api import convert
 from backend.api.context import Controlled, TheBench, TheMember
-from backend.api.errors import NotFound
-from backend.api.models import JobInfo
-from backend.api.models_functions import (
+from backend.api.drive.models_functions import (
     AxisRecordInfo,
     BrakingInfo,
     BrakingRequest,
@@ -25,18 +22,21 @@ from backend.api.models_functions import (
     PastFaultInfo,
     WatchUpdate,
 )
-from backend.api.models_parameters import ParameterValue
+from backend.api.drive.models_parameters import ParameterValue
+from backend.api.errors import NotFound
+from backend.api.models import JobInfo
 from backend.audit.asked import note_before
-from backend.axis import Envelope
-from backend.axis_store import AxisRecord, AxisStore
-from backend.drive import Drive
-from backend.fault_history import PastFault, history_of, read_history
-from backend.functions import functions_of
-from backend.mechanics_calc import GearPlan, Mechanics
-from backend.member import Member
-from backend.readings import Reading
-from backend.tools import identification
-from backend.units import gentlest_ramp_rpm_s
+from backend.axis.axis import Envelope
+from backend.axis.fault_history import PastFault, history_of, read_history
+from backend.axis.remembered import AxisRecord, AxisStore
+from backend.axis.units import gentlest_ramp_rpm_s
+from backend.drive.catalog import functions_of
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
+from backend.functions import gear, regeneration
+from backend.functions.gear_calculator import GearPlan, Mechanics
+from backend.station.connected_drive import Member
+from backend.tools.moves import identification
 from drivers.errors import DriveError
 from profiles.functions import FaultHistory, Functions
 

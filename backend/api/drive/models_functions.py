@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from backend.api.drive.models_parameters import ParameterValue
 from backend.api.models import Message, Positive
-from backend.api.models_parameters import ParameterValue
-from backend.mechanics_calc import Mechanics
-from backend.regeneration import Verdict
+from backend.functions.gear_calculator import Mechanics
+from backend.functions.regeneration import Verdict
 
 
 class PastFaultInfo(Message):

@@ -9,9 +9,9 @@ from fastapi import APIRouter, Path
 
 from backend.api.context import TheBench
 from backend.api.errors import NotFound
-from backend.api.models_description import PROFILE_NAME, MotionClass, MotionClassRequest
+from backend.api.station.models_description import PROFILE_NAME, MotionClass, MotionClassRequest
 from backend.audit.asked import note_before
-from backend.bench import Bench
+from backend.station.bench import Bench
 from drivers.errors import NotAllowed
 from profiles import load_profile
 from profiles.loader import ProfileError

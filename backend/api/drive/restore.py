@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from backend.api import convert
 from backend.api.context import Controlled, TheBench
 from backend.api.models import JobInfo
-from backend.api.models_bench import DriveSummary
+from backend.api.station.models import DriveSummary
 from drivers.errors import NotAllowed
 
 router = APIRouter(prefix="/drives/{drive_id}")

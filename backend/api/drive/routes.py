@@ -7,25 +7,24 @@ from collections.abc import Awaitable, Callable, Iterable
 
 from fastapi import APIRouter
 
-from backend.api import convert, convert_motion
+from backend.api import convert
 from backend.api.context import Controlled, TheBench, TheMember
-from backend.api.errors import NotFound, problem_of
-from backend.api.models import JobInfo
-from backend.api.models_axis import (
+from backend.api.drive import convert_motion
+from backend.api.drive.models_axis import (
     ActiveFault,
     AxisState,
     ProcedureInfo,
     ProcedureRequest,
     TransitionRequest,
 )
-from backend.api.models_motion import (
+from backend.api.drive.models_motion import (
     GenerateRequest,
     HomeRequest,
     HomingMethodInfo,
     MoveRequest,
     SequenceRequest,
 )
-from backend.api.models_parameters import (
+from backend.api.drive.models_parameters import (
     ParameterRow,
     ParameterValue,
     ParameterWrite,
@@ -33,15 +32,19 @@ from backend.api.models_parameters import (
     ReadAllRequest,
     WriteResult,
 )
-from backend.api.models_sets import LoadSetRequest
-from backend.bench import Bench
-from backend.drive import Drive
-from backend.jobs import JobResult, Progress
-from backend.member import Member
-from backend.motion.assign import assign
+from backend.api.errors import NotFound, problem_of
+from backend.api.models import JobInfo
+from backend.api.sets.models import LoadSetRequest
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
+from backend.functions.assign import assign
 from backend.motion.classes import held_still, motion_of
-from backend.readings import Reading
-from backend.tools import cyclic_motion, homing, move, parameters, procedures
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.tools import parameters
+from backend.tools.jog import cyclic as cyclic_motion
+from backend.tools.moves import homing, move, procedures
+from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from profiles.schema import Parameter, Raw

@@ -6,8 +6,7 @@ from fastapi import APIRouter
 
 from backend.api import convert
 from backend.api.context import Controlled, TheBench, TheMember
-from backend.api.models import JobInfo
-from backend.api.models_scales import (
+from backend.api.drive.models_scales import (
     ScaleInfo,
     ScalesInfo,
     ScalesUpdate,
@@ -15,17 +14,18 @@ from backend.api.models_scales import (
     SmallMovesInfo,
     TurnedUpdate,
 )
+from backend.api.models import JobInfo
 from backend.audit.asked import note_before
-from backend.bench import Bench
-from backend.jobs import JobResult, Progress
-from backend.measuring import EXCHANGE_ENDS_S, exchange_for
-from backend.member import Member
-from backend.restoring import shielded
+from backend.axis.restoring import shielded
+from backend.axis.units import AxisUnits
 from backend.scales import teaching
 from backend.scales.scale import Scale, what_to_do
 from backend.scales.taught import Taught
-from backend.tools.small_move import SmallMoveSettings, longest_allowed, small_move
-from backend.units import AxisUnits
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
+from backend.tools.moves.small_move import SmallMoveSettings, longest_allowed, small_move
+from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
 
 router = APIRouter(prefix="/drives/{drive_id}")

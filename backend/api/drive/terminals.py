@@ -7,11 +7,9 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Request
 
-from backend import io_functions
 from backend.api import convert
 from backend.api.context import Connection, Controlled, TheBench, TheMember
-from backend.api.errors import NotFound
-from backend.api.models_functions import (
+from backend.api.drive.models_functions import (
     ForcingInfo,
     ForcingStart,
     ForcingValues,
@@ -20,11 +18,13 @@ from backend.api.models_functions import (
     TerminalFunction,
     TerminalInfo,
 )
-from backend.api.models_parameters import ParameterValue
-from backend.forcing import ForcingSession, ForcingSessions
-from backend.functions import functions_of
-from backend.io_functions import ProbeSettings, TerminalState
-from backend.member import Member
+from backend.api.drive.models_parameters import ParameterValue
+from backend.api.errors import NotFound
+from backend.drive import terminals as io_functions
+from backend.drive.catalog import functions_of
+from backend.drive.terminals import ProbeSettings, TerminalState
+from backend.functions.forcing import ForcingSession, ForcingSessions
+from backend.station.connected_drive import Member
 from profiles.functions import Forcing, TerminalFacts
 
 router = APIRouter(prefix="/drives/{drive_id}/io")

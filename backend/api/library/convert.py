@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from backend.api.models_library import (
+from backend.api.library.models import (
     AxisInfo,
     LibraryEntry,
     StoredSet,

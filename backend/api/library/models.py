@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from backend.api.models import Message, Raw
-from backend.api.models_sets import SetFileInfo
+from backend.api.sets.models import SetFileInfo
 
 LibraryKind = Literal["set", "recording", "measurement", "report"]
 TagText = Annotated[str, Field(min_length=1, max_length=60)]

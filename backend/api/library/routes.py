@@ -10,10 +10,10 @@ from urllib.parse import quote
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
 
-from backend.api import convert_library
 from backend.api.context import TheBench
 from backend.api.errors import NotFound
-from backend.api.models_library import (
+from backend.api.library import convert as convert_library
+from backend.api.library.models import (
     LibraryChange,
     LibraryEntry,
     LibraryKind,
@@ -21,13 +21,13 @@ from backend.api.models_library import (
     TagCount,
     VersionInfo,
 )
-from backend.api.routes_recordings import TheRecordings
+from backend.api.scope.recordings import TheRecordings
 from backend.api.times import in_utc
-from backend.bench import Bench
 from backend.library import NotInLibrary, sharing
 from backend.library.entries import Entry
 from backend.library.entries import Query as LibraryQuery
 from backend.recording.service import Recordings
+from backend.station.bench import Bench
 from drivers.errors import NotAllowed
 
 router = APIRouter(prefix="/library")

@@ -18,11 +18,11 @@ from pydantic import BaseModel, ValidationError
 from starlette.websockets import WebSocketState
 
 import backend
-from backend.api import live_news
-from backend.api.convert_stop import stop_result
+from backend.api.drive.convert_stop import stop_result
 from backend.api.errors import problem_of
-from backend.api.live_jog import Jogs
-from backend.api.live_messages import (
+from backend.api.live import news as live_news
+from backend.api.live.jog import Jogs
+from backend.api.live.messages import (
     DriveRequest,
     Hello,
     JogRenew,
@@ -41,15 +41,15 @@ from backend.api.live_messages import (
     WatchValues,
     from_page,
 )
-from backend.api.live_people import PeopleLive
-from backend.api.live_people_messages import PeopleRequest
-from backend.api.live_scope import ScopeStreams
-from backend.api.live_shared import Shared, only
-from backend.api.security_messages import require_message
+from backend.api.live.people import PeopleLive
+from backend.api.live.people_messages import PeopleRequest
+from backend.api.live.scope import ScopeStreams
+from backend.api.live.shared import Shared, only
+from backend.api.security.messages import require_message
 from backend.audit.asked import Asked, asked
-from backend.bench import Bench
 from backend.people.identity import Actor, Identity, acting
 from backend.people.station import People
+from backend.station.bench import Bench
 from drivers.errors import DriveError
 
 #: Messages that wait for a slow page; states, values and drive lists coalesce and do not count.

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from backend.access import Notice
-from backend.api.live_page import Page
-from backend.api.live_people_messages import (
+from backend.api.live.page import Page
+from backend.api.live.people_messages import (
     LeaseAnswer,
     LeaseAsk,
     LeaseHand,
     LeaseNotice,
     LeaseOverride,
 )
-from backend.api.people_record import PeopleRecord
-from backend.bench import Bench
+from backend.api.people.record import PeopleRecord
 from backend.people.errors import Forbidden
 from backend.people.identity import Identity
+from backend.people.lease import Notice
 from backend.people.rights import GRANTABLE, Right
 from backend.people.station import People
+from backend.station.bench import Bench
 from drivers.errors import NotAllowed
 
 

@@ -6,15 +6,15 @@ from collections.abc import Callable
 
 from pydantic import BaseModel
 
-from backend.api.convert_motion import jog_settings, unit_of
+from backend.api.drive.convert_motion import jog_settings, unit_of
 from backend.api.errors import problem_of
-from backend.api.live_messages import JogEnded, JogGap, JogRenew, JogStart
-from backend.bench import Bench
-from backend.jobs import JobResult, Progress
-from backend.member import Member
-from backend.tools.cyclic_motion import jog_cyclic
-from backend.tools.hold import Hold
-from backend.tools.jog import jog
+from backend.api.live.messages import JogEnded, JogGap, JogRenew, JogStart
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.tools.jog.cyclic import jog_cyclic
+from backend.tools.jog.hold import Hold
+from backend.tools.jog.run import jog
+from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
 
 

@@ -7,19 +7,20 @@ from functools import partial
 
 from fastapi import WebSocket
 
-from backend.api import convert, live_news
-from backend.api.live_connection import Connection
-from backend.api.live_messages import Logged
-from backend.api.live_people import PeopleLive
-from backend.api.live_shared import Shared
-from backend.api.security_socket import OpenSockets
-from backend.bench import Bench
-from backend.jobs import Job
-from backend.journal import Entry
-from backend.monitor import Snapshot
+from backend.api import convert
+from backend.api.live import news as live_news
+from backend.api.live.connection import Connection
+from backend.api.live.messages import Logged
+from backend.api.live.people import PeopleLive
+from backend.api.live.shared import Shared
+from backend.api.security.socket import OpenSockets
+from backend.drive.readings import Reading
 from backend.people.identity import Actor, acting
 from backend.people.station import People
-from backend.readings import Reading
+from backend.station.bench import Bench
+from backend.station.monitor import Snapshot
+from backend.work.jobs import Job
+from backend.work.journal import Entry
 
 
 class LiveHub:

@@ -21,11 +21,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter
 
-from backend.api.live_people_messages import PeopleRequest
+from backend.api.drive.models_axis import AxisState, StopResult
+from backend.api.drive.models_parameters import ParameterValue
+from backend.api.live.people_messages import PeopleRequest
 from backend.api.models import JobInfo, LogEntry, Message, Positive, Problem
-from backend.api.models_axis import AxisState, StopResult
-from backend.api.models_bench import DriveSummary
-from backend.api.models_parameters import ParameterValue
+from backend.api.station.models import DriveSummary
 
 # --- page to server -----------------------------------------------------------------
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pydantic import BaseModel
 
 from backend.api import convert
-from backend.api.live_messages import DrivesChanged, JobChanged, StateChanged, ValuesChanged
-from backend.bench import Bench
-from backend.jobs import Job
-from backend.monitor import Snapshot
+from backend.api.live.messages import DrivesChanged, JobChanged, StateChanged, ValuesChanged
+from backend.station.bench import Bench
+from backend.station.monitor import Snapshot
+from backend.work.jobs import Job
 
 
 def state(bench: Bench, drive: str, snapshot: Snapshot) -> BaseModel | None:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from pydantic import BaseModel
 
-from backend.api.live_shared import Shared
+from backend.api.live.shared import Shared
 from backend.people.identity import Identity
 
 

@@ -8,9 +8,9 @@ from functools import partial
 
 from pydantic import BaseModel
 
-from backend.api.live_control import PeopleControl
-from backend.api.live_page import Page
-from backend.api.live_people_messages import (
+from backend.api.live.control import PeopleControl
+from backend.api.live.page import Page
+from backend.api.live.people_messages import (
     Chat,
     CursorMoved,
     EnablePress,
@@ -26,16 +26,16 @@ from backend.api.live_people_messages import (
     PointerMoved,
     Where,
 )
-from backend.api.live_people_motion import PeopleMotions
-from backend.api.live_people_views import PeopleViews, chat_line
-from backend.api.live_shared import Shared, only
-from backend.api.live_watch import PeopleWatch
-from backend.api.people_record import PeopleRecord
-from backend.bench import Bench
+from backend.api.live.people_motion import PeopleMotions
+from backend.api.live.people_views import PeopleViews, chat_line
+from backend.api.live.shared import Shared, only
+from backend.api.live.watch import PeopleWatch
+from backend.api.people.record import PeopleRecord
 from backend.people.errors import Forbidden, TooOften
 from backend.people.identity import Identity
 from backend.people.station import People
 from backend.people.throttle import Bucket
+from backend.station.bench import Bench
 
 #: Lines of a page's chat at once, and a second: nobody talks the log full.
 _TALK = (10.0, 1.0)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Coroutine, Mapping
 
-from backend.api.live_page import Page
-from backend.api.people_record import PeopleRecord
-from backend.bench import Bench
-from backend.jobs import Job
+from backend.api.live.page import Page
+from backend.api.people.record import PeopleRecord
 from backend.people.station import People
 from backend.people.support import Invitation
+from backend.station.bench import Bench
+from backend.work.jobs import Job
 from drivers.cia402 import State
 
 

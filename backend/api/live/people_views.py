@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import UTC, datetime
 
-from backend.api.live_page import Page
-from backend.api.live_people_messages import (
+from backend.api.live.page import Page
+from backend.api.live.people_messages import (
     ChatLine,
     GrantView,
     InvitationView,
     PeopleHere,
     PersonHere,
 )
-from backend.bench import Bench
-from backend.elapsed import moment_of
+from backend.people.elapsed import moment_of
 from backend.people.identity import Identity
 from backend.people.rights import Right
 from backend.people.station import People
 from backend.people.support import Invitation, Said
+from backend.station.bench import Bench
 
 
 class PeopleViews:

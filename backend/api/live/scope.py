@@ -16,12 +16,12 @@ from fastapi import WebSocketDisconnect
 from pydantic import BaseModel
 
 from backend.api.errors import problem_of
-from backend.api.live_messages import ScopeChannelInfo, ScopeInfo, ScopeStart, ScopeStop
-from backend.api.scope_blocks import encode_block
-from backend.bench import Bench
-from backend.scope import Subscription
-from backend.scope_units import axis_scale
-from backend.units import AxisUnits
+from backend.api.live.messages import ScopeChannelInfo, ScopeInfo, ScopeStart, ScopeStop
+from backend.api.live.scope_blocks import encode_block
+from backend.axis.units import AxisUnits
+from backend.scope.hub import Subscription
+from backend.scope.units import axis_scale
+from backend.station.bench import Bench
 from drivers.errors import Busy, DriveError
 
 #: Subscriptions of one connection, and requests that may wait.

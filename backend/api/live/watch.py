@@ -9,12 +9,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from backend.bench import Bench
 from backend.people.station import People
+from backend.station.bench import Bench
 from drivers.errors import DriveError
 
 if TYPE_CHECKING:
-    from backend.api.live_page import Page
+    from backend.api.live.page import Page
 
 log = logging.getLogger(__name__)
 

@@ -7,7 +7,7 @@ from datetime import timedelta
 from fastapi import APIRouter, Response
 
 from backend.api.context import Me, ThePeople
-from backend.api.models_people import (
+from backend.api.people.models import (
     AccountChange,
     AccountInfo,
     MadeToken,
@@ -15,8 +15,8 @@ from backend.api.models_people import (
     NewToken,
     TokenInfo,
 )
-from backend.api.own_session import own_account, whose_sessions
-from backend.api.people_record import TheRecord
+from backend.api.people.record import TheRecord
+from backend.api.security.own_session import own_account, whose_sessions
 from backend.people.accounts import Accounts
 from backend.people.errors import NoSuchPerson
 from backend.people.identity import Identity

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from backend.api.live_people_messages import ChatLine, InvitationView, PersonHere
+from backend.api.live.people_messages import ChatLine, InvitationView, PersonHere
 from backend.api.models import Message
 from backend.people.passwords import MAX_LENGTH
 from backend.people.rights import Right, Role

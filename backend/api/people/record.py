@@ -8,8 +8,8 @@ from fastapi import Depends
 
 from backend.api.context import TheBench
 from backend.audit.facts import Fact
-from backend.bench import Bench
-from backend.journal import Level
+from backend.station.bench import Bench
+from backend.work.journal import Level
 
 
 class PeopleRecord:

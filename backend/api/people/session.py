@@ -5,8 +5,10 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from backend.api.context import Me, ThePeople
-from backend.api.models_people import LogIn, PasswordChange, Session, SessionInfo, SetUp
-from backend.api.own_session import (
+from backend.api.people.models import LogIn, PasswordChange, Session, SessionInfo, SetUp
+from backend.api.people.record import TheRecord
+from backend.api.security.gate import COOKIE, SECURE_COOKIE, credentials
+from backend.api.security.own_session import (
     address_of,
     client_of,
     device_of,
@@ -16,8 +18,6 @@ from backend.api.own_session import (
     whose_sessions,
     with_cookie,
 )
-from backend.api.people_record import TheRecord
-from backend.api.security import COOKIE, SECURE_COOKIE, credentials
 from backend.people.errors import NoSuchPerson, NotLoggedIn
 
 router = APIRouter()

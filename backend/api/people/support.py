@@ -7,10 +7,10 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Request, Response
 
 from backend.api.context import Me, ThePeople
-from backend.api.live import LiveHub
-from backend.api.live_people_messages import InvitationView
-from backend.api.live_people_views import chat_line
-from backend.api.models_people import (
+from backend.api.live.live import LiveHub
+from backend.api.live.people_messages import InvitationView
+from backend.api.live.people_views import chat_line
+from backend.api.people.models import (
     ChatLog,
     JoinAsGuest,
     MadeInvitation,
@@ -19,9 +19,9 @@ from backend.api.models_people import (
     PeopleList,
     Session,
 )
-from backend.api.own_session import address_of, with_cookie
-from backend.api.people_record import TheRecord
-from backend.api.security import require_right
+from backend.api.people.record import TheRecord
+from backend.api.security.gate import require_right
+from backend.api.security.own_session import address_of, with_cookie
 from backend.people.errors import Forbidden, NotLoggedIn
 
 router = APIRouter()

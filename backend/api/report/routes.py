@@ -11,13 +11,13 @@ from fastapi import APIRouter, Response
 from backend.api.context import TheBench, TheMember
 from backend.api.disposition import disposition
 from backend.api.errors import NotFound
-from backend.api.models_report import ReportInfo, ReportRequest
-from backend.api.routes_measurements import change_log, measurement_head
-from backend.bench import Bench
-from backend.measurements import BadMeasurement, Head
-from backend.member import Member
+from backend.api.report.models import ReportInfo, ReportRequest
+from backend.api.tuning.measurements import change_log, measurement_head
+from backend.library.measurements import BadMeasurement, Head
 from backend.report.gather import About, belongs, choose, kind_of, live_facts, measured_from
 from backend.report.store import Format, ReportStore, render
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
 from drivers.errors import NotAllowed
 
 router = APIRouter()

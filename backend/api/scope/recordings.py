@@ -12,7 +12,7 @@ from fastapi.responses import FileResponse
 from backend.api import convert
 from backend.api.errors import NotFound
 from backend.api.models import JobInfo
-from backend.api.recording_models import (
+from backend.api.scope.recording_models import (
     ArmRequest,
     BundleInfo,
     BundleList,

@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from backend.api import convert
 from backend.api.context import TheBench
 from backend.api.errors import NotFound
-from backend.api.models_scope import NamedSetup, ScopeSetup, SnapshotHeader, SnapshotInfo
-from backend.scope_store import (
+from backend.api.scope.models import NamedSetup, ScopeSetup, SnapshotHeader, SnapshotInfo
+from backend.scope.stored import (
     MAX_SNAPSHOT_BYTES,
     BadSnapshot,
     ScopeStore,

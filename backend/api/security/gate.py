@@ -1,7 +1,7 @@
 """The gate: every request and websocket passes here before any code of a route runs.
 
-In this order: meant for us (Host, Origin), declared (`backend.api.rights`), known (cookie or
-token), has the right, comes from our page (CSRF token), has control of the axis, body in bounds.
+In this order: meant for us (Host, Origin), declared (`backend.api.security.rights`), known (cookie
+or token), has the right, comes from our page (CSRF token), has control of the axis, body in bounds.
 What passes runs with `acting` set, so that whatever it starts knows whose it is.
 """
 
@@ -14,17 +14,17 @@ from http.cookies import CookieError, SimpleCookie
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from backend.access import Leases
 from backend.api.admission.requests import Admission
 from backend.api.errors import NotFound, WrongMethod, answer, answer_error, problem_of
 from backend.api.models import Problem
-from backend.api.rights import Matched, Policy
-from backend.api.security_body import BodyRefused, MeasuredBody, framing
-from backend.api.security_origin import Addresses, header
-from backend.api.security_socket import GuardedSocket, OpenSockets
+from backend.api.security.body import BodyRefused, MeasuredBody, framing
+from backend.api.security.origin import Addresses, header
+from backend.api.security.rights import Matched, Policy
+from backend.api.security.socket import GuardedSocket, OpenSockets
 from backend.people.credentials import csrf_of, same_text
 from backend.people.errors import Forbidden, NotLoggedIn, TooOften
 from backend.people.identity import Actor, Identity, acting
+from backend.people.lease import Leases
 from backend.people.rights import Right
 from backend.people.station import People
 from drivers.errors import DriveError, NotAllowed

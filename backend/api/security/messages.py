@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Literal
 
-from backend.api import live_messages as live
-from backend.api import live_people_messages as people_live
-from backend.api.live_control import require_control
+from backend.api.live import messages as live
+from backend.api.live import people_messages as people_live
+from backend.api.live.control import require_control
 from backend.api.models import Message
-from backend.api.security import require_right
+from backend.api.security.gate import require_right
 from backend.people.errors import Forbidden
 from backend.people.identity import Identity
 from backend.people.rights import Right
@@ -55,7 +55,7 @@ def require_message(people: People, identity: Identity, message: Message) -> Non
     if need is None:
         raise Forbidden(
             f"nobody may send {type(message).__name__}",
-            remedy="a new message must stand in backend/api/security_messages.py",
+            remedy="a new message must stand in backend/api/security/messages.py",
         )
     if need == "always":
         return

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fastapi import Request, Response
 
-from backend.api.models_people import Session
-from backend.api.security import (
+from backend.api.people.models import Session
+from backend.api.security.gate import (
     COOKIE,
     DEVICE_COOKIE,
     SECURE_COOKIE,

@@ -20,7 +20,7 @@ from websockets.frames import Frame
 
 from backend.api.admission.accepting import AcceptingSocket
 from backend.api.admission.requests import Beginnings
-from backend.api.rights import API
+from backend.api.security.rights import API
 from backend.people.throttle import Bucket
 
 #: Time for the head of a request, from the connection or the first byte on.
@@ -32,7 +32,7 @@ MOST_PER_ADDRESS = 100
 
 #: Connections at once, over all: beyond this the longest idle one is closed for a new one. What
 #: is under way and every websocket have limits of their own, below it together
-#: (`backend.api.admission.requests`, `backend.api.security_socket`), so that there always is one.
+#: (`backend.api.admission.requests`, `backend.api.security.socket`), so that there always is one.
 MOST_CONNECTIONS = 800
 
 #: Frames beside messages at once, and a second. A page of ours answers a ping every 5 s.
@@ -63,7 +63,7 @@ class AcceptingConfig(uvicorn.Config):
 class PatientSocket(WebSocketsSansIOProtocol):
     """A websocket that ends where the other side sends frames that no application sees.
 
-    Messages are counted where they are understood (`backend.api.security_socket`); pings, pongs
+    Messages are counted where they are understood (`backend.api.security.socket`); pings, pongs
     and empty parts of messages never come there.
     """
 

@@ -9,9 +9,9 @@ from fastapi import APIRouter, Query, Request, Response
 
 from backend.api.context import TheBench
 from backend.api.errors import NotFound
-from backend.api.models_description import ImportedList
-from backend.parameter_list import export_list, import_list
-from backend.parameter_set import MAX_BYTES, BadSet
+from backend.api.station.models_description import ImportedList
+from backend.parameters.lists import export_list, import_list
+from backend.parameters.set_file import MAX_BYTES, BadSet
 from drivers.errors import NotAllowed
 from profiles import load_profile
 from profiles.loader import ProfileError

@@ -7,19 +7,20 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from backend import parameter_set
-from backend.api import convert, convert_library
+from backend.api import convert
 from backend.api.context import Controlled, TheBench, TheMember
 from backend.api.errors import NotFound
-from backend.api.models_library import StoredSet, ThreeWay
-from backend.api.models_sets import Diff, SaveSetRequest
-from backend.bench import Bench
-from backend.drive import Drive
+from backend.api.library import convert as convert_library
+from backend.api.library.models import StoredSet, ThreeWay
+from backend.api.sets.models import Diff, SaveSetRequest
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
 from backend.library.identity import doubts
 from backend.library.three_way import three_way as compare_three
-from backend.parameter_set import MAX_BYTES, BadSet, ParameterSet, Row
+from backend.parameters import set_file as parameter_set
+from backend.parameters.set_file import MAX_BYTES, BadSet, ParameterSet, Row
 from backend.people.identity import acting_person
-from backend.readings import Reading
+from backend.station.bench import Bench
 from backend.tools import parameters
 from drivers.errors import NotAllowed, OutOfRange
 

@@ -11,8 +11,8 @@ from backend.api import convert
 from backend.api.context import TheBench, TheMember
 from backend.api.errors import NotFound
 from backend.api.models import JobInfo
-from backend.api.models_bench import ProfileMatch
-from backend.api.models_description import (
+from backend.api.station.models import ProfileMatch
+from backend.api.station.models_description import (
     PROFILE_NAME,
     DescribedDevice,
     ImportedDescription,
@@ -21,10 +21,10 @@ from backend.api.models_description import (
     MissingPort,
     ReadDictionaryRequest,
 )
-from backend.description import BadDescription, drive_task, import_in_process
-from backend.jobs import JobResult, Progress
-from backend.line_search import search_line
-from backend.second_port import missing_ports
+from backend.station.description import BadDescription, drive_task, import_in_process
+from backend.station.line_search import search_line
+from backend.station.second_port import missing_ports
+from backend.work.jobs import JobResult, Progress
 from drivers.errors import NotAllowed
 from drivers.link import Found
 from profiles import drive_names, load_profile

@@ -12,7 +12,7 @@ from backend.api import convert
 from backend.api.context import Connection, Controlled, TheBench
 from backend.api.errors import NotFound
 from backend.api.models import JobInfo
-from backend.api.models_ethercat import (
+from backend.api.station.models_ethercat import (
     AliasRequest,
     CountersRequest,
     EthercatPermissions,
@@ -22,17 +22,17 @@ from backend.api.models_ethercat import (
     SegmentPort,
     SegmentStation,
 )
-from backend.bench import Bench
-from backend.drive_identity import confirm_identity
-from backend.jobs import JobResult, Progress
-from backend.member import Member
+from backend.drive.identity import confirm_identity
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.work.jobs import JobResult, Progress
 from drivers.adapters import require_interface
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
-from drivers.ethercat import firmware, permissions
-from drivers.ethercat.al_status import AlState
 from drivers.ethercat.link import EthercatLink
-from drivers.ethercat.survey import ExchangeFigures, Survey, SurveyedStation
+from drivers.ethercat.process import firmware, permissions
+from drivers.ethercat.process.survey import ExchangeFigures, Survey, SurveyedStation
+from drivers.ethercat.wire.al_status import AlState
 
 router = APIRouter()
 

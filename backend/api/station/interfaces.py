@@ -9,7 +9,7 @@ from pathlib import Path
 
 from serial.tools import list_ports
 
-from backend.api.models_bench import Interfaces, NetworkInterface, SerialPort
+from backend.api.station.models import Interfaces, NetworkInterface, SerialPort
 
 _NET = Path("/sys/class/net")
 

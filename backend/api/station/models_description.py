@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import ConfigDict, Field, model_validator
 
 from backend.api.models import Message
-from backend.api.models_bench import FoundDrive
+from backend.api.station.models import FoundDrive
 
 #: What a profile may be called.
 PROFILE_NAME = r"^[a-z][a-z0-9_]{0,59}$"

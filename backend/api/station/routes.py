@@ -9,12 +9,13 @@ from fastapi import APIRouter, Query, Response
 import backend
 from backend.api import convert
 from backend.api.context import Connection, Controlled, Me, TheBench, TheMember, ThePeople
-from backend.api.convert_stop import stop_result
+from backend.api.drive.convert_stop import stop_result
+from backend.api.drive.models_axis import StopRequest, StopResult
 from backend.api.errors import NotFound
-from backend.api.interfaces import list_interfaces
 from backend.api.models import JobInfo, LogEntry
-from backend.api.models_axis import StopRequest, StopResult
-from backend.api.models_bench import (
+from backend.api.security.gate import require_right
+from backend.api.station.interfaces import list_interfaces
+from backend.api.station.models import (
     Bus,
     ConnectRequest,
     CyclicRequest,
@@ -26,14 +27,13 @@ from backend.api.models_bench import (
     ProfileInfo,
     ScanRequest,
 )
-from backend.api.security import require_right
 from backend.audit import Fact
 from backend.audit.asked import note_before
-from backend.bench import Bench
-from backend.jobs import Job, JobResult, Progress
-from backend.member import Member
 from backend.people.rights import Right
-from backend.second_port import require_same_drive
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.station.second_port import require_same_drive
+from backend.work.jobs import Job, JobResult, Progress
 from drivers.link import Found
 from profiles import load_all
 from profiles.loader import broken_profiles, is_own

@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 from fastapi import APIRouter
 
-from backend.analysis.arrays import magnitude_db, phase_deg
-from backend.analysis.loop_structure import Gains, speed_loop, step_of_closed_loop
-from backend.analysis.margins import closed_from_open, sensitivity
-from backend.analysis.measured_plant import MeasuredPlant, measured_plant
-from backend.analysis.notch import Notch, RealisedNotch
+from backend.analysis.loop.loop_structure import Gains, speed_loop, step_of_closed_loop
+from backend.analysis.loop.margins import closed_from_open, sensitivity
+from backend.analysis.loop.measured_plant import MeasuredPlant, measured_plant
+from backend.analysis.loop.notch import Notch, RealisedNotch
+from backend.analysis.signals.arrays import magnitude_db, phase_deg
 from backend.api.context import Controlled, TheBench, TheMember
-from backend.api.models_tune import (
+from backend.api.tuning.measurements import change_log, measurement_head
+from backend.api.tuning.models import (
     CandidatesInfo,
     CandidatesRequest,
     GainInfo,
@@ -32,16 +33,18 @@ from backend.api.models_tune import (
     RealisedInfo,
     Undo,
 )
-from backend.api.routes_measurements import change_log, measurement_head
-from backend.bench import Bench
-from backend.drive import Drive
-from backend.measurements import BadMeasurement, unpack
-from backend.member import Member
+from backend.drive.drive import Drive
+from backend.library.measurements import BadMeasurement, unpack
 from backend.report.changes import Change
-from backend.tools import gains, notch, sweep_evaluation, tune_candidates
-from backend.tools.axis_facts import read_facts
-from backend.tools.notch_meaning import meaning_of
-from backend.tools.temporary import put_back, write_settings
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.tools.autotune import candidates as tune_candidates
+from backend.tools.autotune import gains
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.measuring.temporary import put_back, write_settings
+from backend.tools.notch import filters as notch
+from backend.tools.notch.meaning import meaning_of
+from backend.tools.sweep import evaluation as sweep_evaluation
 from drivers.errors import NotAllowed, OutOfRange
 
 router = APIRouter()

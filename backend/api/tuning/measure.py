@@ -10,16 +10,15 @@ import numpy as np
 import numpy.typing as npt
 from fastapi import APIRouter
 
-from backend.api import (
-    convert,
-    routes_design,
-    routes_measurements,
-    routes_report,
-    routes_response_import,
-)
+from backend.api import convert
 from backend.api.context import Controlled, TheBench, TheMember
 from backend.api.models import JobInfo
-from backend.api.models_tune import (
+from backend.api.report import routes as routes_report
+from backend.api.tuning import design as routes_design
+from backend.api.tuning import measurements as routes_measurements
+from backend.api.tuning import response_import as routes_response_import
+from backend.api.tuning.measurements import change_log
+from backend.api.tuning.models import (
     AutotuneRequest,
     ExcitationInfo,
     InertiaRequest,
@@ -27,27 +26,24 @@ from backend.api.models_tune import (
     SweepRequest,
     TuneLimits,
 )
-from backend.api.routes_measurements import change_log
-from backend.axis import Envelope
-from backend.bench import Bench
-from backend.cyclic import CyclicSession
-from backend.jobs import JobResult, Progress
-from backend.measurements import MeasurementStore
-from backend.measuring import EXCHANGE_ENDS_S, exchange_for
-from backend.member import Member
+from backend.axis.axis import Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.axis.restoring import shielded
+from backend.library.measurements import MeasurementStore
 from backend.report.changes import Change
-from backend.restoring import shielded
-from backend.tools import (
-    autotune,
-    inertia,
-    inertia_evaluation,
-    profile_speed,
-    step_response,
-    sweep,
-    sweep_evaluation,
-)
-from backend.tools.sweep_preview import preview
-from backend.tools.tune_apply import take_back
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
+from backend.tools.autotune import run as autotune
+from backend.tools.autotune.apply import take_back
+from backend.tools.inertia import evaluation as inertia_evaluation
+from backend.tools.inertia import run as inertia
+from backend.tools.step import run as step_response
+from backend.tools.sweep import evaluation as sweep_evaluation
+from backend.tools.sweep import profile_speed
+from backend.tools.sweep import run as sweep
+from backend.tools.sweep.preview import preview
+from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
 
 router = APIRouter()

@@ -11,11 +11,11 @@ from fastapi import APIRouter, Query, Request, Response
 from backend.api.context import TheBench
 from backend.api.disposition import disposition
 from backend.api.errors import NotFound
-from backend.api.models_tune import MeasurementContent, MeasurementInfo
-from backend.bench import Bench
-from backend.evaluation import evaluate
-from backend.measurements import SUFFIX, BadMeasurement, Head, Measurement
+from backend.api.tuning.models import MeasurementContent, MeasurementInfo
+from backend.library.measurements import SUFFIX, BadMeasurement, Head, Measurement
 from backend.report.changes import ChangeLog
+from backend.station.bench import Bench
+from backend.station.evaluation import evaluate
 from drivers.errors import NotAllowed, OutOfRange
 
 router = APIRouter()

@@ -12,10 +12,10 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 
 from backend.api.context import TheBench
-from backend.api.models_response_import import ImportQuery, RecordingPreview
-from backend.api.models_tune import MeasurementInfo
-from backend.api.routes_measurements import info_of
-from backend.measurements import SUFFIX
+from backend.api.tuning.measurements import info_of
+from backend.api.tuning.models import MeasurementInfo
+from backend.api.tuning.models_response_import import ImportQuery, RecordingPreview
+from backend.library.measurements import SUFFIX
 from backend.response_import.evaluation import ImportSettings
 from backend.response_import.process import ImportTask, import_in_process
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend.files import write_atomically
+from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 
 FILE = "accounts.json"

@@ -15,20 +15,20 @@ from typing import Literal
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray, magnitude_db, phase_deg
-from backend.analysis.design import Candidate
-from backend.analysis.frf import Frf
-from backend.analysis.loop_goals import LoadClass, Mark, goals_for
-from backend.analysis.loop_seen import LoopLines, seen_in_loop
-from backend.analysis.loop_structure import speed_loop
-from backend.analysis.margins import closed_from_open
-from backend.analysis.measured_plant import MeasuredPlant
-from backend.tools.temporary import write_settings
-from backend.tools.tune_apply import Applied, first_kept, nothing_stays, take_back
-from backend.tools.tune_candidates import candidates_for
-from backend.tools.tune_present import Trials, judged
-from backend.tools.tune_verdict import fixed_of
-from backend.tools.tune_verify import LOOKS, MOST_PAIRS, Verified, sharp_margins
+from backend.analysis.loop.design import Candidate
+from backend.analysis.loop.loop_goals import LoadClass, Mark, goals_for
+from backend.analysis.loop.loop_seen import LoopLines, seen_in_loop
+from backend.analysis.loop.loop_structure import speed_loop
+from backend.analysis.loop.margins import closed_from_open
+from backend.analysis.loop.measured_plant import MeasuredPlant
+from backend.analysis.response.frf import Frf
+from backend.analysis.signals.arrays import ComplexArray, FloatArray, magnitude_db, phase_deg
+from backend.tools.autotune.apply import Applied, first_kept, nothing_stays, take_back
+from backend.tools.autotune.candidates import candidates_for
+from backend.tools.autotune.present import Trials, judged
+from backend.tools.autotune.verdict import fixed_of
+from backend.tools.autotune.verify import LOOKS, MOST_PAIRS, Verified, sharp_margins
+from backend.tools.measuring.temporary import write_settings
 
 #: A prediction stands within these: share of the -3 dB point, dB and degrees. The aims are 10 %,
 #: 3 dB and 6° (tuning.md, section 5).

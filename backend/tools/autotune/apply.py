@@ -7,16 +7,16 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from backend.analysis.design import Candidate
-from backend.analysis.loop_goals import Goals
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools.interrupted import ends_all
-from backend.tools.temporary import put_back_in_time, write_settings
-from backend.tools.tune_candidates import plan
-from backend.tools.tune_time import TimeLeft
-from backend.tools.tune_verify import HUM_PERCENT, Check, Keep, Verified, verify
+from backend.analysis.loop.design import Candidate
+from backend.analysis.loop.loop_goals import Goals
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune.candidates import plan
+from backend.tools.autotune.time_budget import TimeLeft
+from backend.tools.autotune.verify import HUM_PERCENT, Check, Keep, Verified, verify
+from backend.tools.measuring.interrupted import ends_all
+from backend.tools.measuring.temporary import put_back_in_time, write_settings
+from backend.work.jobs import Progress
 from drivers.errors import DriveError
 
 #: A candidate with this share of its gain; None where that keeps no margins.

@@ -7,19 +7,19 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from backend.analysis.design import Candidate, design
-from backend.analysis.loop_goals import LoadClass
-from backend.analysis.loop_structure import DriveLoops
-from backend.analysis.measured_plant import MeasuredPlant, measured_plant
-from backend.analysis.mechanical_model import MechanicalModel
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.tools import gains as gain_tool
-from backend.tools import notch as notch_tool
-from backend.tools import notch_effect
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.notch_meaning import meaning_of
-from backend.tools.sweep_evaluation import SweepResult
+from backend.analysis.loop.design import Candidate, design
+from backend.analysis.loop.loop_goals import LoadClass
+from backend.analysis.loop.loop_structure import DriveLoops
+from backend.analysis.loop.measured_plant import MeasuredPlant, measured_plant
+from backend.analysis.mechanics.mechanical_model import MechanicalModel
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from backend.tools.autotune import gains as gain_tool
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.notch import effect as notch_effect
+from backend.tools.notch import filters as notch_tool
+from backend.tools.notch.meaning import meaning_of
+from backend.tools.sweep.evaluation import SweepResult
 
 #: A loop can be verified up to this share of the sample rate, so none is designed above it.
 _VERIFIABLE = 0.2

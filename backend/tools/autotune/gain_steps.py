@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools import gains as gain_tool
-from backend.tools.axis_facts import si_value
-from backend.tools.interrupted import ends_all
-from backend.tools.step_response import LEAD_S, StepResult, StepSettings, step_response
-from backend.tools.temporary import temporary
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune import gains as gain_tool
+from backend.tools.autotune.axis_facts import si_value
+from backend.tools.measuring.interrupted import ends_all
+from backend.tools.measuring.temporary import temporary
+from backend.tools.step.run import LEAD_S, StepResult, StepSettings, step_response
+from backend.work.jobs import Progress
 from drivers.errors import DriveError
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]

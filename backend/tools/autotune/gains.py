@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.loop_structure import DriveLoops, Gains, LoopFilters
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.tools.axis_facts import AxisFacts, read_facts, si, si_raw, si_value
+from backend.analysis.loop.loop_structure import DriveLoops, Gains, LoopFilters
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from backend.tools.autotune.axis_facts import AxisFacts, read_facts, si, si_raw, si_value
 from drivers.errors import NotAllowed
 from profiles.schema import GainSpec, StiffnessTable
 

@@ -6,19 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools import excite, inertia_evaluation, notch_effect, notch_trials, sweep_evaluation
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.go_back import go_back
-from backend.tools.interrupted import ends_all
-from backend.tools.notch_in_loop import measure_meaning_in_loop
-from backend.tools.notch_meaning import NotchMeaning, meaning_of, remember
-from backend.tools.probe import PULLED
-from backend.tools.recording import cycle_s, quiet
-from backend.tools.repeats import Repeats
-from backend.tools.tune_time import TimeLeft
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.autotune.time_budget import TimeLeft
+from backend.tools.inertia import evaluation as inertia_evaluation
+from backend.tools.inertia.probe import PULLED
+from backend.tools.measuring import excite
+from backend.tools.measuring.interrupted import ends_all
+from backend.tools.measuring.recording import cycle_s, quiet
+from backend.tools.measuring.repeats import Repeats
+from backend.tools.moves.go_back import go_back
+from backend.tools.notch import effect as notch_effect
+from backend.tools.notch import trials as notch_trials
+from backend.tools.notch.in_loop import measure_meaning_in_loop
+from backend.tools.notch.meaning import NotchMeaning, meaning_of, remember
+from backend.tools.sweep import evaluation as sweep_evaluation
+from backend.work.jobs import Progress
 from drivers.errors import NotAllowed
 
 #: A resonance that rises by less bounds no gain.

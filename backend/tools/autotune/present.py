@@ -13,25 +13,25 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from backend.analysis.design import Candidate, described
-from backend.analysis.loop_goals import Goals, stable_with_less_gain, worst_of
-from backend.analysis.loop_structure import Gains, LoopFilters, speed_loop
-from backend.analysis.measured_plant import MeasuredPlant
-from backend.analysis.notch import Notch
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools import gains as gain_tool
-from backend.tools import notch as notch_tool
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.interrupted import ends_all
-from backend.tools.notch_effect import unknown
-from backend.tools.notch_meaning import meaning_of
-from backend.tools.temporary import write_settings
-from backend.tools.tune_apply import Applied, first_kept, nothing_stays, stages, take_back
-from backend.tools.tune_time import TimeLeft
-from backend.tools.tune_verdict import fixed_of
-from backend.tools.tune_verify import Check, Keep, otherwise, verify
+from backend.analysis.loop.design import Candidate, described
+from backend.analysis.loop.loop_goals import Goals, stable_with_less_gain, worst_of
+from backend.analysis.loop.loop_structure import Gains, LoopFilters, speed_loop
+from backend.analysis.loop.measured_plant import MeasuredPlant
+from backend.analysis.loop.notch import Notch
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune import gains as gain_tool
+from backend.tools.autotune.apply import Applied, first_kept, nothing_stays, stages, take_back
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.autotune.time_budget import TimeLeft
+from backend.tools.autotune.verdict import fixed_of
+from backend.tools.autotune.verify import Check, Keep, otherwise, verify
+from backend.tools.measuring.interrupted import ends_all
+from backend.tools.measuring.temporary import write_settings
+from backend.tools.notch import filters as notch_tool
+from backend.tools.notch.effect import unknown
+from backend.tools.notch.meaning import meaning_of
+from backend.work.jobs import Progress
 from drivers.errors import DriveError, NotAllowed
 
 _TURN = 2.0 * np.pi

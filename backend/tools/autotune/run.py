@@ -11,38 +11,39 @@ import asyncio
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 
-from backend.analysis.design import Candidate
-from backend.analysis.loop_goals import LoadClass, Mark, goals_for
-from backend.analysis.loop_structure import Gains
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools import gains as gain_tool
-from backend.tools import inertia as inertia_tool
-from backend.tools import inertia_evaluation, sweep_evaluation
-from backend.tools import step_response as step_tool
-from backend.tools import sweep as sweep_tool
-from backend.tools.axis_facts import AxisFacts, read_facts
-from backend.tools.go_back import go_back
-from backend.tools.interrupted import ends_all
-from backend.tools.probe import holding_torque
-from backend.tools.recording import cycle_s, quiet
-from backend.tools.temporary import stopping_hard, temporary
-from backend.tools.tune_again import Again, Designing, Figures, expected, first_that_holds
-from backend.tools.tune_again import as_json as again_json
-from backend.tools.tune_apply import part
-from backend.tools.tune_candidates import (
+from backend.analysis.loop.design import Candidate
+from backend.analysis.loop.loop_goals import LoadClass, Mark, goals_for
+from backend.analysis.loop.loop_structure import Gains
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune import gains as gain_tool
+from backend.tools.autotune.again import Again, Designing, Figures, expected, first_that_holds
+from backend.tools.autotune.again import as_json as again_json
+from backend.tools.autotune.apply import part
+from backend.tools.autotune.axis_facts import AxisFacts, read_facts
+from backend.tools.autotune.candidates import (
     Design,
     candidate_json,
     cautious_design,
     design_for,
     plant_of,
 )
-from backend.tools.tune_notches import Learning, learn_notches, learning_s
-from backend.tools.tune_present import Trials
-from backend.tools.tune_time import NOT_AGAIN, TimeLeft
-from backend.tools.tune_verdict import as_json as verdict_json
-from backend.tools.tune_verify import Check, Keep, Verified, otherwise, unseen
+from backend.tools.autotune.notches import Learning, learn_notches, learning_s
+from backend.tools.autotune.present import Trials
+from backend.tools.autotune.time_budget import NOT_AGAIN, TimeLeft
+from backend.tools.autotune.verdict import as_json as verdict_json
+from backend.tools.autotune.verify import Check, Keep, Verified, otherwise, unseen
+from backend.tools.inertia import evaluation as inertia_evaluation
+from backend.tools.inertia import run as inertia_tool
+from backend.tools.inertia.probe import holding_torque
+from backend.tools.measuring.interrupted import ends_all
+from backend.tools.measuring.recording import cycle_s, quiet
+from backend.tools.measuring.temporary import stopping_hard, temporary
+from backend.tools.moves.go_back import go_back
+from backend.tools.step import run as step_tool
+from backend.tools.sweep import evaluation as sweep_evaluation
+from backend.tools.sweep import run as sweep_tool
+from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import EnvelopeExceeded, NotAllowed
 

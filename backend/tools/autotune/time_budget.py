@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from backend.tools.repeats import Repeats
+from backend.tools.measuring.repeats import Repeats
 
 #: Writing a design, standing still and a step, beside the measurement of the loop.
 _AROUND_S = 4.0

@@ -6,21 +6,21 @@ from dataclasses import asdict
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.design import Candidate
-from backend.analysis.frf import Frf
-from backend.analysis.loop_goals import Goals
-from backend.analysis.loop_structure import LoopFilters, speed_loop
-from backend.analysis.loop_verdict import Lines, LoopVerdict, Missed, judge
-from backend.analysis.measured_plant import MeasuredPlant
-from backend.analysis.notch import Notch
-from backend.analysis.reference_path import reference_paths
-from backend.analysis.sampling import Hold
-from backend.axis import Axis
-from backend.tools import gains as gain_tool
-from backend.tools import notch as notch_tool
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.notch_meaning import meaning_of
+from backend.analysis.loop.design import Candidate
+from backend.analysis.loop.loop_goals import Goals
+from backend.analysis.loop.loop_structure import LoopFilters, speed_loop
+from backend.analysis.loop.loop_verdict import Lines, LoopVerdict, Missed, judge
+from backend.analysis.loop.measured_plant import MeasuredPlant
+from backend.analysis.loop.notch import Notch
+from backend.analysis.response.frf import Frf
+from backend.analysis.response.reference_path import reference_paths
+from backend.analysis.response.sampling import Hold
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.axis.axis import Axis
+from backend.tools.autotune import gains as gain_tool
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.notch import filters as notch_tool
+from backend.tools.notch.meaning import meaning_of
 
 #: What a measured margin is known to; the designs keep more than this in reserve.
 MARGIN_DB, MARGIN_DEG, MS_RATIO = 1.0, 1.0, 1.03

@@ -9,26 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.design import Candidate
-from backend.analysis.frf import Frf
-from backend.analysis.loop_goals import Goals
-from backend.analysis.loop_verdict import LoopVerdict
-from backend.analysis.margins import bandwidth, open_from_closed
-from backend.analysis.measured_plant import MeasuredPlant
-from backend.analysis.sampling import Hold
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools import step_response as step_tool
-from backend.tools import sweep as sweep_tool
-from backend.tools import sweep_evaluation
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.go_back import go_back
-from backend.tools.probe import holding_torque
-from backend.tools.recording import quiet
-from backend.tools.tune_gain_steps import GainSteps, gain_steps
-from backend.tools.tune_time import NOT_AGAIN, TimeLeft
-from backend.tools.tune_verdict import (
+from backend.analysis.loop.design import Candidate
+from backend.analysis.loop.loop_goals import Goals
+from backend.analysis.loop.loop_verdict import LoopVerdict
+from backend.analysis.loop.margins import bandwidth, open_from_closed
+from backend.analysis.loop.measured_plant import MeasuredPlant
+from backend.analysis.response.frf import Frf
+from backend.analysis.response.sampling import Hold
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.autotune.gain_steps import GainSteps, gain_steps
+from backend.tools.autotune.time_budget import NOT_AGAIN, TimeLeft
+from backend.tools.autotune.verdict import (
     BLURRED_DEG,
     COHERENT,
     LINES,
@@ -40,6 +33,13 @@ from backend.tools.tune_verdict import (
     misses,
     verdict_of,
 )
+from backend.tools.inertia.probe import holding_torque
+from backend.tools.measuring.recording import quiet
+from backend.tools.moves.go_back import go_back
+from backend.tools.step import run as step_tool
+from backend.tools.sweep import evaluation as sweep_evaluation
+from backend.tools.sweep import run as sweep_tool
+from backend.work.jobs import Progress
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 

@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.inertia import InertiaResult, Interval, estimate_inertia
-from backend.analysis.spectrum import power_density
-from backend.axis import Envelope
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.quiet_velocity import quiet_velocity
-from backend.tools.recording import Recording
+from backend.analysis.mechanics.inertia import InertiaResult, Interval, estimate_inertia
+from backend.analysis.signals.spectrum import power_density
+from backend.axis.axis import Envelope
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.measuring.recording import Recording
+from backend.tools.sweep.quiet_velocity import quiet_velocity
 from drivers.errors import NotAllowed
 
 Scheme = Literal["free", "limited", "taught"]

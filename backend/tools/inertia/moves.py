@@ -8,17 +8,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.identification_path import MoveLimits, design_moves
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.tools import profile_speed
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.go_back import go_back
-from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.probe import RoughFit, require_right_sign, rough_fit, smoothed
-from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play, quiet
-from backend.tools.soft_loop import SoftLoop, soft_loop_of
-from backend.tools.temporary import stopping_hard
+from backend.analysis.mechanics.identification_path import MoveLimits, design_moves
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.inertia.evaluation import InertiaSettings
+from backend.tools.inertia.probe import RoughFit, require_right_sign, rough_fit, smoothed
+from backend.tools.inertia.soft_loop import SoftLoop, soft_loop_of
+from backend.tools.measuring.recording import (
+    Play,
+    Recording,
+    bus_limits,
+    cycle_s,
+    enabled,
+    play,
+    quiet,
+)
+from backend.tools.measuring.temporary import stopping_hard
+from backend.tools.moves.go_back import go_back
+from backend.tools.sweep import profile_speed
 from drivers.cia402 import Mode
 from drivers.errors import EnvelopeExceeded, NotAllowed, OutOfRange, exceeded
 from drivers.halt import HaltCause

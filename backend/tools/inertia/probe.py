@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.tools import excite
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.interrupted import Interrupted, require_enabled
-from backend.tools.recording import Play, Recording, bus_limits, cycle_s, enabled, play
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.measuring import excite
+from backend.tools.measuring.interrupted import Interrupted, require_enabled
+from backend.tools.measuring.recording import Play, Recording, bus_limits, cycle_s, enabled, play
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
 

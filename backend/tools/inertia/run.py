@@ -15,15 +15,11 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.inertia import InertiaResult
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools.axis_facts import read_facts
-from backend.tools.computing import meanwhile
-from backend.tools.end_search import find_ends
-from backend.tools.go_back import go_back
-from backend.tools.inertia_evaluation import (
+from backend.analysis.mechanics.inertia import InertiaResult
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.inertia.evaluation import (
     InertiaOutcome,
     InertiaSettings,
     doubt_of,
@@ -32,10 +28,14 @@ from backend.tools.inertia_evaluation import (
     ratio_against,
     raw_of,
 )
-from backend.tools.inertia_moves import Shape, first_look, identification_moves
-from backend.tools.probe import RoughFit
-from backend.tools.recording import require_signals, share
-from backend.tools.repeats import Repeats
+from backend.tools.inertia.moves import Shape, first_look, identification_moves
+from backend.tools.inertia.probe import RoughFit
+from backend.tools.measuring.computing import meanwhile
+from backend.tools.measuring.recording import require_signals, share
+from backend.tools.measuring.repeats import Repeats
+from backend.tools.moves.end_search import find_ends
+from backend.tools.moves.go_back import go_back
+from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 

@@ -16,21 +16,21 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.cyclic_mode import keeping_mode
-from backend.drive import Drive
-from backend.jobs import JobResult, Progress
-from backend.motion import loop
-from backend.ports import address_of
+from backend.axis import loop
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.axis.cyclic_mode import keeping_mode
+from backend.axis.units import AxisUnits
+from backend.drive.drive import Drive
+from backend.drive.ports import address_of
 from backend.scales.words import halt_remedy, halt_words
-from backend.tools.hold import Hold
-from backend.tools.jog import JogSettings, require_scale
-from backend.units import AxisUnits
+from backend.tools.jog.hold import Hold
+from backend.tools.jog.run import JogSettings, require_scale
+from backend.work.jobs import JobResult, Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, motion_halted
-from drivers.ethercat.motion import Phase
+from drivers.motion.setpoint_plan import Phase
 
 _RENEW_S, _LOOK_S = 0.05, 0.02
 _STATE_TIMEOUT_S = 5.0

@@ -11,13 +11,13 @@ import asyncio
 import time
 from dataclasses import dataclass
 
-from backend.axis import Axis, Envelope
-from backend.jobs import JobResult, Progress
-from backend.optional import ramp_keys
+from backend.axis.axis import Axis, Envelope
+from backend.axis.units import AxisUnits, ramp_raw
+from backend.drive.optional import ramp_keys
+from backend.motion.travel_units import REVOLUTIONS, TravelUnit
 from backend.scales.polled import PolledGuard
-from backend.tools.hold import GAP_S, Hold
-from backend.travel_units import REVOLUTIONS, TravelUnit
-from backend.units import AxisUnits, ramp_raw
+from backend.tools.jog.hold import GAP_S, Hold
+from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.excitation import BaseMotion, Excitation, scaled
-from backend.tools.waveform import Band, Waveform, grid, periodic, stepped, tones_hz
+from backend.analysis.signals.excitation import BaseMotion, Excitation, scaled
+from backend.tools.measuring.waveform import Band, Waveform, grid, periodic, stepped, tones_hz
 
 FloatArray = npt.NDArray[np.float64]
 TURN = 2.0 * np.pi

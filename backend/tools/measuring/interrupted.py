@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
 from backend.scales.words import halt_remedy, halt_words
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, NotAllowed, motion_halted

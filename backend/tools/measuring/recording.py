@@ -16,14 +16,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession, channel
-from backend.jobs import Progress
-from backend.motion import loop
-from backend.ports import address_of
+from backend.axis import loop
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession, channel
+from backend.drive.ports import address_of
 from backend.scales.compare import disagreement_of
-from backend.tools.alignment import BoolArray, FloatArray, Run, aligned
-from backend.tools.interrupted import interrupted, interrupted_by, raise_if_ended, require_held
+from backend.tools.measuring.alignment import BoolArray, FloatArray, Run, aligned
+from backend.tools.measuring.interrupted import (
+    interrupted,
+    interrupted_by,
+    raise_if_ended,
+    require_held,
+)
+from backend.work.jobs import Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from backend.axis import Axis
-from backend.drive_identity import confirm_identity
-from backend.jobs import JobResult
-from backend.tools.temporary import put_back_in_time
+from backend.axis.axis import Axis
+from backend.drive.identity import confirm_identity
+from backend.tools.measuring.temporary import put_back_in_time
+from backend.work.jobs import JobResult
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from profiles.schema import Raw

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 
-from backend.axis import Axis
-from backend.jobs import Progress
-from backend.optional import existing
-from backend.quick_stop import quick_stop_keys, raise_quick_stop_from
-from backend.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
-from backend.tools.procedures import run_procedure
+from backend.axis.axis import Axis
+from backend.axis.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
+from backend.drive.optional import existing
+from backend.stopping.quick_stop import quick_stop_keys, raise_quick_stop_from
+from backend.tools.moves.procedures import run_procedure
+from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
 from profiles.schema import Raw

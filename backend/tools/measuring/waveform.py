@@ -13,10 +13,16 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.chirp import band_limited, chirp_period
-from backend.analysis.excitation import BaseMotion, Excitation, choose_lines, multisine, repeated
-from backend.analysis.prbs import prbs_period
-from backend.analysis.stepped_sine import stepped_sine
+from backend.analysis.signals.chirp import band_limited, chirp_period
+from backend.analysis.signals.excitation import (
+    BaseMotion,
+    Excitation,
+    choose_lines,
+    multisine,
+    repeated,
+)
+from backend.analysis.signals.prbs import prbs_period
+from backend.analysis.signals.stepped_sine import stepped_sine
 
 Waveform = Literal["multisine", "chirp", "prbs", "stepped"]
 FloatArray = npt.NDArray[np.float64]

@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.optional import torque_limits
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.inertia_moves import speed_move
-from backend.tools.probe import RoughFit
-from backend.tools.recording import cycle_s
-from backend.tools.temporary import temporary
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.drive.optional import torque_limits
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.inertia.evaluation import InertiaSettings
+from backend.tools.inertia.moves import speed_move
+from backend.tools.inertia.probe import RoughFit
+from backend.tools.measuring.recording import cycle_s
+from backend.tools.measuring.temporary import temporary
+from backend.work.jobs import Progress
 from drivers.errors import NotAllowed, OutOfRange
 
 _TURN = 2 * np.pi

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.recording import Play, bus_limits, cycle_s, enabled, play, quiet
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.measuring.recording import Play, bus_limits, cycle_s, enabled, play, quiet
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause

@@ -6,11 +6,11 @@ import asyncio
 import time
 from dataclasses import dataclass
 
-from backend.axis import Axis, Envelope
-from backend.jobs import JobResult, Progress
-from backend.readings import Reading
+from backend.axis.axis import Axis, Envelope
+from backend.axis.units import ramp_raw
+from backend.drive.readings import Reading
 from backend.scales.polled import PolledGuard
-from backend.units import ramp_raw
+from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange

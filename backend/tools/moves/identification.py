@@ -6,8 +6,8 @@ import asyncio
 import time
 from dataclasses import dataclass
 
-from backend.axis import Axis, Envelope
-from backend.jobs import JobResult, Progress
+from backend.axis.axis import Axis, Envelope
+from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, Rejected

@@ -7,11 +7,11 @@ import time
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.axis import Axis, Envelope
-from backend.jobs import JobResult, Progress
-from backend.optional import ramp_keys
+from backend.axis.axis import Axis, Envelope
+from backend.axis.units import AxisUnits, ramp_raw
+from backend.drive.optional import ramp_keys
 from backend.scales.polled import PolledGuard
-from backend.units import AxisUnits, ramp_raw
+from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange

@@ -7,10 +7,10 @@ import time
 from collections.abc import Sequence
 from contextlib import AsyncExitStack, nullcontext
 
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.jobs import JobResult, Progress
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
 from backend.motion.classes import motion_of
+from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, Rejected
 from profiles.schema import (

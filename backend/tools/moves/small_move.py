@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession, channel
-from backend.cyclic_mode import keeping_mode
-from backend.jobs import JobResult, Progress
-from backend.optional import torque_limits
-from backend.ports import address_of
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession, channel
+from backend.axis.cyclic_mode import keeping_mode
+from backend.drive.optional import torque_limits
+from backend.drive.ports import address_of
 from backend.scales.compare import FloatArray, measured_scale
-from backend.tools.cyclic_motion import play_through
-from backend.tools.recording import cycle_s, enabled, quiet, require_signals
+from backend.tools.jog.cyclic import play_through
+from backend.tools.measuring.recording import cycle_s, enabled, quiet, require_signals
+from backend.work.jobs import JobResult, Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange

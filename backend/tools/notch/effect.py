@@ -1,9 +1,9 @@
 """What the notch values of a drive mean, measured on the drive where no manual prints it.
 
 The same signal is played without a notch and with some of its values, all at one frequency; what
-they do is read from the reported torque (:mod:`backend.analysis.notch_effect`): of a free axis
+they do is read from the reported torque (:mod:`backend.analysis.loop.notch_effect`): of a free axis
 without a loop (here), of one that a load pulls beside its closed speed loop
-(:mod:`backend.tools.notch_in_loop`). M6-L prints no depth, R6L only levels. Every value is put
+(:mod:`backend.tools.notch.in_loop`). M6-L prints no depth, R6L only levels. Every value is put
 back.
 """
 
@@ -17,21 +17,16 @@ from typing import Protocol
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.notch import LevelCalibration, Notch
-from backend.analysis.notch_effect import NotchEffect, fit_effect
-from backend.analysis.sampling import SignalPath
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.drive import Drive
-from backend.jobs import Progress
-from backend.tools import excite
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.go_back import go_back
-from backend.tools.notch import plan_notches
-from backend.tools.notch_meaning import NotchMeaning
-from backend.tools.notch_trials import BEFORE, Trial, least_of, limits_of, raw_of, trials_of
-from backend.tools.recording import (
+from backend.analysis.loop.notch import LevelCalibration, Notch
+from backend.analysis.loop.notch_effect import NotchEffect, fit_effect
+from backend.analysis.response.sampling import SignalPath
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.drive.drive import Drive
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.measuring import excite
+from backend.tools.measuring.recording import (
     Play,
     Recording,
     bus_limits,
@@ -42,8 +37,13 @@ from backend.tools.recording import (
     require_signals,
     share,
 )
-from backend.tools.repeats import Repeats
-from backend.tools.temporary import stopping_hard, temporary
+from backend.tools.measuring.repeats import Repeats
+from backend.tools.measuring.temporary import stopping_hard, temporary
+from backend.tools.moves.go_back import go_back
+from backend.tools.notch.filters import plan_notches
+from backend.tools.notch.meaning import NotchMeaning
+from backend.tools.notch.trials import BEFORE, Trial, least_of, limits_of, raw_of, trials_of
+from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause

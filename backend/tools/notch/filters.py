@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.notch import (
+from backend.analysis.loop.notch import (
     IntegerRange,
     Notch,
     NotchCoefficients,
@@ -24,10 +23,11 @@ from backend.analysis.notch import (
     encode_hz_width_db,
     realised,
 )
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.tools.notch_meaning import NotchMeaning
-from backend.tools.temporary import write_settings
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from backend.tools.measuring.temporary import write_settings
+from backend.tools.notch.meaning import NotchMeaning
 from drivers.errors import NotAllowed, OutOfRange
 from profiles.schema import NotchSlot, NotchSpec, Parameter, Profile
 

@@ -1,9 +1,9 @@
 """What notch values do on an axis that must be held: measured beside its closed speed loop.
 
 A load that pulls is never let go. The speed loop's reference is the excitation, as where a drive
-takes no torque beside a loop (:mod:`backend.tools.speed_injection`); torque and speed together
-tell the notch (:mod:`backend.analysis.notch_effect`). Nothing is tried before the loop as measured
-is known to stay stable whatever a notch there may do.
+takes no torque beside a loop (:mod:`backend.tools.sweep.speed_injection`); torque and speed
+together tell the notch (:mod:`backend.analysis.loop.notch_effect`). Nothing is tried before the
+loop as measured is known to stay stable whatever a notch there may do.
 """
 
 from __future__ import annotations
@@ -16,27 +16,29 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.loop_goals import sensitivity_peak, stable
-from backend.analysis.measured_plant import MeasuredPlant, measured_plant
-from backend.analysis.notch import Notch
-from backend.analysis.notch_effect import LoopLines, NotchEffect, fit_effect_in_loop
-from backend.analysis.sampled_model import LoopModel
-from backend.analysis.sampling import SignalPath
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools import excite, gains, speed_injection
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.notch_effect import ATTEMPTS, periods_of, samples_lost, tried_with
-from backend.tools.notch_meaning import NotchMeaning
-from backend.tools.recording import Recording, require_signals
-from backend.tools.repeats import Repeats
-from backend.tools.sweep import filters_off
-from backend.tools.sweep_evaluation import SweepResult, SweepSettings
-from backend.tools.sweep_plan import Setup, sequences_of, setup_of
-from backend.tools.sweep_play import play_fitting, scaled_by_speed
-from backend.tools.temporary import temporary
+from backend.analysis.loop.loop_goals import sensitivity_peak, stable
+from backend.analysis.loop.measured_plant import MeasuredPlant, measured_plant
+from backend.analysis.loop.notch import Notch
+from backend.analysis.loop.notch_effect import LoopLines, NotchEffect, fit_effect_in_loop
+from backend.analysis.response.sampled_model import LoopModel
+from backend.analysis.response.sampling import SignalPath
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune import gains
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.measuring import excite
+from backend.tools.measuring.recording import Recording, require_signals
+from backend.tools.measuring.repeats import Repeats
+from backend.tools.measuring.temporary import temporary
+from backend.tools.notch.effect import ATTEMPTS, periods_of, samples_lost, tried_with
+from backend.tools.notch.meaning import NotchMeaning
+from backend.tools.sweep import speed_injection
+from backend.tools.sweep.evaluation import SweepResult, SweepSettings
+from backend.tools.sweep.plan import Setup, sequences_of, setup_of
+from backend.tools.sweep.play import play_fitting, scaled_by_speed
+from backend.tools.sweep.run import filters_off
+from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
 

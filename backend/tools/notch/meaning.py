@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
-from backend.analysis.notch import (
+from backend.analysis.loop.notch import (
     IntegerRange,
     LevelCalibration,
     Notch,
@@ -13,7 +13,7 @@ from backend.analysis.notch import (
     encode_hz_levels,
     encode_hz_width,
 )
-from backend.drive import Drive
+from backend.drive.drive import Drive
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from backend.drive import Drive
+from backend.drive.drive import Drive
 from profiles.schema import NotchSlot
 
 #: Widths in shares of the centre (Hz), or level pairs (width, depth).

@@ -9,14 +9,12 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.step import MoveMetrics, StepMetrics, move_metrics, step_metrics
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools.axis_facts import read_facts
-from backend.tools.cyclic_motion import run_up
-from backend.tools.go_back import go_back
-from backend.tools.recording import (
+from backend.analysis.signals.step import MoveMetrics, StepMetrics, move_metrics, step_metrics
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.jog.cyclic import run_up
+from backend.tools.measuring.recording import (
     Play,
     Recording,
     bus_limits,
@@ -27,7 +25,9 @@ from backend.tools.recording import (
     require_signals,
     share,
 )
-from backend.tools.temporary import stopping_hard
+from backend.tools.measuring.temporary import stopping_hard
+from backend.tools.moves.go_back import go_back
+from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import OutOfRange
 

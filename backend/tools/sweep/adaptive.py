@@ -10,14 +10,15 @@ import asyncio
 
 import numpy as np
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools import excite, speed_injection
-from backend.tools.repeats import Repeats
-from backend.tools.sweep_evaluation import SweepSettings
-from backend.tools.sweep_plan import Setup
-from backend.tools.sweep_play import Records, play_fitting, sized
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.tools.measuring import excite
+from backend.tools.measuring.repeats import Repeats
+from backend.tools.sweep import speed_injection
+from backend.tools.sweep.evaluation import SweepSettings
+from backend.tools.sweep.plan import Setup
+from backend.tools.sweep.play import Records, play_fitting, sized
+from backend.work.jobs import Progress
 
 #: Realisations with the same phases, of opposite sign.
 _PAIR = 2

@@ -8,29 +8,35 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis import excitation as signals
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.fit_problem import KnownInertia
-from backend.analysis.frf import Frf, Quantity, Record, estimate_periodic
-from backend.analysis.identify import Identification, identify_with_path
-from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
-from backend.analysis.mechanical_model import MechanicalModel
-from backend.analysis.reported import (
+from backend.analysis.loop.margins import bandwidth, closed_from_open, margins, open_from_closed
+from backend.analysis.mechanics.fit_problem import KnownInertia
+from backend.analysis.mechanics.identify import Identification, identify_with_path
+from backend.analysis.mechanics.mechanical_model import MechanicalModel
+from backend.analysis.mechanics.resonance import Resonance
+from backend.analysis.mechanics.resonance_table import resonance_table
+from backend.analysis.response.frf import Frf, Quantity, Record, estimate_periodic
+from backend.analysis.response.reported import (
     charged,
     commanded,
     current_doubt,
     mean_cycles,
     slow_doubt,
 )
-from backend.analysis.resonance import Resonance
-from backend.analysis.resonance_table import resonance_table
-from backend.analysis.sampling import MODEL_SHARE, STEP_LEAD_S, Hold, SignalPath, sampled_command
-from backend.axis import Envelope
-from backend.tools import excite
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.recording import Recording
-from backend.tools.speed_injection import speed_gain
-from backend.tools.waveform import Waveform
+from backend.analysis.response.sampling import (
+    MODEL_SHARE,
+    STEP_LEAD_S,
+    Hold,
+    SignalPath,
+    sampled_command,
+)
+from backend.analysis.signals import excitation as signals
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.axis.axis import Envelope
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.measuring import excite
+from backend.tools.measuring.recording import Recording
+from backend.tools.measuring.waveform import Waveform
+from backend.tools.sweep.speed_injection import speed_gain
 
 Records = tuple[tuple[excite.Sequence, Recording], ...]
 Kind = Literal["mechanics", "speed_loop", "position_loop"]

@@ -8,15 +8,16 @@ from typing import Literal
 
 import numpy as np
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.optional import existing
-from backend.tools import excite, speed_injection
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.gains import read_gains
-from backend.tools.probe import Probed
-from backend.tools.recording import cycle_s
-from backend.tools.sweep_evaluation import Loop, SweepSettings
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.drive.optional import existing
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.autotune.gains import read_gains
+from backend.tools.inertia.probe import Probed
+from backend.tools.measuring import excite
+from backend.tools.measuring.recording import cycle_s
+from backend.tools.sweep import speed_injection
+from backend.tools.sweep.evaluation import Loop, SweepSettings
 from drivers.errors import NotAllowed, OutOfRange
 
 _TURN = 2 * np.pi

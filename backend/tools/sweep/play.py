@@ -10,16 +10,25 @@ from typing import TypeAlias
 
 import numpy as np
 
-from backend.analysis.excitation import scaled
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools import excite, speed_injection
-from backend.tools.go_back import go_back
-from backend.tools.recording import Play, Recording, bus_limits, enabled, play, quiet, share
-from backend.tools.repeats import Repeats
-from backend.tools.sweep_evaluation import SweepSettings
-from backend.tools.sweep_plan import Setup, sequences_of
+from backend.analysis.signals.excitation import scaled
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.tools.measuring import excite
+from backend.tools.measuring.recording import (
+    Play,
+    Recording,
+    bus_limits,
+    enabled,
+    play,
+    quiet,
+    share,
+)
+from backend.tools.measuring.repeats import Repeats
+from backend.tools.moves.go_back import go_back
+from backend.tools.sweep import speed_injection
+from backend.tools.sweep.evaluation import SweepSettings
+from backend.tools.sweep.plan import Setup, sequences_of
+from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange, exceeded
 from drivers.halt import HaltCause

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.excitation import Excitation, crest_factor
-from backend.axis import Axis
-from backend.tools import excite
-from backend.tools.axis_facts import read_facts
-from backend.tools.sweep_evaluation import SweepSettings
-from backend.tools.waveform import Band
+from backend.analysis.signals.excitation import Excitation, crest_factor
+from backend.axis.axis import Axis
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.measuring import excite
+from backend.tools.measuring.waveform import Band
+from backend.tools.sweep.evaluation import SweepSettings
 from drivers.errors import OutOfRange
 
 _TURN = 2 * np.pi

@@ -14,13 +14,13 @@ from contextlib import asynccontextmanager
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.cyclic_mode import keeping_mode, modes_of_the_loop
-from backend.drive import Drive
-from backend.io_functions import read_terminals
-from backend.optional import existing
-from backend.tools.recording import Play, bus_limits, cycle_s, enabled, play, quiet
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.axis.cyclic_mode import keeping_mode, modes_of_the_loop
+from backend.drive.drive import Drive
+from backend.drive.optional import existing
+from backend.drive.terminals import read_terminals
+from backend.tools.measuring.recording import Play, bus_limits, cycle_s, enabled, play, quiet
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, exceeded
 from drivers.halt import HaltCause

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.spectrum import power_density
-from backend.tools.recording import Recording
+from backend.analysis.signals.spectrum import power_density
+from backend.tools.measuring.recording import Recording
 
 _TURN = 2 * np.pi
 #: Nothing of a slow move is up here, so what is there is noise; shares of the sample rate.

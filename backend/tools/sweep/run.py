@@ -14,18 +14,19 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools import notch as notch_tool
-from backend.tools.axis_facts import AxisFacts, read_facts
-from backend.tools.computing import meanwhile
-from backend.tools.go_back import go_back
-from backend.tools.probe import PULLED, Probed, holding_torque, probe_axis
-from backend.tools.recording import require_signals, takes_torque
-from backend.tools.repeats import Repeats
-from backend.tools.sweep_evaluation import SweepResult, SweepSettings, evaluate
-from backend.tools.sweep_plan import (
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.tools.autotune.axis_facts import AxisFacts, read_facts
+from backend.tools.inertia.probe import PULLED, Probed, holding_torque, probe_axis
+from backend.tools.measuring.computing import meanwhile
+from backend.tools.measuring.recording import require_signals, takes_torque
+from backend.tools.measuring.repeats import Repeats
+from backend.tools.measuring.temporary import stopping_hard, temporary
+from backend.tools.moves.go_back import go_back
+from backend.tools.notch import filters as notch_tool
+from backend.tools.sweep.adaptive import play_telling
+from backend.tools.sweep.evaluation import SweepResult, SweepSettings, evaluate
+from backend.tools.sweep.plan import (
     Setup,
     check,
     chosen_loop,
@@ -33,9 +34,8 @@ from backend.tools.sweep_plan import (
     sequences_of,
     setup_of,
 )
-from backend.tools.sweep_play import MODE_OF, Records, scaled_by_speed
-from backend.tools.sweep_telling import play_telling
-from backend.tools.temporary import stopping_hard, temporary
+from backend.tools.sweep.play import MODE_OF, Records, scaled_by_speed
+from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause

@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.frf import Record, estimate_periodic
-from backend.analysis.line_spectra import good_periods, period_spectra
-from backend.analysis.reference_gain import ReferenceLoop, reference_gain
-from backend.analysis.sampled_model import SampledFit
-from backend.analysis.sampling import SignalPath, delay_response, rising_command
-from backend.tools import excite
-from backend.tools.recording import Recording
-from backend.tools.waveform import Band, Waveform
+from backend.analysis.response.frf import Record, estimate_periodic
+from backend.analysis.response.reference_gain import ReferenceLoop, reference_gain
+from backend.analysis.response.sampled_model import SampledFit
+from backend.analysis.response.sampling import SignalPath, delay_response, rising_command
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.signals.line_spectra import good_periods, period_spectra
+from backend.tools.measuring import excite
+from backend.tools.measuring.recording import Recording
+from backend.tools.measuring.waveform import Band, Waveform
 
 _TURN = 2 * np.pi
 #: Peak of the first trial in rad/s: even a high gain makes little torque of it.

@@ -14,13 +14,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from drivers.ethercat.gridphase import GridPhase
-from drivers.ethercat.mapping import Entry
-from drivers.ethercat.motion import Phase
-from drivers.ethercat.playback import AxisLoop
-from drivers.ethercat.ring import RESYNCED, VALID, Ring, lost_flag
-from drivers.ethercat.segment import Segment
+from drivers.ethercat.exchange.gridphase import GridPhase
+from drivers.ethercat.exchange.mapping import Entry
+from drivers.ethercat.exchange.ring import RESYNCED, VALID, Ring, lost_flag
+from drivers.ethercat.process.segment import Segment
 from drivers.halt import HaltCause, Halted
+from drivers.motion.playback import AxisLoop
+from drivers.motion.setpoint_plan import Phase
 
 DISTRUST_S = 0.03
 """Without valid process data for this long no setpoint can be trusted: every axis brakes."""

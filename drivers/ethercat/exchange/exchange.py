@@ -8,20 +8,20 @@ from collections.abc import Sequence
 
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
-from drivers.ethercat import setup as setup_
-from drivers.ethercat.al_status import ERROR_BIT, AlState
-from drivers.ethercat.cyclic import CyclicLoop, Image, layout, percentile_us
-from drivers.ethercat.lanes import Done, Lanes
-from drivers.ethercat.motion import Motion, limits_of
-from drivers.ethercat.playback import AxisLoop
-from drivers.ethercat.preparation import Preparation, Report
-from drivers.ethercat.protocol import Message
-from drivers.ethercat.ring import Ring
-from drivers.ethercat.segment import Segment
-from drivers.ethercat.setup import Snapshot, StationSetup
-from drivers.ethercat.station import Station, al_status, change_state
-from drivers.ethercat.steps import Pause, Steps
+from drivers.ethercat.exchange import setup as setup_
+from drivers.ethercat.exchange.cyclic import CyclicLoop, Image, layout, percentile_us
+from drivers.ethercat.exchange.preparation import Preparation, Report
+from drivers.ethercat.exchange.ring import Ring
+from drivers.ethercat.exchange.setup import Snapshot, StationSetup
+from drivers.ethercat.process.protocol import Message
+from drivers.ethercat.process.segment import Segment
+from drivers.ethercat.process.station import Station, al_status, change_state
+from drivers.ethercat.wire.al_status import ERROR_BIT, AlState
+from drivers.ethercat.wire.lanes import Done, Lanes
+from drivers.ethercat.wire.steps import Pause, Steps
 from drivers.halt import HaltCause, Halted
+from drivers.motion.playback import AxisLoop
+from drivers.motion.setpoint_plan import Motion, limits_of
 
 _NOT_YET, _OP_TRIES, _OP_PAUSE_S = (0x001B, 0x002D), 5, 0.2
 """Process data or SYNC0 stayed away (AL status codes of ETG.1020 table 2)."""

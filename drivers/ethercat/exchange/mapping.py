@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from drivers.codec import size_of
 from drivers.errors import NotAllowed
 from drivers.link import Address, CyclicSignal
-from drivers.setpoints import TARGETS
+from drivers.motion.setpoints import TARGETS
 from profiles.schema import Parameter, PdoPart, PdoSet, PdoSpec, Profile
 
 CONTROL_WORD = Address(0x6040, 0, "UINT16")

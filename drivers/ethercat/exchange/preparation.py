@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
-from drivers.ethercat import coe
-from drivers.ethercat import setup as setup_
-from drivers.ethercat.al_status import AlState
-from drivers.ethercat.cyclic import Image, layout, places
-from drivers.ethercat.lanes import Done, LaneName, Lanes
-from drivers.ethercat.mapping import Entry, Pdo
-from drivers.ethercat.playback import AxisLoop
-from drivers.ethercat.protocol import Message
-from drivers.ethercat.ring import Ring
-from drivers.ethercat.segment import IO_MAP_BYTES, Segment, SpoiltMap
-from drivers.ethercat.setup import Snapshot, StationSetup
-from drivers.ethercat.station import Station, change_state, identify
-from drivers.ethercat.steps import Steps
+from drivers.ethercat.exchange import setup as setup_
+from drivers.ethercat.exchange.cyclic import Image, layout, places
+from drivers.ethercat.exchange.mapping import Entry, Pdo
+from drivers.ethercat.exchange.ring import Ring
+from drivers.ethercat.exchange.setup import Snapshot, StationSetup
+from drivers.ethercat.process.protocol import Message
+from drivers.ethercat.process.segment import IO_MAP_BYTES, Segment, SpoiltMap
+from drivers.ethercat.process.station import Station, change_state, identify
+from drivers.ethercat.wire import coe
+from drivers.ethercat.wire.al_status import AlState
+from drivers.ethercat.wire.lanes import Done, LaneName, Lanes
+from drivers.ethercat.wire.steps import Steps
+from drivers.motion.playback import AxisLoop
 
 CYCLE_NS = (250_000, 10_000_000)
 _SETUP_S = 30.0

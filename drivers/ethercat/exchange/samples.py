@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from drivers.ethercat.mapping import Entry, StationPlan
+from drivers.ethercat.exchange.mapping import Entry, StationPlan
 
 _NUMPY = {
     "b": "<i1", "B": "<u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "q": "<i8",

@@ -13,16 +13,16 @@ import numpy.typing as npt
 
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, motion_halted
-from drivers.ethercat.hostprocess import HostProcess
-from drivers.ethercat.mapping import Pdo, StationPlan, plan_station
-from drivers.ethercat.motion import Phase
-from drivers.ethercat.protocol import Message
-from drivers.ethercat.recovery import Recovery
-from drivers.ethercat.ring import VALID, RingReader, lost_flag
-from drivers.ethercat.samples import contiguous, fields_of
-from drivers.ethercat.trajectory import message_of
+from drivers.ethercat.exchange.mapping import Pdo, StationPlan, plan_station
+from drivers.ethercat.exchange.recovery import Recovery
+from drivers.ethercat.exchange.ring import VALID, RingReader, lost_flag
+from drivers.ethercat.exchange.samples import contiguous, fields_of
+from drivers.ethercat.process.hostprocess import HostProcess
+from drivers.ethercat.process.protocol import Message
 from drivers.halt import Halted, LoopState
 from drivers.link import CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
+from drivers.motion.setpoint_plan import Phase
+from drivers.motion.trajectory import message_of
 from profiles.schema import Profile
 
 _ANSWER_S, _CONFIGURE_S, _START_S, _STOP_S = 5.0, 60.0, 25.0, 15.0

@@ -11,12 +11,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from drivers.errors import DriveError, LinkLost, NotAllowed, ProtocolError, Rejected
-from drivers.ethercat import coe, sii
-from drivers.ethercat.al_status import AlState
-from drivers.ethercat.mapping import Entry, Pdo
-from drivers.ethercat.registers import TRIES, read_again
-from drivers.ethercat.station import Station, change_state
-from drivers.ethercat.steps import Read, Steps, Write
+from drivers.ethercat.exchange.mapping import Entry, Pdo
+from drivers.ethercat.process.station import Station, change_state
+from drivers.ethercat.wire import coe, sii
+from drivers.ethercat.wire.al_status import AlState
+from drivers.ethercat.wire.registers import TRIES, read_again
+from drivers.ethercat.wire.steps import Read, Steps, Write
 
 FMMU, SYNC_MANAGERS = 0x600, 0x800
 _FMMU_COUNT = 0x004

@@ -11,12 +11,12 @@ from collections.abc import Callable
 from typing import Literal
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
-from drivers.ethercat import foe, sii
-from drivers.ethercat.al_status import AlState
-from drivers.ethercat.mailbox import Mailbox
-from drivers.ethercat.setup import SYNC_MANAGERS, restore_mailbox
-from drivers.ethercat.station import Station, change_state, identify
-from drivers.ethercat.steps import Pause, Steps, Write
+from drivers.ethercat.exchange.setup import SYNC_MANAGERS, restore_mailbox
+from drivers.ethercat.process.station import Station, change_state, identify
+from drivers.ethercat.wire import foe, sii
+from drivers.ethercat.wire.al_status import AlState
+from drivers.ethercat.wire.mailbox import Mailbox
+from drivers.ethercat.wire.steps import Pause, Steps, Write
 
 Where = Literal["auto", "BOOT", "PREOP"]
 Tell = Callable[[float, str], None]

@@ -1,4 +1,4 @@
-"""The process that owns one EtherCAT segment: ``python -m drivers.ethercat.host INTERFACE …``.
+"""The process that owns one EtherCAT segment: `python -m drivers.ethercat.process.host IFACE …`.
 
 One thread does everything on the wire. While process data are exchanged it follows the grid and
 uses what is left of each cycle for mailbox frames and commands; otherwise it works through
@@ -22,10 +22,10 @@ import time
 from types import FrameType
 
 from drivers.errors import DriveError, LinkLost, ProtocolError
-from drivers.ethercat import protocol, realtime
-from drivers.ethercat.operations import Operations
-from drivers.ethercat.protocol import Message
-from drivers.ethercat.ring import Ring
+from drivers.ethercat.exchange.ring import Ring
+from drivers.ethercat.process import protocol, realtime
+from drivers.ethercat.process.operations import Operations
+from drivers.ethercat.process.protocol import Message
 from drivers.halt import HaltCause, Halted
 
 _LAST_WORDS_S = 5

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout
-from drivers.ethercat import protocol
-from drivers.ethercat.protocol import Message
-from drivers.ethercat.ring import Ring
+from drivers.ethercat.exchange.ring import Ring
+from drivers.ethercat.process import protocol
+from drivers.ethercat.process.protocol import Message
 from drivers.link import Progress
 
 _WATCH_S = 0.1
@@ -171,7 +171,7 @@ class HostProcess:
                 try:
                     self.ring = Ring(ring_fd)
                     self._process = await asyncio.create_subprocess_exec(
-                        *self._launcher, sys.executable, "-m", "drivers.ethercat.host",
+                        *self._launcher, sys.executable, "-m", "drivers.ethercat.process.host",
                         self._interface, "--control", str(theirs.fileno()),
                         "--ring", str(ring_fd), *self._options,
                         pass_fds=(theirs.fileno(), ring_fd), env=_environment(),

@@ -10,20 +10,21 @@ from typing import Any
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed, OutOfRange, ProtocolError
-from drivers.ethercat import coe, esc, firmware, reading, sii
-from drivers.ethercat import station as transactions
-from drivers.ethercat.al_status import AlState, state_name
-from drivers.ethercat.cyclic import CyclicLoop
-from drivers.ethercat.frames import ROOM_BYTES
-from drivers.ethercat.information import ObjectInfo
-from drivers.ethercat.lanes import Done, Lanes, Urgency
-from drivers.ethercat.protocol import Message, error_to_wire
-from drivers.ethercat.realtime import RealTime
-from drivers.ethercat.ring import Ring
-from drivers.ethercat.roster import Roster, Send
-from drivers.ethercat.segment import Segment, SpoiltMap
-from drivers.ethercat.setup import FoundInPart
-from drivers.ethercat.station import Station
+from drivers.ethercat.exchange.cyclic import CyclicLoop
+from drivers.ethercat.exchange.ring import Ring
+from drivers.ethercat.exchange.setup import FoundInPart
+from drivers.ethercat.process import firmware
+from drivers.ethercat.process import station as transactions
+from drivers.ethercat.process.protocol import Message, error_to_wire
+from drivers.ethercat.process.realtime import RealTime
+from drivers.ethercat.process.roster import Roster, Send
+from drivers.ethercat.process.segment import Segment, SpoiltMap
+from drivers.ethercat.process.station import Station
+from drivers.ethercat.wire import coe, esc, reading, sii
+from drivers.ethercat.wire.al_status import AlState, state_name
+from drivers.ethercat.wire.frames import ROOM_BYTES
+from drivers.ethercat.wire.information import ObjectInfo
+from drivers.ethercat.wire.lanes import Done, Lanes, Urgency
 from drivers.halt import HaltCause, Halted
 
 _CONTROL_WORD = 0x6040

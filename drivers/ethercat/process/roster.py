@@ -7,17 +7,17 @@ import time
 from collections.abc import Callable, Sequence
 
 from drivers.errors import Busy, DriveError, LinkLost
-from drivers.ethercat import station as transactions
-from drivers.ethercat.al_status import ERROR_BIT, AlState, al_status_text, state_name
-from drivers.ethercat.exchange import Exchange
-from drivers.ethercat.lanes import Lanes
-from drivers.ethercat.mailbox import Mailbox
-from drivers.ethercat.protocol import Message
-from drivers.ethercat.ring import Ring
-from drivers.ethercat.segment import Segment
-from drivers.ethercat.setup import restore_mailbox
-from drivers.ethercat.station import Station
-from drivers.ethercat.steps import Steps
+from drivers.ethercat.exchange.exchange import Exchange
+from drivers.ethercat.exchange.ring import Ring
+from drivers.ethercat.exchange.setup import restore_mailbox
+from drivers.ethercat.process import station as transactions
+from drivers.ethercat.process.protocol import Message
+from drivers.ethercat.process.segment import Segment
+from drivers.ethercat.process.station import Station
+from drivers.ethercat.wire.al_status import ERROR_BIT, AlState, al_status_text, state_name
+from drivers.ethercat.wire.lanes import Lanes
+from drivers.ethercat.wire.mailbox import Mailbox
+from drivers.ethercat.wire.steps import Steps
 
 _FIND_S, _WATCH_S, _REOPEN_S = 30.0, 0.25, 1.0
 _LET_END_S = 0.3

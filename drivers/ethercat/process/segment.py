@@ -27,8 +27,9 @@ import pysoem
 
 from drivers.adapters import require_interface
 from drivers.errors import Busy, LinkLost, NotAllowed, ProtocolError
-from drivers.ethercat import frames, permissions, promiscuous
-from drivers.ethercat.steps import Read, Write
+from drivers.ethercat.process import permissions, promiscuous
+from drivers.ethercat.wire import frames
+from drivers.ethercat.wire.steps import Read, Write
 
 IO_MAP_BYTES = 4096
 MAX_STATIONS = 199

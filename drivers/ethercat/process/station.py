@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 
 from drivers.codec import text_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError, Rejected
-from drivers.ethercat import coe, esc, sii
-from drivers.ethercat.al_status import ERROR_BIT, AlState, al_status_text, state_name
-from drivers.ethercat.mailbox import Mailbox
-from drivers.ethercat.registers import GONE_S, TRIES, read_again
-from drivers.ethercat.steps import Pause, Read, Steps, Write
+from drivers.ethercat.wire import coe, esc, sii
+from drivers.ethercat.wire.al_status import ERROR_BIT, AlState, al_status_text, state_name
+from drivers.ethercat.wire.mailbox import Mailbox
+from drivers.ethercat.wire.registers import GONE_S, TRIES, read_again
+from drivers.ethercat.wire.steps import Pause, Read, Steps, Write
 
 AL_CONTROL, AL_STATUS = 0x120, 0x130
 _SYNC_MANAGERS, _NO_MAILBOXES = 0x800, 0x0016

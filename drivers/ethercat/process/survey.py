@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drivers.ethercat.al_status import ERROR_BIT, AlText, al_status_text, state_name
-from drivers.ethercat.esc import Finding, Port, PortCounters
-from drivers.ethercat.protocol import Message
+from drivers.ethercat.process.protocol import Message
+from drivers.ethercat.wire.al_status import ERROR_BIT, AlText, al_status_text, state_name
+from drivers.ethercat.wire.esc import Finding, Port, PortCounters
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, ProtocolError, Rejected
-from drivers.ethercat.mailbox import COE, Mail, Mailbox, Overtaken
-from drivers.ethercat.steps import Pause, Steps
+from drivers.ethercat.wire.mailbox import COE, Mail, Mailbox, Overtaken
+from drivers.ethercat.wire.steps import Pause, Steps
 from drivers.sdo_abort import rejected
 
 _REQUEST = 2 << 12

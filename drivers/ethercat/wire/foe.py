@@ -6,9 +6,9 @@ import struct
 from collections.abc import Callable
 
 from drivers.errors import DriveError, ProtocolError, Rejected
-from drivers.ethercat.mailbox import FOE, Mail, Mailbox
-from drivers.ethercat.registers import GONE_S
-from drivers.ethercat.steps import Pause, Steps
+from drivers.ethercat.wire.mailbox import FOE, Mail, Mailbox
+from drivers.ethercat.wire.registers import GONE_S
+from drivers.ethercat.wire.steps import Pause, Steps
 
 ERASE_S, PACKET_S = 30.0, 10.0
 """Drives that erase their memory first, or check the whole file at the end, take their time."""

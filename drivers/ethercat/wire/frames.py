@@ -12,7 +12,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
-from drivers.ethercat.steps import Read, Write
+from drivers.ethercat.wire.steps import Read, Write
 
 ETHERTYPE = b"\x88\xa4"
 FIRST_INDEX, INDICES = 0x80, 0x80

@@ -9,9 +9,9 @@ import struct
 from dataclasses import dataclass
 
 from drivers.errors import ProtocolError
-from drivers.ethercat.coe import MAX_BYTES, OVERTAKEN_READS, settle
-from drivers.ethercat.mailbox import COE, Mail, Mailbox, Overtaken
-from drivers.ethercat.steps import Steps
+from drivers.ethercat.wire.coe import MAX_BYTES, OVERTAKEN_READS, settle
+from drivers.ethercat.wire.mailbox import COE, Mail, Mailbox, Overtaken
+from drivers.ethercat.wire.steps import Steps
 from drivers.sdo_abort import rejected
 
 _INFO = 8

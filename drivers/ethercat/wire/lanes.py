@@ -19,9 +19,9 @@ from enum import IntEnum
 from typing import Any, Literal, Protocol
 
 from drivers.errors import DriveError, LinkLost, ProtocolError
-from drivers.ethercat.coe import stopped_first
-from drivers.ethercat.frames import ROOM_BYTES, Request, bytes_of
-from drivers.ethercat.steps import Gap, Pause, Read, Step, Steps, Write
+from drivers.ethercat.wire.coe import stopped_first
+from drivers.ethercat.wire.frames import ROOM_BYTES, Request, bytes_of
+from drivers.ethercat.wire.steps import Gap, Pause, Read, Step, Steps, Write
 
 GRACE_S = 0.01
 """How long a stop lets the answer under way come: most drives need 1 to 5 ms."""
@@ -35,7 +35,7 @@ class Wire(Protocol):
     """One frame for several accesses."""
 
     def exchange(self, requests: Sequence[Request]) -> list[bytes | None]:
-        """As `drivers.ethercat.frames.answers`; all None for a lost frame."""
+        """As `drivers.ethercat.wire.frames.answers`; all None for a lost frame."""
 
 
 class Urgency(IntEnum):

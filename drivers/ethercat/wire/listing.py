@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from drivers.codec import size_of
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, NotAsked, ProtocolError
-from drivers.ethercat.protocol import Message, error_from_wire
+from drivers.ethercat.process.protocol import Message, error_from_wire
 from drivers.link import Address
 
 Item: TypeAlias = tuple[int, int, int | None]

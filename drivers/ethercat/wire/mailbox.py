@@ -1,6 +1,6 @@
 """The mailbox of one slave: framing and transactions as generators without any I/O.
 
-See `drivers.ethercat.steps` for what a transaction yields and is sent back.
+See `drivers.ethercat.wire.steps` for what a transaction yields and is sent back.
 
 Source: ETG.1000.4 clause 5.6 (mailbox header, counter, repeat), ETG.1000.6 clause 5.6 (CoE).
 """
@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from drivers.errors import LinkLost, LinkTimeout, ProtocolError
-from drivers.ethercat.steps import Pause, Read, Steps, Write
+from drivers.ethercat.wire.steps import Pause, Read, Steps, Write
 
 MAILBOX_ERROR = 0
 COE = 3

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotInUse, Rejected
-from drivers.ethercat import coe, information
-from drivers.ethercat.station import Station
-from drivers.ethercat.steps import Gap, Steps
+from drivers.ethercat.process.station import Station
+from drivers.ethercat.wire import coe, information
+from drivers.ethercat.wire.steps import Gap, Steps
 
 _NO_COMPLETE_ACCESS = {0x05040001, 0x06010000, 0x06010004}
 _LISTS = frozenset((*range(0x1600, 0x1C00), *range(0x1C10, 0x1C30)))

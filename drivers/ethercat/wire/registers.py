@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from drivers.ethercat.steps import Pause, Read, Steps
+from drivers.ethercat.wire.steps import Pause, Read, Steps
 
 TRIES = 3
 """A frame that comes back untouched so often says for certain that nobody answers."""

@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 from drive_sim import TURN, Drive, Mechanics, simulate
 
-from backend.analysis.excitation import BaseMotion, choose_lines, multisine, scaled
-from backend.analysis.frf import Frf
-from backend.analysis.line_spectra import Quantity, Record
-from backend.analysis.sampling import SignalPath
+from backend.analysis.response.frf import Frf
+from backend.analysis.response.sampling import SignalPath
+from backend.analysis.signals.excitation import BaseMotion, choose_lines, multisine, scaled
+from backend.analysis.signals.line_spectra import Quantity, Record
 
 RIGID = Mechanics()
 ONE = Mechanics(loads=((1e-4, 20.0, 0.002),))

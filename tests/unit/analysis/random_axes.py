@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from drive_sim import TURN, Drive, Mechanics, simulate
 
-from backend.axis import Envelope
-from backend.tools import excite
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.recording import Recording
-from backend.tools.sweep_evaluation import SweepResult, SweepSettings, evaluate
+from backend.axis.axis import Envelope
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.measuring import excite
+from backend.tools.measuring.recording import Recording
+from backend.tools.sweep.evaluation import SweepResult, SweepSettings, evaluate
 
 RATED_NM = 1.27
 #: Most that the axis may do meanwhile: rad, rad/s, Nm.

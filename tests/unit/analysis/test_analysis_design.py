@@ -9,14 +9,14 @@ import pytest
 from drive_sim import TURN, Drive, Mechanics, simulate
 from measured_axes import COMPLIANT, RIGID, STIFF, measure
 
-from backend.analysis.design import design
-from backend.analysis.identify import identify_mechanics
-from backend.analysis.loop_goals import goals_for
-from backend.analysis.loop_structure import DriveLoops, step_of_closed_loop
-from backend.analysis.margins import margins
-from backend.analysis.measured_plant import MeasuredPlant, measured_plant
-from backend.analysis.mechanical_model import MechanicalModel, Mode
-from backend.analysis.notch import coefficients_response, encode_coefficients
+from backend.analysis.loop.design import design
+from backend.analysis.loop.loop_goals import goals_for
+from backend.analysis.loop.loop_structure import DriveLoops, step_of_closed_loop
+from backend.analysis.loop.margins import margins
+from backend.analysis.loop.measured_plant import MeasuredPlant, measured_plant
+from backend.analysis.loop.notch import coefficients_response, encode_coefficients
+from backend.analysis.mechanics.identify import identify_mechanics
+from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
 
 LOOPS = DriveLoops(1000.0, 50e-6)
 #: Load-side resonance near 300 Hz, inertia ratio 6, lightly damped.

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from backend.analysis.design import design
-from backend.analysis.loop_goals import stable
-from backend.analysis.loop_structure import DriveLoops
-from backend.analysis.measured_plant import MeasuredPlant
-from backend.analysis.mechanical_model import MechanicalModel, Mode
-from backend.analysis.notch import Notch
+from backend.analysis.loop.design import design
+from backend.analysis.loop.loop_goals import stable
+from backend.analysis.loop.loop_structure import DriveLoops
+from backend.analysis.loop.measured_plant import MeasuredPlant
+from backend.analysis.loop.notch import Notch
+from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
 
 MOTOR, LOAD, STIFFNESS, DAMPING = 5e-5, 1e-4, 40.0, 3e-3
 WHOLE = MOTOR + LOAD

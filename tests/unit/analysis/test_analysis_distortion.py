@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from drive_sim import TURN, Drive, Mechanics, simulate
 
-from backend.analysis.distortion import distortion
-from backend.analysis.excitation import BaseMotion, choose_lines, multisine, scaled
-from backend.analysis.frf import estimate_periodic
-from backend.analysis.identify import identify_with_path
-from backend.analysis.line_spectra import Record, speed_lag_s
-from backend.analysis.sampling import SignalPath
+from backend.analysis.mechanics.identify import identify_with_path
+from backend.analysis.response.distortion import distortion
+from backend.analysis.response.frf import estimate_periodic
+from backend.analysis.response.sampling import SignalPath
+from backend.analysis.signals.excitation import BaseMotion, choose_lines, multisine, scaled
+from backend.analysis.signals.line_spectra import Record, speed_lag_s
 
 RATE, PERIOD = 1000.0, 650
 LINES = choose_lines(5.0, 400.0, RATE / PERIOD, count=150)

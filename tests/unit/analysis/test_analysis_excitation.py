@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from backend.analysis.chirp import chirp
-from backend.analysis.excitation import (
+from backend.analysis.signals.chirp import chirp
+from backend.analysis.signals.excitation import (
     BaseMotion,
     choose_lines,
     crest_factor,
@@ -12,8 +12,8 @@ from backend.analysis.excitation import (
     multisine,
     scaled,
 )
-from backend.analysis.prbs import prbs
-from backend.analysis.stepped_sine import stepped_sine
+from backend.analysis.signals.prbs import prbs
+from backend.analysis.signals.stepped_sine import stepped_sine
 
 LINES = choose_lines(5.0, 400.0, 1.0, count=150)
 

@@ -7,14 +7,14 @@ import pytest
 from drive_sim import TURN, Drive, Mechanics, simulate
 from measured_axes import HEAVY, NAMED, ONE, RIGID, STIFF, THREE, TWO, VERTICAL, errors, measure
 
-from backend.analysis.chirp import chirp
-from backend.analysis.excitation import choose_lines, multisine, scaled
-from backend.analysis.frf import estimate_periodic, valid_band_hz
-from backend.analysis.frf_stepped import estimate_stepped
-from backend.analysis.identify import identify_mechanics
-from backend.analysis.line_spectra import Record
-from backend.analysis.sampling import SignalPath, hold_response, sampled_command
-from backend.analysis.stepped_sine import stepped_sine
+from backend.analysis.mechanics.identify import identify_mechanics
+from backend.analysis.response.frf import estimate_periodic, valid_band_hz
+from backend.analysis.response.frf_stepped import estimate_stepped
+from backend.analysis.response.sampling import SignalPath, hold_response, sampled_command
+from backend.analysis.signals.chirp import chirp
+from backend.analysis.signals.excitation import choose_lines, multisine, scaled
+from backend.analysis.signals.line_spectra import Record
+from backend.analysis.signals.stepped_sine import stepped_sine
 
 
 def matches(found, mechanics, low_hz, high_hz):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from backend.analysis.friction import estimate_coulomb
-from backend.analysis.line_spectra import LineSpectra, continuous_input, friction_input
-from backend.analysis.sampling import SignalPath
+from backend.analysis.mechanics.friction import estimate_coulomb
+from backend.analysis.response.sampling import SignalPath
+from backend.analysis.signals.line_spectra import LineSpectra, continuous_input, friction_input
 
 PATH = SignalPath(1000.0)
 LINES = np.arange(4, 124)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from drive_sim import TURN, Drive, Mechanics, simulate
 
-from backend.analysis.identification_path import MoveLimits, design_moves
-from backend.analysis.inertia import estimate_inertia
+from backend.analysis.mechanics.identification_path import MoveLimits, design_moves
+from backend.analysis.mechanics.inertia import estimate_inertia
 
 MOTOR = 5e-5
 

@@ -6,8 +6,8 @@ Torque is worked out from the moves themselves (inverse dynamics), which knows n
 import numpy as np
 import pytest
 
-from backend.analysis.identification_path import MoveLimits, design_moves
-from backend.analysis.inertia import estimate_inertia
+from backend.analysis.mechanics.identification_path import MoveLimits, design_moves
+from backend.analysis.mechanics.inertia import estimate_inertia
 
 TURN = 2 * np.pi
 RATE = 1000.0

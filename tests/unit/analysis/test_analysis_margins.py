@@ -4,9 +4,9 @@ import control
 import numpy as np
 import pytest
 
-from backend.analysis.margins import bandwidth, closed_from_open, margins, open_from_closed
-from backend.analysis.spectrum import power_density
-from backend.analysis.step import move_metrics, step_metrics
+from backend.analysis.loop.margins import bandwidth, closed_from_open, margins, open_from_closed
+from backend.analysis.signals.spectrum import power_density
+from backend.analysis.signals.step import move_metrics, step_metrics
 
 TURN = 2 * np.pi
 F = np.geomspace(0.1, 3000.0, 3000)

@@ -4,7 +4,7 @@ import control
 import numpy as np
 import pytest
 
-from backend.analysis.notch import (
+from backend.analysis.loop.notch import (
     IntegerRange,
     LevelCalibration,
     Notch,

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
-from backend.analysis.measured_plant import MeasuredPlant
-from backend.analysis.mechanical_model import MechanicalModel, Mode
-from backend.analysis.notch import Notch
-from backend.analysis.notch_effect import LoopLines, fit_effect_in_loop
-from backend.analysis.sampled_model import LoopModel
-from backend.analysis.sampling import SignalPath
-from backend.tools.notch_in_loop import safe_centre_hz
+from backend.analysis.loop.measured_plant import MeasuredPlant
+from backend.analysis.loop.notch import Notch
+from backend.analysis.loop.notch_effect import LoopLines, fit_effect_in_loop
+from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
+from backend.analysis.response.sampled_model import LoopModel
+from backend.analysis.response.sampling import SignalPath
+from backend.tools.notch.in_loop import safe_centre_hz
 
 TURN = 2 * np.pi
 RATE, STEPS, PERIOD, PERIODS = 2000.0, 10, 1300, 4

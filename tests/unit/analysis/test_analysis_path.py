@@ -8,19 +8,19 @@ from drive_sim import TURN, Drive, Mechanics
 from random_axes import RATED_NM, Case, errors, played, result_of
 from scipy.optimize import least_squares
 
-from backend.analysis.frf import estimate_periodic
-from backend.analysis.identify import (
+from backend.analysis.mechanics.identify import (
     Identification,
     _Task,
     _undecided,
     _without_path,
     identify_with_path,
 )
-from backend.analysis.line_spectra import Record
-from backend.analysis.path_fit import find_paths, moved_path
-from backend.analysis.robust_fit import minimise
-from backend.analysis.sampling import SignalPath, sampled_command, sampled_command_response
-from backend.analysis.stated_band import unexplained
+from backend.analysis.mechanics.robust_fit import minimise
+from backend.analysis.response.frf import estimate_periodic
+from backend.analysis.response.path_fit import find_paths, moved_path
+from backend.analysis.response.sampling import SignalPath, sampled_command, sampled_command_response
+from backend.analysis.response.stated_band import unexplained
+from backend.analysis.signals.line_spectra import Record
 
 ONE = Mechanics(loads=((1e-4, 20.0, 0.002),))
 

@@ -8,23 +8,24 @@ from drive_sim import TURN, Drive, Mechanics, simulate
 from random_axes import errors
 from test_analysis_path import case_of, records_of
 
-from backend.analysis.excitation import choose_lines, multisine, scaled
-from backend.analysis.frf import Frf
-from backend.analysis.line_spectra import Record
-from backend.analysis.reference_gain import reference_gain
-from backend.analysis.sampling import (
+from backend.analysis.response.frf import Frf
+from backend.analysis.response.reference_gain import reference_gain
+from backend.analysis.response.sampling import (
     SignalPath,
     rising_command,
     sampled_command,
     sampled_integral_response,
 )
-from backend.analysis.stated_band import ended_where_unknown
-from backend.axis import Envelope
-from backend.tools import excite, speed_injection
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.recording import Recording
-from backend.tools.sweep_evaluation import SweepSettings, evaluate
-from backend.tools.waveform import Band
+from backend.analysis.response.stated_band import ended_where_unknown
+from backend.analysis.signals.excitation import choose_lines, multisine, scaled
+from backend.analysis.signals.line_spectra import Record
+from backend.axis.axis import Envelope
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.measuring import excite
+from backend.tools.measuring.recording import Recording
+from backend.tools.measuring.waveform import Band
+from backend.tools.sweep import speed_injection
+from backend.tools.sweep.evaluation import SweepSettings, evaluate
 
 RATE, FINE = 1000.0, 1000
 PATHS = [

@@ -8,15 +8,15 @@ import pytest
 from drive_sim import TURN, Drive, simulate
 from measured_axes import ONE, tuned_drive
 
-from backend.analysis.excitation import BaseMotion, choose_lines, multisine, scaled
-from backend.analysis.line_spectra import Record
-from backend.analysis.reported import commanded, current_doubt, mean_cycles
-from backend.analysis.sampling import SignalPath, lag_response
-from backend.axis import Envelope
-from backend.tools import excite
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.recording import Recording
-from backend.tools.sweep_evaluation import SweepSettings, evaluate
+from backend.analysis.response.reported import commanded, current_doubt, mean_cycles
+from backend.analysis.response.sampling import SignalPath, lag_response
+from backend.analysis.signals.excitation import BaseMotion, choose_lines, multisine, scaled
+from backend.analysis.signals.line_spectra import Record
+from backend.axis.axis import Envelope
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.measuring import excite
+from backend.tools.measuring.recording import Recording
+from backend.tools.sweep.evaluation import SweepSettings, evaluate
 
 RATE = 1000.0
 

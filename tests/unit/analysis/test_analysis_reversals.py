@@ -7,17 +7,17 @@ import pytest
 from drive_sim import TURN, Drive, Mechanics
 from random_axes import ENVELOPE, RATED_NM, Case, errors, facts_of, played
 
-from backend.analysis import identify
-from backend.analysis.fit_problem import CHAIN, Problem, View
-from backend.analysis.frf import Frf
-from backend.analysis.line_spectra import Record, collect
-from backend.analysis.mechanical_model import MechanicalModel, Mode
-from backend.analysis.mode_doubt import ModeDoubt, mode_doubts
-from backend.analysis.resonance import Resonance
-from backend.analysis.resonance_table import resonance_table
-from backend.analysis.sampled_model import LoopModel, seen_response
-from backend.analysis.sampling import SignalPath
-from backend.tools.sweep_evaluation import SweepSettings, evaluate
+from backend.analysis.mechanics import identify
+from backend.analysis.mechanics.fit_problem import CHAIN, Problem, View
+from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
+from backend.analysis.mechanics.mode_uncertainty import ModeDoubt, mode_doubts
+from backend.analysis.mechanics.resonance import Resonance
+from backend.analysis.mechanics.resonance_table import resonance_table
+from backend.analysis.response.frf import Frf
+from backend.analysis.response.sampled_model import LoopModel, seen_response
+from backend.analysis.response.sampling import SignalPath
+from backend.analysis.signals.line_spectra import Record, collect
+from backend.tools.sweep.evaluation import SweepSettings, evaluate
 
 DRIVE = Drive(
     rated_nm=RATED_NM, limit_nm=3 * RATED_NM, current_hz=1000.0, counts_per_rev=2**20,

@@ -5,11 +5,11 @@ import pytest
 from drive_sim import TURN, Drive, Mechanics
 from random_axes import RATED_NM, Case, errors, played, result_of
 
-from backend.analysis.excitation import choose_lines, multisine
-from backend.analysis.frf import estimate_periodic
-from backend.analysis.line_spectra import Record
-from backend.analysis.sampling import SignalPath
-from backend.analysis.settling import settled
+from backend.analysis.response.frf import estimate_periodic
+from backend.analysis.response.sampling import SignalPath
+from backend.analysis.signals.excitation import choose_lines, multisine
+from backend.analysis.signals.line_spectra import Record
+from backend.analysis.signals.transient_removal import settled
 
 #: 30 Hz by the reduced inertia of both masses, damping ratio 0.002: it rings for 3 s.
 _REDUCED = 1.0 / (1 / 5e-5 + 1 / 1.5e-4)

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from backend.analysis.arrays import ComplexArray, FloatArray
-from backend.analysis.design import design
-from backend.analysis.loop_goals import goals_for, worst_of
-from backend.analysis.loop_search import LoopSearch, Shape
-from backend.analysis.loop_seen import LoopLines, seen_in_loop
-from backend.analysis.loop_structure import DriveLoops, Gains, speed_loop
-from backend.analysis.margins import bandwidth, closed_from_open
-from backend.analysis.measured_plant import MeasuredPlant
-from backend.analysis.mechanical_model import MechanicalModel
+from backend.analysis.loop.design import design
+from backend.analysis.loop.loop_goals import goals_for, worst_of
+from backend.analysis.loop.loop_search import LoopSearch, Shape
+from backend.analysis.loop.loop_seen import LoopLines, seen_in_loop
+from backend.analysis.loop.loop_structure import DriveLoops, Gains, speed_loop
+from backend.analysis.loop.margins import bandwidth, closed_from_open
+from backend.analysis.loop.measured_plant import MeasuredPlant
+from backend.analysis.mechanics.mechanical_model import MechanicalModel
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: Rigid: 1e-4 kg·m² as measured before; within its loop a fifth of it is loose, above some 30 Hz.
 BEFORE = MechanicalModel(1e4, 1.0)

@@ -7,10 +7,10 @@ import httpx
 import pytest
 
 from backend.api.app import make_app
-from backend.bench import Bench
-from backend.drive import Drive
-from backend.member import Member
-from backend.ports import Port
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
 from drivers.link import Found
 from profiles.motion.classify import classified
 from profiles.motion.rule import MotionRule

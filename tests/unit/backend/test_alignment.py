@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.tools.alignment import FloatArray, Run, aligned
+from backend.tools.measuring.alignment import FloatArray, Run, aligned
 from drivers.errors import LinkLost
 
 IDLE = 40

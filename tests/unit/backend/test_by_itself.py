@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from backend.bench import Bench
 from backend.people.identity import LOCAL, Actor, acting, acting_person, by_itself
+from backend.station.bench import Bench
 from drivers.link import LinkEvent, Unsubscribe
 from tests.support.memory_link import MemoryLink
 

@@ -9,19 +9,19 @@ from typing import Any
 
 import pytest
 
-from backend.api.live import LiveHub
-from backend.api.live_connection import Connection
-from backend.api.live_messages import ScopeChannel, ScopeStart
-from backend.api.security_socket import OpenSockets
-from backend.axis import Envelope
-from backend.bench import Bench
-from backend.cyclic import CyclicSession
-from backend.jobs import JobRunner, Progress
-from backend.measuring import Exchange
-from backend.member import Member
-from backend.monitor import Snapshot
+from backend.api.live.connection import Connection
+from backend.api.live.live import LiveHub
+from backend.api.live.messages import ScopeChannel, ScopeStart
+from backend.api.security.socket import OpenSockets
+from backend.axis.axis import Envelope
+from backend.axis.cyclic import CyclicSession
 from backend.people.identity import LOCAL, Actor, acting
 from backend.people.station import People
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.station.measuring import Exchange
+from backend.station.monitor import Snapshot
+from backend.work.jobs import JobRunner, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, LinkTimeout, NotAllowed
 from drivers.link import CyclicSignal

@@ -16,13 +16,13 @@ import typer
 from typer.testing import CliRunner
 
 from backend import cli
-from backend.bench import Bench
 from backend.commands import session
 from backend.commands.serve import _tell_problems
 from backend.commands.values import assignment, line, show_readings
-from backend.drive import Drive
-from backend.readings import Reading
-from backend.records import REMOTE_S
+from backend.drive.drive import Drive
+from backend.drive.readings import Reading
+from backend.station.bench import Bench
+from backend.station.records import REMOTE_S
 from drivers.errors import NotAllowed
 from profiles import load_profile
 from tests.support.machine import OwnTime

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from backend.api import routes_design
-from backend.measurements import BadMeasurement
+from backend.api.tuning import design as routes_design
+from backend.library.measurements import BadMeasurement
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ from itertools import chain, pairwise
 import pytest
 from pydantic import ValidationError
 
-from backend.api.models_parameters import ParameterWrite
-from backend.drive import Drive
-from backend.ports import OBJECT_BATCH, Port
+from backend.api.drive.models_parameters import ParameterWrite
+from backend.drive.drive import Drive
+from backend.drive.ports import OBJECT_BATCH, Port
 from backend.tools.parameters import read_all
 from drivers.errors import (
     DriveError,

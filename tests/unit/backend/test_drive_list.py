@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from backend.bench import Bench
-from backend.drive_list import DriveList, SavedDrive, SavedPort
-from backend.files import StorageFailed
+from backend.station.bench import Bench
+from backend.station.drive_list import DriveList, SavedDrive, SavedPort
+from backend.store.files import StorageFailed
 from tests.support.memory_link import MemoryLink
 
 X = SavedDrive("X", "mms7", (SavedPort("mlink:///dev/ttyUSB0", 1),), "left", 77)

@@ -10,27 +10,27 @@ from typing import Any
 import httpx
 import pytest
 
-from backend.access import Leases
 from backend.api.app import make_app
-from backend.api.live import LiveHub
-from backend.api.security_socket import OpenSockets
-from backend.bench import Bench
-from backend.cyclic import CyclicState
-from backend.elapsed import elapsed_s, moment_of
-from backend.gear import write_gear
-from backend.jobs import Progress
-from backend.measuring import Exchange, exchange_for
-from backend.mechanics_calc import GearValue
-from backend.member import Member
+from backend.api.live.live import LiveHub
+from backend.api.security.socket import OpenSockets
+from backend.axis.cyclic import CyclicState
+from backend.functions.gear import write_gear
+from backend.functions.gear_calculator import GearValue
+from backend.people.elapsed import elapsed_s, moment_of
 from backend.people.identity import LOCAL, Actor, acting
+from backend.people.lease import Leases
 from backend.people.rights import Right
 from backend.people.station import People
 from backend.people.support import Support
 from backend.restore.identity import identity_of
 from backend.restore.store import RestoreStore
-from backend.tools.cyclic_motion import jog_cyclic
-from backend.tools.end_search import limited
-from backend.tools.jog import Hold, JogSettings
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.station.measuring import Exchange, exchange_for
+from backend.tools.jog.cyclic import jog_cyclic
+from backend.tools.jog.run import Hold, JogSettings
+from backend.tools.moves.end_search import limited
+from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, LinkTimeout, NotAllowed
 from tests.support.servo import STATUS, URL, Servo
@@ -420,7 +420,7 @@ async def test_a_defect_does_not_end_the_watch_over_silent_pages(
     bench: Bench, hub: LiveHub, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """The dead-man of every motion lived in a task that one exception ended for good."""
-    monkeypatch.setattr("backend.api.live_watch._LOOK_S", 0.001)
+    monkeypatch.setattr("backend.api.live.watch._LOOK_S", 0.001)
     broken = iter([True, True])
 
     def tick(*_what: object) -> None:

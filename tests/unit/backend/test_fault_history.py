@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.fault_history import named_fault, read_history
-from backend.member import Member
-from backend.ports import Port
+from backend.axis.axis import Axis
+from backend.axis.fault_history import named_fault, read_history
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
 from backend.recording.facts import past_faults
+from backend.station.connected_drive import Member
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address
 from profiles import load_profile

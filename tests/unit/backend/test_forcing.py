@@ -7,14 +7,14 @@ from collections.abc import Callable
 
 import pytest
 
-from backend import forcing
-from backend.access import Leases
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.forcing import ForcingSessions
-from backend.io_functions import ProbeSettings, probe_bits, read_terminals, set_probe
-from backend.jobs import JobRunner
-from backend.ports import Port
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
+from backend.drive.terminals import ProbeSettings, probe_bits, read_terminals, set_probe
+from backend.functions import forcing
+from backend.functions.forcing import ForcingSessions
+from backend.people.lease import Leases
+from backend.work.jobs import JobRunner
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange, Rejected
 from profiles.functions import Forcing, Functions, Probe, TerminalBits, TerminalFacts, TouchProbe
 from profiles.schema import IoFunction, IoTerminal, Parameter, Profile, Quirk

@@ -9,7 +9,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from backend.bench import Bench
+from backend.station.bench import Bench
 from tests.support.servo import URL, Servo, bench_with
 
 

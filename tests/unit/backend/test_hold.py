@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from backend.tools.hold import CONFIRM_S, GAP_S, RESUME_S, Hold
+from backend.tools.jog.hold import CONFIRM_S, GAP_S, RESUME_S, Hold
 
 #: A page sends a sign every 40 ms; a motion looks at its hold as often.
 PERIOD_S = 0.04

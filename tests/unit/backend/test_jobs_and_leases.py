@@ -6,9 +6,9 @@ import asyncio
 
 import pytest
 
-from backend.access import Leases
-from backend.jobs import JobRunner, Progress
-from backend.restoring import shielded
+from backend.axis.restoring import shielded
+from backend.people.lease import Leases
+from backend.work.jobs import JobRunner, Progress
 from drivers.errors import Busy, LinkLost, LinkTimeout, NotAllowed, OutOfRange
 
 

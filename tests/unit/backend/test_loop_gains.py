@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import pytest
 
-from backend.analysis.loop_structure import Gains, LoopFilters
-from backend.drive import Drive
-from backend.tools.gains import filter_choices, plan_filters, plan_gains
+from backend.analysis.loop.loop_structure import Gains, LoopFilters
+from backend.drive.drive import Drive
+from backend.tools.autotune.gains import filter_choices, plan_filters, plan_gains
 from drivers.errors import NotAllowed
 from profiles.loader import load_profile
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from backend import matching
+from backend.station import matching
 from drivers.link import Found
 from profiles.schema import Profile
 

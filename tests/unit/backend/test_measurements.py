@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from backend import measurements
-from backend.drive import Drive
-from backend.evaluation import evaluate
-from backend.measurements import BadMeasurement, MeasurementStore, profile_version, unpack
+from backend.drive.drive import Drive
+from backend.library import measurements
+from backend.library.measurements import BadMeasurement, MeasurementStore, profile_version, unpack
+from backend.station.evaluation import evaluate
 from drivers.errors import DriveError, NotAllowed
 from tests.support import measurements as known
 

@@ -9,7 +9,7 @@ import httpx
 import pytest
 
 from backend.api.app import make_app
-from backend.bench import Bench
+from backend.station.bench import Bench
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
 from tests.support.servo import URL, Servo

@@ -8,11 +8,11 @@ from typing import cast
 
 import pytest
 
-from backend import monitor as watching
-from backend.cyclic import CyclicSession
-from backend.drive import Drive
-from backend.journal import Journal
-from backend.member import Member
+from backend.axis.cyclic import CyclicSession
+from backend.drive.drive import Drive
+from backend.station import monitor as watching
+from backend.station.connected_drive import Member
+from backend.work.journal import Journal
 from drivers.cia402 import State
 from tests.support.servo import STATUS, Servo
 

@@ -10,16 +10,16 @@ from pathlib import Path
 import httpx
 import pytest
 
-from backend.axis import Axis
-from backend.bench import Bench
-from backend.drive import Drive
-from backend.jobs import JobResult, Progress
-from backend.member import Member
-from backend.motion.assign import assign
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
+from backend.functions.assign import assign
 from backend.motion.authority import UNATTENDED_S, MotionAuthority
 from backend.motion.grant import Grant, NotGranted
 from backend.motion.stopping import stops
-from backend.ports import Port
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, NotAllowed
 from profiles.loader import load_profile
@@ -147,7 +147,7 @@ async def test_an_axis_left_enabled_by_a_script_loses_its_power(
     x: Member, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert UNATTENDED_S == 600.0
-    monkeypatch.setattr("backend.axis.UNATTENDED_S", 0.05)
+    monkeypatch.setattr("backend.axis.axis.UNATTENDED_S", 0.05)
     await x.axis.transition(State.OPERATION_ENABLED, Mode.PV)
     standing = bench.authority.grant_of("x")
     assert standing is not None
@@ -212,7 +212,7 @@ async def test_an_input_that_is_on_gets_no_function() -> None:
 async def test_a_setting_that_turns_the_shaft_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     async def not_seen(*_what: object) -> None: ...
 
-    monkeypatch.setattr("backend.motion.assign._require_inputs_off", not_seen)
+    monkeypatch.setattr("backend.functions.assign._require_inputs_off", not_seen)
     axis, link = an_m6l()
     link.device.inject("di2", 1.0)
     with pytest.raises(NotAllowed, match="began to turn") as told:

@@ -8,16 +8,16 @@ from typing import Literal
 import httpx
 import pytest
 
-from backend.axis import Envelope
-from backend.bench import Bench
-from backend.cyclic import CyclicState
-from backend.jobs import Progress
-from backend.member import Member
-from backend.ports import Port
-from backend.tools import jog as jogging
-from backend.tools import move as moving
-from backend.tools.cyclic_motion import GeneratorSettings, generate, jog_cyclic
-from backend.tools.jog import Hold, JogSettings, jog
+from backend.axis.axis import Envelope
+from backend.axis.cyclic import CyclicState
+from backend.drive.ports import Port
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.tools.jog import run as jogging
+from backend.tools.jog.cyclic import GeneratorSettings, generate, jog_cyclic
+from backend.tools.jog.run import Hold, JogSettings, jog
+from backend.tools.moves import move as moving
+from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from tests.support.servo import (
@@ -157,7 +157,7 @@ async def test_stop_goes_over_the_second_port_when_the_first_is_dead(
 async def test_after_stop_power_is_not_cut_while_the_axis_still_moves(
     bench: Bench, x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("backend.axis.CLEANUP_TIMEOUT_S", 0.4)
+    monkeypatch.setattr("backend.axis.axis.CLEANUP_TIMEOUT_S", 0.4)
 
     async def turn(_progress: Progress) -> None:
         async with x.axis.enabled(Mode.PV, ENVELOPE):
@@ -249,7 +249,7 @@ async def test_everything_that_could_not_be_restored_is_named(x: Member, servo: 
 async def test_a_cleanup_that_takes_too_long_names_what_it_leaves(
     x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("backend.axis.CLEANUP_TIMEOUT_S", 0.05)
+    monkeypatch.setattr("backend.axis.axis.CLEANUP_TIMEOUT_S", 0.05)
 
     async def work() -> None:
         async with x.axis.restoring("6081:00"):

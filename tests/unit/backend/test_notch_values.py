@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.analysis.notch import LevelCalibration, Notch
-from backend.analysis.notch_effect import fit_effect, seen_ratio
-from backend.analysis.sampling import SignalPath
-from backend.tools.notch import encode, off_raw, response
-from backend.tools.notch_meaning import NotchMeaning
+from backend.analysis.loop.notch import LevelCalibration, Notch
+from backend.analysis.loop.notch_effect import fit_effect, seen_ratio
+from backend.analysis.response.sampling import SignalPath
+from backend.tools.notch.filters import encode, off_raw, response
+from backend.tools.notch.meaning import NotchMeaning
 from drivers.errors import OutOfRange
 from profiles.loader import load_profile
 

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from backend.axis import Envelope
-from backend.bench import Bench
-from backend.jobs import Progress
-from backend.member import Member
-from backend.tools.axis_facts import read_facts
-from backend.tools.jog import Hold, JogSettings, jog
-from backend.tools.move import MoveSettings, move
-from backend.tools.sweep_plan import drive_limit_percent
+from backend.axis.axis import Envelope
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.jog.run import Hold, JogSettings, jog
+from backend.tools.moves.move import MoveSettings, move
+from backend.tools.sweep.plan import drive_limit_percent
+from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, Rejected
 from tests.support.servo import Servo

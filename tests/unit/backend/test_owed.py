@@ -11,12 +11,12 @@ from pathlib import Path
 import httpx
 import pytest
 
-from backend.axis import Envelope
-from backend.bench import Bench
-from backend.drive_identity import read_serial
-from backend.member import Member
-from backend.restoring import RestoreFailed
-from backend.tools.temporary import temporary
+from backend.axis.axis import Envelope
+from backend.axis.restoring import RestoreFailed
+from backend.drive.identity import read_serial
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.tools.measuring.temporary import temporary
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost
 from drivers.link import Found
@@ -63,7 +63,7 @@ async def test_a_line_too_slow_for_putting_back_names_what_is_left(
     x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On a dead serial line or CAN bus each try takes its time-out: none is left for the rest."""
-    monkeypatch.setattr("backend.tools.temporary.CLEANUP_TIMEOUT_S", 0.02)
+    monkeypatch.setattr("backend.tools.measuring.temporary.CLEANUP_TIMEOUT_S", 0.02)
 
     async def motion() -> None:
         async with temporary(x.axis, {SPEED: 200}):

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from backend.commands.params import app
-from backend.parameter_dcf import read_dcf, write_dcf
-from backend.parameter_list import import_list
-from backend.parameter_set import BadSet, Row, parse
+from backend.parameters.dcf import read_dcf, write_dcf
+from backend.parameters.lists import import_list
+from backend.parameters.set_file import BadSet, Row, parse
 from profiles import load_profile
 from profiles.importer import export_eds
 from profiles.schema import Profile

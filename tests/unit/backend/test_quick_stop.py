@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.axis import Envelope
-from backend.member import Member
-from backend.quick_stop import STOP_S
-from backend.tools.recording import Play, bus_limits, enabled, play
-from backend.tools.temporary import stopping_hard
+from backend.axis.axis import Envelope
+from backend.station.connected_drive import Member
+from backend.stopping.quick_stop import STOP_S
+from backend.tools.measuring.recording import Play, bus_limits, enabled, play
+from backend.tools.measuring.temporary import stopping_hard
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
-from drivers.ethercat import playback
+from drivers.motion import playback
 from tests.support.servo import Servo
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import mechanics

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from backend.regeneration import (
+from backend.functions.regeneration import (
     BrakingCycle,
     BrakingLimits,
     Resistor,

@@ -7,8 +7,8 @@ import io
 import numpy as np
 import pytest
 
-from backend.api.live_messages import ScopeChannelInfo, ScopeInfo
-from backend.api.scope_blocks import encode_block
+from backend.api.live.messages import ScopeChannelInfo, ScopeInfo
+from backend.api.live.scope_blocks import encode_block
 from backend.commands.live import Recording
 from backend.commands.options import DEFAULT_SERVER, server_for
 from backend.commands.samples import Samples, decode

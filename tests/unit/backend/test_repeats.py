@@ -11,16 +11,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.analysis.notch import Notch
-from backend.analysis.notch_effect import NotchEffect
-from backend.axis import Envelope
-from backend.drive import Drive
-from backend.jobs import Progress
-from backend.tools import go_back as go_back_tool
-from backend.tools import notch_effect, repeats, sweep_play, tune_time
-from backend.tools.computing import meanwhile
-from backend.tools.repeats import Repeats
-from backend.tools.tune_time import TimeLeft
+from backend.analysis.loop.notch import Notch
+from backend.analysis.loop.notch_effect import NotchEffect
+from backend.axis.axis import Envelope
+from backend.drive.drive import Drive
+from backend.tools.autotune import time_budget as tune_time
+from backend.tools.autotune.time_budget import TimeLeft
+from backend.tools.measuring import repeats
+from backend.tools.measuring.computing import meanwhile
+from backend.tools.measuring.repeats import Repeats
+from backend.tools.moves import go_back as go_back_tool
+from backend.tools.notch import effect as notch_effect
+from backend.tools.sweep import play as sweep_play
+from backend.work.jobs import Progress
 from drivers.errors import NotAllowed
 from profiles.loader import load_profile
 from tests.unit.backend.test_tune_time import Clock

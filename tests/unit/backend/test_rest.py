@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import pytest
 
-from backend.axis import Axis
-from backend.drive import Drive
-from backend.ports import Port
-from backend.rest import Resting
-from backend.tools.procedures import run_procedure
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from backend.drive.exclusive import Resting
+from backend.drive.ports import Port
+from backend.tools.moves.procedures import run_procedure
 from drivers.errors import DriveError
 from drivers.link import Address
 from profiles.schema import Procedure, Profile, WaitStep, WriteStep

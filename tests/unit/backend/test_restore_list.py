@@ -13,12 +13,12 @@ import pytest
 
 from backend.commands import restoring
 from backend.commands.state import STATE_FOLDER_VARIABLE, state_folder
-from backend.member import Member
-from backend.owed import Debt
+from backend.drive.pending_restore import Debt
 from backend.restore import store as store_module
 from backend.restore.identity import DriveIdentity, identity_of
 from backend.restore.process import lives, this_process
 from backend.restore.store import RestoreStore
+from backend.station.connected_drive import Member
 from drivers.errors import Busy, NotAllowed
 from tests.support.servo import Servo
 

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from backend.axis import Axis
-from backend.axis_store import AxisRecord, AxisStore
-from backend.drive import Drive
-from backend.ports import Port
+from backend.axis.axis import Axis
+from backend.axis.remembered import AxisRecord, AxisStore
+from backend.axis.units import AxisUnits, read_units
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
 from backend.scales import teaching
 from backend.scales.resolve import Told, scales_of
 from backend.scales.scale import Doubt, Origin, ScaleUnknown
 from backend.scales.taught import Taught
 from backend.scales.units_found import nearest_unit
 from backend.scales.words import apart, halt_words
-from backend.units import AxisUnits, read_units
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.halt import HaltCause, Halted
 from drivers.link import Found

@@ -7,19 +7,19 @@ import struct
 import numpy as np
 import pytest
 
-from backend.api.scope_blocks import encode_block
-from backend.drive import Drive
-from backend.scope_units import axis_scale
-from backend.units import AxisUnits
+from backend.api.live.scope_blocks import encode_block
+from backend.axis.units import AxisUnits
+from backend.drive.drive import Drive
+from backend.scope.units import axis_scale
 from drivers.link import ScopeBlock
 from profiles.loader import load_profile
 from tests.support.memory_link import MemoryLink
 
-from backend.ports import Port  # isort: skip
+from backend.drive.ports import Port  # isort: skip
 
 
 def decode(frame: bytes) -> tuple[dict[str, float], np.ndarray, np.ndarray]:
-    """Header, times and samples, after the layout in backend/api/live_messages.py."""
+    """Header, times and samples, after the layout in backend/api/live/messages.py."""
     names = [
         "magic",
         "subscription",

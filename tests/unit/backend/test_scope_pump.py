@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from fastapi import WebSocketDisconnect
 
-from backend.api.live_messages import ScopeChannel, ScopeStart
-from backend.api.live_scope import ScopeStreams, _Running
-from backend.bench import Bench
+from backend.api.live.messages import ScopeChannel, ScopeStart
+from backend.api.live.scope import ScopeStreams, _Running
 from backend.commands.samples import decode
-from backend.scope import QUEUE_BLOCKS, Subscription
+from backend.scope.hub import QUEUE_BLOCKS, Subscription
+from backend.station.bench import Bench
 
 
 def request() -> ScopeStart:
@@ -44,7 +44,7 @@ class Line:
 async def test_nothing_more_goes_to_a_line_that_broke_while_much_was_queued(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("backend.api.live_scope.FRAME_BYTES", 1)  # each block in a frame of its own
+    monkeypatch.setattr("backend.api.live.scope.FRAME_BYTES", 1)  # each block in a frame of its own
     line = Line()
     streams = ScopeStreams(cast("Bench", None), "c1", lambda _: None, line.send)
     stream = Subscription("x", ("6064:00",), 0.0)

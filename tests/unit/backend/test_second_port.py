@@ -6,10 +6,10 @@ from typing import Literal
 
 import pytest
 
-from backend.drive import Drive
-from backend.parameter_set import storable
-from backend.ports import Port
-from backend.second_port import missing_ports, require_same_drive
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
+from backend.parameters.set_file import storable
+from backend.station.second_port import missing_ports, require_same_drive
 from drivers.codec import encode
 from drivers.errors import NotAllowed
 from profiles import load_profile

@@ -8,13 +8,13 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from backend.axis import Envelope
-from backend.tools import excite
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.interrupted import Interrupted
-from backend.tools.sweep_evaluation import SweepSettings
-from backend.tools.sweep_plan import Setup, sequences_of
-from backend.tools.sweep_play import _smaller, _too_much
+from backend.axis.axis import Envelope
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.measuring import excite
+from backend.tools.measuring.interrupted import Interrupted
+from backend.tools.sweep.evaluation import SweepSettings
+from backend.tools.sweep.plan import Setup, sequences_of
+from backend.tools.sweep.play import _smaller, _too_much
 from drivers.errors import NotAllowed, motion_halted
 from drivers.halt import HaltCause, Halted, Quantity
 

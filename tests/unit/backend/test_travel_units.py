@@ -12,19 +12,24 @@ from typing import Any
 
 import pytest
 
-from backend.api import convert_motion
-from backend.api.live_messages import JogStart
-from backend.api.models_motion import GenerateRequest, HomeRequest, MoveRequest, SequenceRequest
-from backend.axis import Envelope
-from backend.axis_store import AxisRecord
-from backend.bench import Bench
-from backend.jobs import Progress
-from backend.mechanics_calc import Mechanics
-from backend.member import Member
-from backend.tools import jog as jogging
-from backend.tools import move as moving
-from backend.tools.cyclic_motion import _require_inside
-from backend.travel_units import REVOLUTIONS, TravelUnit
+from backend.api.drive import convert_motion
+from backend.api.drive.models_motion import (
+    GenerateRequest,
+    HomeRequest,
+    MoveRequest,
+    SequenceRequest,
+)
+from backend.api.live.messages import JogStart
+from backend.axis.axis import Envelope
+from backend.axis.remembered import AxisRecord
+from backend.functions.gear_calculator import Mechanics
+from backend.motion.travel_units import REVOLUTIONS, TravelUnit
+from backend.station.bench import Bench
+from backend.station.connected_drive import Member
+from backend.tools.jog import run as jogging
+from backend.tools.jog.cyclic import _require_inside
+from backend.tools.moves import move as moving
+from backend.work.jobs import Progress
 from drivers.errors import NotAllowed, OutOfRange
 from tests.support.servo import Servo, bench_with
 

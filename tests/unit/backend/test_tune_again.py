@@ -10,20 +10,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.analysis.design import Candidate
-from backend.analysis.loop_goals import Goals, goals_for
-from backend.analysis.measured_plant import MeasuredPlant
-from backend.analysis.mechanical_model import MechanicalModel
-from backend.axis import Envelope
-from backend.jobs import Progress
-from backend.tools import tune_again, tune_apply
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.excite import Room, band_for, loop_reference
-from backend.tools.tune_again import Again, Designing, Figures, contradictions
-from backend.tools.tune_apply import Applied
-from backend.tools.tune_present import Present, Trials
-from backend.tools.tune_time import TimeLeft
-from backend.tools.tune_verify import MOST_PAIRS, Check
+from backend.analysis.loop.design import Candidate
+from backend.analysis.loop.loop_goals import Goals, goals_for
+from backend.analysis.loop.measured_plant import MeasuredPlant
+from backend.analysis.mechanics.mechanical_model import MechanicalModel
+from backend.axis.axis import Envelope
+from backend.tools.autotune import again as tune_again
+from backend.tools.autotune import apply as tune_apply
+from backend.tools.autotune.again import Again, Designing, Figures, contradictions
+from backend.tools.autotune.apply import Applied
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.autotune.present import Present, Trials
+from backend.tools.autotune.time_budget import TimeLeft
+from backend.tools.autotune.verify import MOST_PAIRS, Check
+from backend.tools.measuring.excite import Room, band_for, loop_reference
+from backend.work.jobs import Progress
 from tests.unit.backend.test_tune_hum import GOALS, design
 from tests.unit.backend.test_tune_verify import loop_swept
 

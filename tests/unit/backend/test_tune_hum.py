@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from backend.analysis.design import Candidate
-from backend.analysis.loop_goals import Goals
-from backend.analysis.loop_structure import Gains, LoopFilters
-from backend.analysis.margins import Margins
-from backend.jobs import Progress
-from backend.tools import tune_apply
-from backend.tools.tune_time import TimeLeft
+from backend.analysis.loop.design import Candidate
+from backend.analysis.loop.loop_goals import Goals
+from backend.analysis.loop.loop_structure import Gains, LoopFilters
+from backend.analysis.loop.margins import Margins
+from backend.tools.autotune import apply as tune_apply
+from backend.tools.autotune.time_budget import TimeLeft
+from backend.work.jobs import Progress
 
 GOALS = Goals(9.0, 48.0, 1.8)
 #: More gain than this makes the torque hum with more than 4 % of the rated.

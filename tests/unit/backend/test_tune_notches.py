@@ -9,14 +9,14 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from backend.analysis.frf import Frf
-from backend.analysis.mechanical_model import MechanicalModel, Mode
-from backend.jobs import Progress
-from backend.tools import tune_notches
-from backend.tools.notch_meaning import NotchMeaning
-from backend.tools.sweep_evaluation import SweepResult
-from backend.tools.tune_notches import out_of_sight
-from backend.tools.tune_time import TimeLeft
+from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
+from backend.analysis.response.frf import Frf
+from backend.tools.autotune import notches as tune_notches
+from backend.tools.autotune.notches import out_of_sight
+from backend.tools.autotune.time_budget import TimeLeft
+from backend.tools.notch.meaning import NotchMeaning
+from backend.tools.sweep.evaluation import SweepResult
+from backend.work.jobs import Progress
 
 
 def measured(*modes: tuple[float, float, float]) -> SweepResult:
@@ -73,8 +73,8 @@ async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
     monkeypatch.setattr(tune_notches, "_learn_free", free)
     monkeypatch.setattr(tune_notches, "meaning_of", lambda _drive: None)
     monkeypatch.setattr(tune_notches, "remember", lambda *_: None)
-    monkeypatch.setattr("backend.tools.notch_effect.unknown", lambda _drive: True)
-    monkeypatch.setattr("backend.tools.notch_trials.least_s", lambda _drive: 11.6)
+    monkeypatch.setattr("backend.tools.notch.effect.unknown", lambda _drive: True)
+    monkeypatch.setattr("backend.tools.notch.trials.least_s", lambda _drive: 11.6)
 
     assert await said_of(loop, scheme, gravity_nm) == ""
     assert ways == [beside]
@@ -112,8 +112,8 @@ async def test_notches_are_learned_only_where_a_design_can_be_verified_after_it(
     """12 s are for the design and its verification; a free axis needs 8.1 of the 11.6 s."""
     known: list[NotchMeaning] = [] if before is None else [before]
     clock = SimpleNamespace(monotonic=lambda: 1000.0)
-    monkeypatch.setattr("backend.tools.tune_time.time", clock)
-    monkeypatch.setattr("backend.tools.repeats.time", clock)
+    monkeypatch.setattr("backend.tools.autotune.time_budget.time", clock)
+    monkeypatch.setattr("backend.tools.measuring.repeats.time", clock)
 
     async def free(*given: Any) -> NotchMeaning:
         assert given[-1].by_s == pytest.approx(1000.0 + left_s - 12.0)
@@ -122,8 +122,8 @@ async def test_notches_are_learned_only_where_a_design_can_be_verified_after_it(
     monkeypatch.setattr(tune_notches, "_learn_free", free)
     monkeypatch.setattr(tune_notches, "meaning_of", lambda _drive: known[-1] if known else None)
     monkeypatch.setattr(tune_notches, "remember", lambda _drive, meaning: known.append(meaning))
-    monkeypatch.setattr("backend.tools.notch_effect.unknown", lambda _drive: True)
-    monkeypatch.setattr("backend.tools.notch_trials.least_s", lambda _drive: 11.6)
+    monkeypatch.setattr("backend.tools.notch.effect.unknown", lambda _drive: True)
+    monkeypatch.setattr("backend.tools.notch.trials.least_s", lambda _drive: 11.6)
     left = TimeLeft.of(left_s)
     said = await said_of(time_left=left)
     assert [meaning.centre_hz for meaning in known][-1:] == (

@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
-from backend.analysis.design import Candidate
-from backend.jobs import Progress
-from backend.tools import tune_apply, tune_present
-from backend.tools.tune_apply import Applied
+from backend.analysis.loop.design import Candidate
+from backend.tools.autotune import apply as tune_apply
+from backend.tools.autotune import present as tune_present
+from backend.tools.autotune.apply import Applied
+from backend.work.jobs import Progress
 from tests.unit.backend.test_tune_hum import GOALS, design
 
 #: Raw values: of the axis as it was, and of the design.

@@ -7,19 +7,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from backend.analysis.design import Candidate
-from backend.analysis.frf import Frf
-from backend.analysis.loop_goals import Goals
-from backend.analysis.loop_structure import Gains
-from backend.analysis.margins import Margins
-from backend.axis import Envelope
-from backend.jobs import Progress
-from backend.tools import tune_verify
-from backend.tools.axis_facts import AxisFacts
-from backend.tools.step_response import LEAD_S, StepResult
-from backend.tools.sweep_evaluation import SweepResult, SweepSettings
-from backend.tools.tune_time import TimeLeft
-from backend.tools.tune_verify import (
+from backend.analysis.loop.design import Candidate
+from backend.analysis.loop.loop_goals import Goals
+from backend.analysis.loop.loop_structure import Gains
+from backend.analysis.loop.margins import Margins
+from backend.analysis.response.frf import Frf
+from backend.axis.axis import Envelope
+from backend.tools.autotune import verify as tune_verify
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.autotune.time_budget import TimeLeft
+from backend.tools.autotune.verify import (
     Check,
     Verified,
     hum,
@@ -29,6 +26,9 @@ from backend.tools.tune_verify import (
     verify,
     worse_than,
 )
+from backend.tools.step.run import LEAD_S, StepResult
+from backend.tools.sweep.evaluation import SweepResult, SweepSettings
+from backend.work.jobs import Progress
 
 PROMISED = Goals(gain_margin_db=9.0, phase_margin_deg=48.0, ms=1.8)
 

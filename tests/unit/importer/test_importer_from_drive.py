@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from importer_samples import GOOD_EDS
 
-from backend.description import dictionary_entries, profile_of_drive
+from backend.station.description import dictionary_entries, profile_of_drive
 from drivers.errors import NotAllowed, Rejected
-from drivers.ethercat.information import EntryDescription, ObjectInfo
+from drivers.ethercat.wire.information import EntryDescription, ObjectInfo
 from drivers.link import Address, Found
 from profiles.importer import ImportFailed
 

@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from drivers.ethercat.mapping import plan_station
+from drivers.ethercat.exchange.mapping import plan_station
 from drivers.link import Address, CyclicSignal
 from profiles.check import check
 from profiles.importer import ImportFailed, ImportReport, import_file

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from importer_samples import GOOD_EDS, GOOD_ESI
 
-from backend.description import BadDescription, import_in_process
+from backend.station.description import BadDescription, import_in_process
 from profiles.importer.process import DevicesTask, FileTask, Task
 from profiles.loader import ProfileError, broken_profiles, load_all, load_profile
 

@@ -19,11 +19,11 @@ from typing import BinaryIO
 import numpy as np
 import pytest
 
-from backend.files import StorageFailed
 from backend.recording import chunks
 from backend.recording import writer as recording_writer
 from backend.recording.reader import BadRecording, RecordingReader
 from backend.recording.writer import RecordingWriter
+from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed
 from drivers.link import ScopeBlock
 from tests.unit.recording.support import block, header

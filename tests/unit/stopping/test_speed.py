@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from backend.axis.units import AxisUnits
 from backend.stopping.speed import Sample, SpeedWatch
 from backend.stopping.turning import TurnKind, TurnWatch
-from backend.units import AxisUnits
 from drivers.cia402 import State
 from profiles.schema import UnitSpec
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.jobs import Progress
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepSettings
+from backend.tools.sweep.evaluation import SweepSettings
+from backend.tools.sweep.run import sweep
+from backend.work.jobs import Progress
 from benchmarks._true_loop import true_loop
 from benchmarks.rough_campaign import CLASSES, FAMILIES, Tally, case_of, lines_of, table
 from drivers.virtual.firmware.factory import make_device

@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 
 import can
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.drive import Drive
-from backend.ports import Port
-from backend.tools import profile_speed
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
+from backend.tools.sweep import profile_speed
 from drivers.canopen.frames import SYNC, Frame
 from drivers.canopen.link import CanopenLink
 from drivers.link import Trajectory

@@ -22,17 +22,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.drive import Drive
-from backend.ports import Port
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, Rejected
-from drivers.ethercat.cyclic import layout, places
-from drivers.ethercat.mapping import Pdo, plan_station
-from drivers.ethercat.motion import Motion, limits_of
-from drivers.ethercat.playback import AxisLoop
-from drivers.ethercat.setup import interpolation_period
+from drivers.ethercat.exchange.cyclic import layout, places
+from drivers.ethercat.exchange.mapping import Pdo, plan_station
+from drivers.ethercat.exchange.setup import interpolation_period
 from drivers.halt import HaltCause, Halted, LoopState
 from drivers.link import (
     Address,
@@ -45,6 +43,8 @@ from drivers.link import (
     Trajectory,
     Unsubscribe,
 )
+from drivers.motion.playback import AxisLoop
+from drivers.motion.setpoint_plan import Motion, limits_of
 from drivers.virtual.device import Device, SdoAbort
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.mechanics import MechanicsSpec
@@ -213,7 +213,7 @@ class DirectLink:
         del station
         self._access()
         if self.running and address.index == _MODE and _MODE in self._written:
-            # As `drivers.ethercat.exchange` does: else the next cycle would take it back.
+            # As `drivers.ethercat.exchange.exchange` does: else the next cycle would take it back.
             assert self._loop is not None
             mode = int.from_bytes(data, "little", signed=True)
             self._loop.outputs[self._written[_MODE]] = mode
@@ -411,7 +411,7 @@ async def direct(
     for key, raw in (settings or {}).items():
         await axis.drive.write(key, raw)
     if settings:
-        from backend.tools.temporary import make_effective
+        from backend.tools.measuring.temporary import make_effective
 
         await make_effective(axis)
     session = CyclicSession(link, [axis.drive])

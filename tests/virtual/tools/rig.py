@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from backend import parameter_set
-from backend.axis import Axis, Envelope
-from backend.cyclic import CyclicSession
-from backend.drive import Drive
-from backend.jobs import Progress
-from backend.ports import Port
+from backend.axis.axis import Axis, Envelope
+from backend.axis.cyclic import CyclicSession
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
+from backend.parameters import set_file as parameter_set
+from backend.work.jobs import Progress
 from drivers.ethercat.link import EthercatLink
 from drivers.virtual.mechanics import MechanicsSpec, analytic_response
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
@@ -128,7 +128,7 @@ async def bench(
                 for key, raw in (settings or {}).items():
                     await axis.drive.write(key, raw)
                 if settings:
-                    from backend.tools.temporary import make_effective
+                    from backend.tools.measuring.temporary import make_effective
 
                     await make_effective(axis)
                 session = CyclicSession(link, [axis.drive])

@@ -14,16 +14,16 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
-from backend.jobs import Progress
-from backend.tools.autotune import AutotuneResult, AutotuneSettings, apply_and_verify, autotune
-from backend.tools.axis_facts import read_facts
-from backend.tools.inertia import inertia
-from backend.tools.inertia_evaluation import InertiaOutcome, InertiaSettings
-from backend.tools.notch_meaning import NotchMeaning, meaning_of, remember
-from backend.tools.settling import settle
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepResult, SweepSettings, completed
-from backend.tools.tune_notches import Learning, learn_notches
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.autotune.notches import Learning, learn_notches
+from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, apply_and_verify, autotune
+from backend.tools.inertia.evaluation import InertiaOutcome, InertiaSettings
+from backend.tools.inertia.run import inertia
+from backend.tools.measuring.restore import settle
+from backend.tools.notch.meaning import NotchMeaning, meaning_of, remember
+from backend.tools.sweep.evaluation import SweepResult, SweepSettings, completed
+from backend.tools.sweep.run import sweep
+from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.link import Trajectory

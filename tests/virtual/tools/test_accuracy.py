@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import pytest
 
-from backend.evaluation import recompute
-from backend.measurements import pack, unpack
-from backend.tools.autotune import AutotuneSettings, autotune
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepSettings, as_json
-from backend.tools.temporary import put_back
+from backend.library.measurements import pack, unpack
+from backend.station.evaluation import recompute
+from backend.tools.autotune.run import AutotuneSettings, autotune
+from backend.tools.measuring.temporary import put_back
+from backend.tools.sweep.evaluation import SweepSettings, as_json
+from backend.tools.sweep.run import sweep
 from drivers.virtual.wires.netns import Namespace
 from tests.virtual.tools.rig import WIDE, bench, errors, mechanics, silent
 

@@ -16,14 +16,14 @@ from typer.testing import CliRunner
 
 from backend import cli
 from backend.api.app import make_app
-from backend.axis import Axis
-from backend.bench import Bench
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
 from backend.commands import tune
 from backend.commands.remote import Remote
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools import autotune as tool
-from backend.tools.temporary import write_settings
+from backend.station.bench import Bench
+from backend.tools.autotune import run as tool
+from backend.tools.measuring.temporary import write_settings
+from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.virtual.firmware.factory import make_device
 from profiles.loader import load_profile

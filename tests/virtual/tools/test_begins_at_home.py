@@ -11,13 +11,16 @@ from typing import Any, cast
 
 import pytest
 
-from backend.tools import autotune as tuning
-from backend.tools import excite, notch_effect, tune_notches, tune_verify
-from backend.tools.autotune import AutotuneSettings, autotune
-from backend.tools.axis_facts import read_facts
-from backend.tools.go_back import go_back
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepSettings, completed
+from backend.tools.autotune import notches as tune_notches
+from backend.tools.autotune import run as tuning
+from backend.tools.autotune import verify as tune_verify
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.autotune.run import AutotuneSettings, autotune
+from backend.tools.measuring import excite
+from backend.tools.moves.go_back import go_back
+from backend.tools.notch import effect as notch_effect
+from backend.tools.sweep.evaluation import SweepSettings, completed
+from backend.tools.sweep.run import sweep
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, motion_halted
 from drivers.halt import Halted

@@ -6,11 +6,11 @@ from datetime import UTC, datetime
 
 import pytest
 
-from backend.evaluation import recompute
-from backend.measurements import pack, unpack
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import Loop, SweepSettings, as_json
-from backend.tools.waveform import Waveform
+from backend.library.measurements import pack, unpack
+from backend.station.evaluation import recompute
+from backend.tools.measuring.waveform import Waveform
+from backend.tools.sweep.evaluation import Loop, SweepSettings, as_json
+from backend.tools.sweep.run import sweep
 from drivers.errors import OutOfRange
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent

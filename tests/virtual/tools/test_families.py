@@ -9,13 +9,13 @@ from __future__ import annotations
 import pytest
 
 from backend.commands.measure import _told
-from backend.tools.autotune import AutotuneResult, AutotuneSettings, autotune
-from backend.tools.inertia import inertia
-from backend.tools.inertia_evaluation import InertiaSettings, as_json
-from backend.tools.notch_meaning import meaning_of
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepSettings
-from backend.tools.temporary import put_back
+from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
+from backend.tools.inertia.evaluation import InertiaSettings, as_json
+from backend.tools.inertia.run import inertia
+from backend.tools.measuring.temporary import put_back
+from backend.tools.notch.meaning import meaning_of
+from backend.tools.sweep.evaluation import SweepSettings
+from backend.tools.sweep.run import sweep
 from drivers.virtual.mechanics import MechanicsSpec, PlaceSpec
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent

@@ -10,10 +10,10 @@ import contextlib
 
 import pytest
 
-from backend.restoring import RestoreFailed
-from backend.tools import profile_speed
-from backend.tools.recording import enabled
-from backend.tools.settling import settle
+from backend.axis.restoring import RestoreFailed
+from backend.tools.measuring.recording import enabled
+from backend.tools.measuring.restore import settle
+from backend.tools.sweep import profile_speed
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
 from tests.virtual.tools.direct import DirectBench, direct

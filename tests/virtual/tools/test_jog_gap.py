@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
-from backend.jobs import JobResult
-from backend.tools.cyclic_motion import jog_cyclic
-from backend.tools.hold import GAP_S, RESUME_S, Hold
-from backend.tools.jog import JogSettings
+from backend.tools.jog.cyclic import jog_cyclic
+from backend.tools.jog.hold import GAP_S, RESUME_S, Hold
+from backend.tools.jog.run import JogSettings
+from backend.work.jobs import JobResult
 from drivers.cia402 import State
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import mechanics, silent

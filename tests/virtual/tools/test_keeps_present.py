@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from backend.tools.notch_meaning import meaning_of
-from backend.tools.temporary import put_back, write_settings
-from backend.tools.tune_candidates import plan
-from backend.tools.tune_present import KEPT
+from backend.tools.autotune.candidates import plan
+from backend.tools.autotune.present import KEPT
+from backend.tools.measuring.temporary import put_back, write_settings
+from backend.tools.notch.meaning import meaning_of
 from tests.virtual.tools.rig import silent
 from tests.virtual.tools.test_wrong_situations import (
     _FOUND,

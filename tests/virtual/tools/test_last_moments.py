@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from backend.jobs import Progress
-from backend.tools.alignment import aligned
-from backend.tools.inertia import inertia
-from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.interrupted import Interrupted
-from backend.tools.step_response import StepSettings, step_response
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepSettings
+from backend.tools.inertia.evaluation import InertiaSettings
+from backend.tools.inertia.run import inertia
+from backend.tools.measuring.alignment import aligned
+from backend.tools.measuring.interrupted import Interrupted
+from backend.tools.step.run import StepSettings, step_response
+from backend.tools.sweep.evaluation import SweepSettings
+from backend.tools.sweep.run import sweep
+from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.link import Address, Trajectory
@@ -55,7 +55,7 @@ async def test_trouble_after_the_last_sample_is_told(drive: str, tool: str, trou
             return aligned(*arguments, **more)
 
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("backend.tools.recording.aligned", strike)
+            patch.setattr("backend.tools.measuring.recording.aligned", strike)
             with pytest.raises(Interrupted, match=r"emperature|Switch on disabled"):
                 await work(b, progress)
         assert struck

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.jobs import Progress
-from backend.tools import sweep as sweep_tool
-from backend.tools.axis_facts import read_facts
-from backend.tools.go_back import go_back
-from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.inertia_moves import first_look
-from backend.tools.probe import probe_axis
-from backend.tools.recording import bridged
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import Loop, SweepSettings
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.inertia.evaluation import InertiaSettings
+from backend.tools.inertia.moves import first_look
+from backend.tools.inertia.probe import probe_axis
+from backend.tools.measuring.recording import bridged
+from backend.tools.moves.go_back import go_back
+from backend.tools.sweep import run as sweep_tool
+from backend.tools.sweep.evaluation import Loop, SweepSettings
+from backend.tools.sweep.run import sweep
+from backend.work.jobs import Progress
 from drivers.link import ScopeBlock, Trajectory
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent

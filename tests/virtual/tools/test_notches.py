@@ -9,18 +9,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.analysis.loop_structure import Gains
-from backend.analysis.margins import open_from_closed
-from backend.analysis.notch import Notch
-from backend.analysis.sampling import Hold
-from backend.jobs import Progress
-from backend.tools import excite, notch, notch_effect
-from backend.tools.axis_facts import read_facts
-from backend.tools.gains import plan_gains
-from backend.tools.notch_meaning import meaning_of, remember
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepSettings, completed
-from backend.tools.temporary import write_settings
+from backend.analysis.loop.loop_structure import Gains
+from backend.analysis.loop.margins import open_from_closed
+from backend.analysis.loop.notch import Notch
+from backend.analysis.response.sampling import Hold
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.autotune.gains import plan_gains
+from backend.tools.measuring import excite
+from backend.tools.measuring.temporary import write_settings
+from backend.tools.notch import effect as notch_effect
+from backend.tools.notch import filters as notch
+from backend.tools.notch.meaning import meaning_of, remember
+from backend.tools.sweep.evaluation import SweepSettings, completed
+from backend.tools.sweep.run import sweep
+from backend.work.jobs import Progress
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, mechanics
 

@@ -12,12 +12,12 @@ from dataclasses import replace
 
 import pytest
 
-from backend.jobs import Progress
-from backend.tools import notch_in_loop
-from backend.tools.axis_facts import read_facts
-from backend.tools.notch_meaning import NotchMeaning
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepResult, SweepSettings, completed
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.notch import in_loop as notch_in_loop
+from backend.tools.notch.meaning import NotchMeaning
+from backend.tools.sweep.evaluation import SweepResult, SweepSettings, completed
+from backend.tools.sweep.run import sweep
+from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
 from drivers.virtual.mechanics import MechanicsSpec

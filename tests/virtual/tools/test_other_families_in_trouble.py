@@ -13,16 +13,16 @@ from dataclasses import dataclass
 
 import pytest
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.jobs import Progress
-from backend.tools import profile_speed
-from backend.tools.inertia import inertia
-from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.interrupted import Interrupted
-from backend.tools.settling import settle
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepSettings
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.tools.inertia.evaluation import InertiaSettings
+from backend.tools.inertia.run import inertia
+from backend.tools.measuring.interrupted import Interrupted
+from backend.tools.measuring.restore import settle
+from backend.tools.sweep import profile_speed
+from backend.tools.sweep.evaluation import SweepSettings
+from backend.tools.sweep.run import sweep
+from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.virtual.device import Device

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepSettings
+from backend.tools.sweep.evaluation import SweepSettings
+from backend.tools.sweep.run import sweep
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent
 

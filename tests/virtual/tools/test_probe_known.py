@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from backend.tools import probe, recording
-from backend.tools.axis_facts import read_facts
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.inertia import probe
+from backend.tools.measuring import recording
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, mechanics
 

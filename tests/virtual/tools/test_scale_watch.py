@@ -13,21 +13,21 @@ from typing import Any
 
 import pytest
 
-from backend.axis import Envelope
+from backend.axis.axis import Envelope
 from backend.scales import teaching
 from backend.scales.scale import Doubt, Origin, ScaleUnknown
-from backend.tools.autotune import AutotuneSettings, autotune
-from backend.tools.cyclic_motion import GeneratorSettings, generate, jog_cyclic
-from backend.tools.homing import HomingSettings, home
-from backend.tools.inertia import inertia
-from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.interrupted import Interrupted
-from backend.tools.jog import Hold, JogSettings, jog
-from backend.tools.move import MoveSettings, SequenceSettings, move, sequence
-from backend.tools.small_move import SmallMoveSettings, small_move
-from backend.tools.step_response import StepSettings, step_response
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepSettings
+from backend.tools.autotune.run import AutotuneSettings, autotune
+from backend.tools.inertia.evaluation import InertiaSettings
+from backend.tools.inertia.run import inertia
+from backend.tools.jog.cyclic import GeneratorSettings, generate, jog_cyclic
+from backend.tools.jog.run import Hold, JogSettings, jog
+from backend.tools.measuring.interrupted import Interrupted
+from backend.tools.moves.homing import HomingSettings, home
+from backend.tools.moves.move import MoveSettings, SequenceSettings, move, sequence
+from backend.tools.moves.small_move import SmallMoveSettings, small_move
+from backend.tools.step.run import StepSettings, step_response
+from backend.tools.sweep.evaluation import SweepSettings
+from backend.tools.sweep.run import sweep
 from drivers.errors import MotionHalted, NotAllowed, OutOfRange
 from drivers.halt import HaltCause
 from drivers.virtual.mechanics import MechanicsSpec

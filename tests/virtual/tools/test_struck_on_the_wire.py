@@ -7,15 +7,15 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from backend.jobs import Progress
-from backend.tools import profile_speed
-from backend.tools.axis_facts import read_facts
-from backend.tools.inertia import inertia
-from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.settling import settle
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepSettings, completed
-from backend.tools.tune_notches import Learning, learn_notches
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.autotune.notches import Learning, learn_notches
+from backend.tools.inertia.evaluation import InertiaSettings
+from backend.tools.inertia.run import inertia
+from backend.tools.measuring.restore import settle
+from backend.tools.sweep import profile_speed
+from backend.tools.sweep.evaluation import SweepSettings, completed
+from backend.tools.sweep.run import sweep
+from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.virtual.wires.netns import Namespace

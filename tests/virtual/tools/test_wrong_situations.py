@@ -15,23 +15,23 @@ from dataclasses import dataclass
 
 import pytest
 
-from backend.axis import Envelope
-from backend.jobs import Progress
-from backend.tools.autotune import (
+from backend.axis.axis import Envelope
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.autotune.run import (
     AutotuneResult,
     AutotuneSettings,
     apply_and_verify,
     autotune,
 )
-from backend.tools.axis_facts import read_facts
-from backend.tools.inertia import inertia
-from backend.tools.inertia_evaluation import InertiaSettings
-from backend.tools.notch_meaning import NotchMeaning, meaning_of, remember
-from backend.tools.settling import settle
-from backend.tools.step_response import StepSettings, step_response
-from backend.tools.sweep import sweep
-from backend.tools.sweep_evaluation import SweepSettings, completed
-from backend.tools.temporary import put_back, write_settings
+from backend.tools.inertia.evaluation import InertiaSettings
+from backend.tools.inertia.run import inertia
+from backend.tools.measuring.restore import settle
+from backend.tools.measuring.temporary import put_back, write_settings
+from backend.tools.notch.meaning import NotchMeaning, meaning_of, remember
+from backend.tools.step.run import StepSettings, step_response
+from backend.tools.sweep.evaluation import SweepSettings, completed
+from backend.tools.sweep.run import sweep
+from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.link import Address
@@ -121,7 +121,7 @@ async def test_a_torque_that_the_drive_cuts_is_told(
     async def unknown(_axis: object) -> float:
         return 400.0
 
-    monkeypatch.setattr("backend.tools.sweep_plan.drive_limit_percent", unknown)
+    monkeypatch.setattr("backend.tools.sweep.plan.drive_limit_percent", unknown)
     async with unharmed(ONE, family, settings={family.torque_limit: 100}) as b:
         with pytest.raises(DriveError, match="torque"):
             await autotune(b.axis, b.session, family.autotune(), silent())

@@ -10,12 +10,12 @@ from collections.abc import AsyncIterator
 import can
 import pytest
 
-from backend.axis import Axis
-from backend.cyclic import CyclicSession
-from backend.drive import Drive
-from backend.ports import Port
-from backend.tools.cyclic_motion import jog_cyclic
-from backend.tools.jog import Hold, JogSettings, jog
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
+from backend.tools.jog.cyclic import jog_cyclic
+from backend.tools.jog.run import Hold, JogSettings, jog
 from drivers.canopen.link import CanopenLink
 from drivers.cia402 import State
 from drivers.virtual.firmware.factory import make_device

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from drivers.ethercat.steps import Gap, Pause, Read, Step, Steps, Write
+from drivers.ethercat.wire.steps import Gap, Pause, Read, Step, Steps, Write
 
 T = TypeVar("T")
 _MOST_S = 60.0

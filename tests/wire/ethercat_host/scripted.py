@@ -6,8 +6,8 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from drivers.ethercat.mailbox import Mailbox
-from drivers.ethercat.steps import Read, Write
+from drivers.ethercat.wire.mailbox import Mailbox
+from drivers.ethercat.wire.steps import Read, Write
 from tests.wire.ethercat_host.by_hand import ByHand
 
 OUT, IN = 0x1000, 0x1100

@@ -7,10 +7,10 @@ import struct
 import pytest
 
 from drivers.errors import LinkLost, LinkTimeout, NotInUse, ProtocolError, Rejected
-from drivers.ethercat import coe as sdo
-from drivers.ethercat import information
-from drivers.ethercat.reading import read_items
-from drivers.ethercat.station import Station
+from drivers.ethercat.process.station import Station
+from drivers.ethercat.wire import coe as sdo
+from drivers.ethercat.wire import information
+from drivers.ethercat.wire.reading import read_items
 from tests.wire.ethercat_host.scripted import ScriptedSlave, coe
 
 

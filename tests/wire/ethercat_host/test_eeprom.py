@@ -7,8 +7,8 @@ import struct
 import pytest
 
 from drivers.errors import LinkLost, LinkTimeout
-from drivers.ethercat import sii
-from drivers.ethercat.steps import Read, Write
+from drivers.ethercat.wire import sii
+from drivers.ethercat.wire.steps import Read, Write
 from tests.wire.ethercat_host.by_hand import ByHand
 
 OWNER, CONTROL, ADDRESS, DATA = 0x500, 0x502, 0x504, 0x508

@@ -7,10 +7,10 @@ from typing import cast
 import pytest
 
 from drivers.errors import NotAllowed
-from drivers.ethercat.al_status import ERROR_BIT, AlState
-from drivers.ethercat.exchange import Exchange
-from drivers.ethercat.station import AL_CONTROL, AL_STATUS, Station
-from drivers.ethercat.steps import Read, Write
+from drivers.ethercat.exchange.exchange import Exchange
+from drivers.ethercat.process.station import AL_CONTROL, AL_STATUS, Station
+from drivers.ethercat.wire.al_status import ERROR_BIT, AlState
+from drivers.ethercat.wire.steps import Read, Write
 from tests.wire.ethercat_host.by_hand import ByHand
 
 WATCHDOG, NO_SYNC0, BAD_OUTPUTS = 0x001B, 0x002D, 0x001D

@@ -9,7 +9,7 @@ import struct
 import pytest
 
 from drivers.errors import Busy, DriveError, LinkTimeout, NotAllowed, Rejected
-from drivers.ethercat.foe import write_file
+from drivers.ethercat.wire.foe import write_file
 from drivers.link import Address
 from tests.wire.ethercat_host.conftest import Bus, Rig, until
 from tests.wire.ethercat_host.scripted import ScriptedSlave

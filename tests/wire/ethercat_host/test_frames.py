@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import pytest
 
-from drivers.ethercat.frames import ROOM_BYTES, Request, answers, build, bytes_of
-from drivers.ethercat.lanes import Lanes
-from drivers.ethercat.steps import Pause, Read, Steps, Write
+from drivers.ethercat.wire.frames import ROOM_BYTES, Request, answers, build, bytes_of
+from drivers.ethercat.wire.lanes import Lanes
+from drivers.ethercat.wire.steps import Pause, Read, Steps, Write
 
 ETHERNET = bytes.fromhex("ffffffffffff 010101010101 88a4")
 TWO: list[Request] = [(1, Read(0x0130, 2)), (3, Write(0x0120, b"\x04\x00"))]

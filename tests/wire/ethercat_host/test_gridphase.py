@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from drivers.ethercat.gridphase import GridPhase
+from drivers.ethercat.exchange.gridphase import GridPhase
 
 CYCLE = 250_000
 OFFSET = 77_000  # of the reference clock's cycles against ours

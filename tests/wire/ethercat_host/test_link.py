@@ -14,9 +14,9 @@ import time
 import pytest
 
 from drivers.errors import Busy, DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
-from drivers.ethercat.al_status import AlState
-from drivers.ethercat.information import EntryDescription
 from drivers.ethercat.link import EthercatLink
+from drivers.ethercat.wire.al_status import AlState
+from drivers.ethercat.wire.information import EntryDescription
 from drivers.link import Address
 from drivers.virtual.wires.netns import Namespace, child_environment
 from tests.support.machine import OwnTime
@@ -339,7 +339,7 @@ def test_hazards_of_pysoem_are_guarded(namespace: Namespace, rig: Rig) -> None:
         """
         import os, socket
         from drivers.errors import DriveError
-        from drivers.ethercat.segment import IO_MAP_BYTES, Segment
+        from drivers.ethercat.process.segment import IO_MAP_BYTES, Segment
 
         def refused(call):
             try:

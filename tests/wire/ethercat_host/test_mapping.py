@@ -11,10 +11,10 @@ import pysoem
 import pytest
 
 from drivers.errors import NotAllowed, ProtocolError
-from drivers.ethercat.mapping import plan_station
-from drivers.ethercat.operations import Operations
-from drivers.ethercat.ring import Ring
-from drivers.ethercat.segment import Segment
+from drivers.ethercat.exchange.mapping import plan_station
+from drivers.ethercat.exchange.ring import Ring
+from drivers.ethercat.process.operations import Operations
+from drivers.ethercat.process.segment import Segment
 from drivers.link import Address, CyclicSignal
 from drivers.virtual.wires.netns import Namespace, child_environment
 from profiles.schema import DataType, PdoSpec, Profile
@@ -169,7 +169,7 @@ def test_a_search_takes_away_what_an_earlier_mapping_left_in_the_slaves(
     script = textwrap.dedent(
         """
         import time
-        from drivers.ethercat.segment import Segment
+        from drivers.ethercat.process.segment import Segment
 
         segment = Segment("ec0m")
         segment.frame_timeout_us = 1_000_000

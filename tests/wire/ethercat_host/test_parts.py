@@ -14,17 +14,18 @@ import pytest
 
 from drivers import errors, scheduling
 from drivers.errors import DriveError, LinkLost, Rejected
-from drivers.ethercat import esc, permissions, protocol, sii
-from drivers.ethercat.al_status import AlState, al_status_text, state_name
-from drivers.ethercat.cyclic import percentile_us
-from drivers.ethercat.frames import Request
-from drivers.ethercat.lanes import Lanes
-from drivers.ethercat.mailbox import Mailbox
-from drivers.ethercat.ring import RING_BYTES, SLOT, VALID, Ring
-from drivers.ethercat.samples import contiguous
-from drivers.ethercat.setup import interpolation_period
-from drivers.ethercat.station import Station, _to_preop, change_state
-from drivers.ethercat.steps import Pause, Read, Step, Steps, Write
+from drivers.ethercat.exchange.cyclic import percentile_us
+from drivers.ethercat.exchange.ring import RING_BYTES, SLOT, VALID, Ring
+from drivers.ethercat.exchange.samples import contiguous
+from drivers.ethercat.exchange.setup import interpolation_period
+from drivers.ethercat.process import permissions, protocol
+from drivers.ethercat.process.station import Station, _to_preop, change_state
+from drivers.ethercat.wire import esc, sii
+from drivers.ethercat.wire.al_status import AlState, al_status_text, state_name
+from drivers.ethercat.wire.frames import Request
+from drivers.ethercat.wire.lanes import Lanes
+from drivers.ethercat.wire.mailbox import Mailbox
+from drivers.ethercat.wire.steps import Pause, Read, Step, Steps, Write
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import pytest
 
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
-from drivers.ethercat.motion import Limits, Motion, Phase
-from drivers.ethercat.playback import STOP_S, AxisLoop
 from drivers.halt import HaltCause, Halted
+from drivers.motion.playback import STOP_S, AxisLoop
+from drivers.motion.setpoint_plan import Limits, Motion, Phase
 
 IN = {0x6041: 0, 0x6064: 1, 0x606C: 2, 0x6077: 3, 0x6061: 4}
 OUT = {0x6040: 0, 0x607A: 1, 0x60FF: 2, 0x6071: 3, 0x60B2: 4, 0x6060: 5}

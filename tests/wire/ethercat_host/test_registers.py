@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 import pytest
 
 from drivers.errors import LinkLost
-from drivers.ethercat.registers import read_again
-from drivers.ethercat.station import Station, identify
-from drivers.ethercat.steps import Pause, Read, Write
+from drivers.ethercat.process.station import Station, identify
+from drivers.ethercat.wire.registers import read_again
+from drivers.ethercat.wire.steps import Pause, Read, Write
 from tests.wire.ethercat_host.by_hand import ByHand
 from tests.wire.ethercat_host.plain_slaves import Servo
 

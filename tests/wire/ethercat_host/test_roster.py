@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from drivers.errors import LinkLost
-from drivers.ethercat import roster as watched
-from drivers.ethercat.al_status import ERROR_BIT, AlState
-from drivers.ethercat.roster import Roster
-from drivers.ethercat.steps import Pause, Read, Steps, Write
+from drivers.ethercat.process import roster as watched
+from drivers.ethercat.process.roster import Roster
+from drivers.ethercat.wire.al_status import ERROR_BIT, AlState
+from drivers.ethercat.wire.steps import Pause, Read, Steps, Write
 
 #: Sync managers 0 and 1 with mailboxes of 128 bytes at 1000h and 1080h (ETG.1000.4 table 58).
 MANAGERS = bytes.fromhex("0010 8000 26 00 01 00 8010 8000 22 00 01 00")

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.errors import LinkTimeout, NotAsked
 from drivers.ethercat.link import EthercatLink
-from drivers.ethercat.protocol import Message, error_to_wire
+from drivers.ethercat.process.protocol import Message, error_to_wire
 from drivers.link import Address
 
 

@@ -11,12 +11,12 @@ import pytest
 
 from drivers import cia402
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
-from drivers.ethercat import coe
-from drivers.ethercat.frames import Request
-from drivers.ethercat.lanes import GRACE_S, Lanes, Urgency
-from drivers.ethercat.reading import read_items
-from drivers.ethercat.station import Station
-from drivers.ethercat.steps import Read, Write
+from drivers.ethercat.process.station import Station
+from drivers.ethercat.wire import coe
+from drivers.ethercat.wire.frames import Request
+from drivers.ethercat.wire.lanes import GRACE_S, Lanes, Urgency
+from drivers.ethercat.wire.reading import read_items
+from drivers.ethercat.wire.steps import Read, Write
 from drivers.link import Address
 from tests.support.machine import OwnTime
 from tests.wire.ethercat_host.conftest import Rig, until

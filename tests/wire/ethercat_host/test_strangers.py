@@ -15,12 +15,12 @@ import pytest
 
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, NotAllowed, Rejected
-from drivers.ethercat.information import EntryDescription, ObjectInfo
+from drivers.ethercat.exchange.mapping import Entry, Pdo
+from drivers.ethercat.exchange.setup import FoundInPart, StationSetup, check_places
 from drivers.ethercat.link import EthercatLink
-from drivers.ethercat.mapping import Entry, Pdo
-from drivers.ethercat.setup import FoundInPart, StationSetup, check_places
-from drivers.ethercat.station import Station, identify
-from drivers.ethercat.steps import Read, Steps, Write
+from drivers.ethercat.process.station import Station, identify
+from drivers.ethercat.wire.information import EntryDescription, ObjectInfo
+from drivers.ethercat.wire.steps import Read, Steps, Write
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
 from drivers.virtual.wires.netns import Namespace
 from profiles.schema import PdoSet, PdoSpec, Profile

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import pytest
 
 from drivers.errors import LinkLost
-from drivers.ethercat.mapping import Pdo
-from drivers.ethercat.setup import StationSetup, start_sync0
-from drivers.ethercat.station import Station
-from drivers.ethercat.steps import Read, Step, Write
+from drivers.ethercat.exchange.mapping import Pdo
+from drivers.ethercat.exchange.setup import StationSetup, start_sync0
+from drivers.ethercat.process.station import Station
+from drivers.ethercat.wire.steps import Read, Step, Write
 
 CYCLE_NS = 250_000
 SETUP = StationSetup(Pdo(0x1600, (), True), Pdo(0x1A00, (), True), CYCLE_NS, True, 50.0)

@@ -1,4 +1,4 @@
-/** Scope blocks as the server sends them (layout: backend/api/live_messages.py). */
+/** Scope blocks as the server sends them (layout: backend/api/live/messages.py). */
 export interface ScopeBlock {
   subscription: number
   /** Sequence and dropped samples are of one stream of the subscription. */

@@ -1,4 +1,4 @@
-/** The websocket's messages, both ways (backend/api/live_messages.py). */
+/** The websocket's messages, both ways (backend/api/live/messages.py). */
 import type {
   Chat,
   ChatLine,

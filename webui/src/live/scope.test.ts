@@ -8,7 +8,7 @@ import { ScopeStore } from './scope-store'
 import { hasBit, Trigger, type TriggerSettings } from './trigger'
 import type { ScopeConfig, ScopeTrigger, ScopeView } from './worker-messages'
 
-/** A frame by hand, byte by byte, after the layout in backend/api/live_messages.py. */
+/** A frame by hand, byte by byte, after the layout in backend/api/live/messages.py. */
 function frame(options: {
   subscription?: number
   stream?: number
