@@ -1,8 +1,8 @@
 """Every route and message that changes something leaves its line in the audit: who, what, values.
 
 Routes tell it in one of two ways (see `backend.api.audit.audited`): where it happens, which is
-asked of each of them here with a real request, or by the wrapper around all routes, which is asked with
-every route that there is.
+asked of each of them here with a real request, or by the wrapper around all routes, which is
+asked with every route that there is.
 """
 
 from __future__ import annotations
