@@ -20,6 +20,7 @@ from backend.analysis.reported import (
     commanded,
     current_doubt,
     mean_cycles,
+    path_doubt,
     slow_doubt,
 )
 from backend.analysis.resonance import Resonance
@@ -174,9 +175,14 @@ def evaluate(
         found = replace(found, direct=direct, corrected=corrected)
         warnings += (_COMMANDED,)
     corner = path.current_bandwidth_hz
-    if corner is not None and _slow(corner, facts):
+    slow = corner is not None and _slow(corner, facts)
+    # Where the torque was dropped it is another one, and an ordinary path explains the motion.
+    if slow or (found.torque_unexplained and not found.torque_dropped):
         lines = found.direct.frequency_hz
-        doubt = slow_doubt(lines, corner)
+        doubt = path_doubt(lines) if corner is None else slow_doubt(lines, corner)
+        doubt = np.hypot(doubt.real, path_doubt(lines).real) + 1j * np.hypot(
+            doubt.imag, path_doubt(lines).imag
+        )
         direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
         found = replace(found, direct=direct, corrected=corrected)
         warnings += (_SLOW,)
