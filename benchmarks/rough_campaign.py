@@ -75,7 +75,8 @@ def case_of(number: int) -> Case:
     """The axis of this number; classes and families come in turn."""
     rng = np.random.default_rng(7919 * number + 13)
     kind = list(CLASSES)[number % len(CLASSES)]
-    drive = FAMILIES[(number // len(CLASSES) + number) % len(FAMILIES)]
+    turn, place = divmod(number, len(CLASSES))
+    drive = FAMILIES[(turn + place) % len(FAMILIES)]
     options: dict[str, Any] = {}
     for name, given in CLASSES[kind].items():
         options[name] = float(rng.uniform(*given)) if isinstance(given, tuple) else given

@@ -121,6 +121,8 @@ class Identification:
     """How exactly each mode of the model is known; empty where no model is trusted."""
     torque_dropped: bool = False
     """Whether the reported torque cannot be the mechanics' input, and was not used as such."""
+    torque_unexplained: bool = False
+    """Whether hold, delay and one lag do not explain the reported torque."""
 
 
 def identify_mechanics(
@@ -188,7 +190,12 @@ def identify_with_path(
     found, doubt = task.with_sure_modes(found, doubt, corner_known)
     alike = [t for t in trials[1:] if _rank(t) < _rank(best) + _UNDECIDED]
     made = _undecided(_identification(task, found, doubt), best, alike)
-    return replace(made, torque_dropped=dropped)
+    unexplained_torque = (
+        not closed
+        and all(record.torque is not None for record in records)
+        and torque_left(settled(records), made.fit.path) > _TORQUE_LEFT
+    )
+    return replace(made, torque_dropped=dropped, torque_unexplained=unexplained_torque)
 
 
 def _by_motion(

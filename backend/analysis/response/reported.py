@@ -21,6 +21,8 @@ from backend.analysis.signals.line_spectra import Record, good_periods, period_s
 _MOST_CYCLES, _SAME = 16, 0.01
 #: A torque that follows its command faster than this is the command; current loops are slower.
 _COMMANDED_HZ, _USUAL_HZ = 3500.0, 1000.0
+#: A lag that is not told is not slower, and what is left of its delay, one deviation.
+_SLOWEST_HZ, _LATE_S = 250.0, 60e-6
 
 
 def mean_cycles(records: tuple[Record, ...]) -> int | None:
@@ -74,6 +76,16 @@ def slow_doubt(frequency_hz: FloatArray, corner_hz: float) -> ComplexArray:
         frequency_hz, 1.0 / max(own_s - usual_s, 1e-6)
     )
     return np.asarray(np.log(two / lag_response(frequency_hz, corner_hz)))
+
+
+def path_doubt(frequency_hz: FloatArray) -> ComplexArray:
+    """Logarithm of what a path may take that neither the drive nor its torque explains.
+
+    One lag more as slow as current loops hardly are, the delay of which is found to `_LATE_S`.
+    """
+    f = np.asarray(frequency_hz, dtype=np.float64)
+    form = _without_delay(f, np.log(lag_response(f, _SLOWEST_HZ)))
+    return np.asarray(form.real + 1j * np.hypot(form.imag, 2 * np.pi * f * _LATE_S))
 
 
 def charged(frf: Frf, lines_hz: FloatArray, doubt: ComplexArray) -> Frf:

@@ -20,6 +20,7 @@ from backend.analysis.response.reported import (
     commanded,
     current_doubt,
     mean_cycles,
+    path_doubt,
     slow_doubt,
 )
 from backend.analysis.response.sampling import (
@@ -27,6 +28,7 @@ from backend.analysis.response.sampling import (
     STEP_LEAD_S,
     Hold,
     SignalPath,
+    lag_response,
     sampled_command,
 )
 from backend.analysis.signals import excitation as signals
@@ -53,6 +55,11 @@ _SLOW = (
 )
 #: A current loop is not slower than this, nor than this share of what the drive tells.
 _SLOW_HZ, _SLOWER = 450.0, 0.7
+_SLOW_OR_FILTERED = (
+    "beside a closed loop a torque that follows slowly and a 6077h that is filtered look alike: no "
+    "model is made, and nothing is designed from one; measure without a loop, or look for filters "
+    "of the torque and of its reading in the drive"
+)
 _DROPPED = (
     "the drive reports another torque (6077h) than the one that moves the axis, such as a filtered "
     "one or a copy of the demand: it was not used, and the path to the axis was found from the "
@@ -180,12 +187,24 @@ def evaluate(
         found = replace(found, direct=direct, corrected=corrected)
         warnings += (_COMMANDED,)
     corner = path.current_bandwidth_hz
-    if corner is not None and _slow(corner, facts):
+    slow = corner is not None and _slow(corner, facts)
+    # Where the torque was dropped it is another one, and an ordinary path explains the motion.
+    if slow or (found.torque_unexplained and not found.torque_dropped):
         lines = found.direct.frequency_hz
-        doubt = slow_doubt(lines, corner)
+        doubt = path_doubt(lines) if corner is None else slow_doubt(lines, corner)
+        doubt = np.hypot(doubt.real, path_doubt(lines).real) + 1j * np.hypot(
+            doubt.imag, path_doubt(lines).imag
+        )
         direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
         found = replace(found, direct=direct, corrected=corrected)
         warnings += (_SLOW,)
+    if slow and quantity == "torque_injection" and facts.torque_filter_hz is None:
+        # Beside a loop the motion alone does not tell which of the two it is.
+        lines = found.direct.frequency_hz
+        doubt = np.log(lag_response(lines, corner))
+        direct = charged(found.direct, lines, doubt)
+        found = replace(found, direct=direct, corrected=direct, trusted=False)
+        warnings += (_SLOW_OR_FILTERED,)
     if by_speed:
         lines = found.direct.frequency_hz
         late = 2j * np.pi * lines * _BY_REFERENCE_S

@@ -320,6 +320,10 @@ export const saidOfTuning = {
     'the drive reports another torque (6077h) than the one that moves the axis, such as a filtered one or a copy of the demand: it was not used, and the path to the axis was found from the motion alone',
     '驱动器报告的转矩（6077h）不是驱动轴的转矩，例如经过滤波或为指令的副本：未使用该转矩，仅由运动求得到轴的通路',
   ],
+  'said.tSlowOrFiltered': [
+    'beside a closed loop a torque that follows slowly and a 6077h that is filtered look alike: no model is made, and nothing is designed from one; measure without a loop, or look for filters of the torque and of its reading in the drive',
+    '在闭环下，转矩响应慢与 6077h 经过滤波无法区分：不建立模型，也不据此设计；请在无回路时测量，或检查驱动器中转矩及其读数的滤波器',
+  ],
   'said.tSlow': [
     'the torque follows its command more slowly than a current loop: a low-pass of the torque is set in the drive (torque filter), which limits every loop. What the response owes to its form is charged to the band',
     '转矩跟随指令比电流环慢：驱动器中设置了转矩低通（转矩滤波器），它限制所有回路。其形式的影响已计入误差带',
