@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from drivers.canopen.pdo import INVALID, PdoPlan, SdoWrite, set_up
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
-from drivers.ethercat.exchange.setup import interpolation_period
+from drivers.motion.interpolation import interpolation_period
 
 WATCHDOG_MS = 200
 _PDO_FLAGS = 0x60000000

@@ -20,6 +20,7 @@ from drivers.ethercat.wire import coe
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.lanes import Done, LaneName, Lanes
 from drivers.ethercat.wire.steps import Steps
+from drivers.motion.interpolation import interpolation_period
 from drivers.motion.playback import AxisLoop
 
 CYCLE_NS = (250_000, 10_000_000)
@@ -76,7 +77,7 @@ class Preparation:
                 limit="250 µs to 10 ms",
                 remedy="choose a cycle within the limit",
             )
-        setup_.interpolation_period(cycle_ns)
+        interpolation_period(cycle_ns)
         self._stations = stations
         self._cycle_ns = cycle_ns
         self._dc = bool(message["dc"]) and all(s.distributed_clock for s in stations)

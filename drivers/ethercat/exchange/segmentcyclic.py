@@ -17,12 +17,12 @@ from drivers.ethercat.exchange.mapping import Pdo, StationPlan, plan_station
 from drivers.ethercat.exchange.recovery import Recovery
 from drivers.ethercat.exchange.ring import VALID, RingReader, lost_flag
 from drivers.ethercat.exchange.samples import contiguous, fields_of
+from drivers.ethercat.exchange.trajectory import message_of
 from drivers.ethercat.process.hostprocess import HostProcess
 from drivers.ethercat.process.protocol import Message
 from drivers.halt import Halted, LoopState
 from drivers.link import CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
 from drivers.motion.setpoint_plan import Phase
-from drivers.motion.trajectory import message_of
 from profiles.schema import Profile
 
 _ANSWER_S, _CONFIGURE_S, _START_S, _STOP_S = 5.0, 60.0, 25.0, 15.0

@@ -17,6 +17,7 @@ from drivers.ethercat.wire import coe, sii
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.registers import TRIES, read_again
 from drivers.ethercat.wire.steps import Read, Steps, Write
+from drivers.motion.interpolation import interpolation_period
 
 FMMU, SYNC_MANAGERS = 0x600, 0x800
 _FMMU_COUNT = 0x004
@@ -146,18 +147,6 @@ def _has_them_anyway(station: Station, assign: int, pdo: Pdo) -> Steps[bool]:
         return False
     words = yield from _read_list(station, pdo.index, 4)
     return words == list(pdo.mapping_words)
-
-
-def interpolation_period(cycle_ns: int) -> tuple[int, int]:
-    """Value and power of ten for 60C2h (CiA 402-2 clause 12.5): value × 10^exponent seconds."""
-    for exponent in (-3, -4, -5, -6):
-        unit_ns = 10 ** (9 + exponent)
-        if cycle_ns % unit_ns == 0 and cycle_ns // unit_ns <= 255:
-            return cycle_ns // unit_ns, exponent
-    raise NotAllowed(
-        f"a cycle of {cycle_ns / 1000:g} µs cannot be told to the drive",
-        remedy="choose another cycle, such as 1 ms",
-    )
 
 
 def reads_whole(station: Station) -> Steps[bool]:

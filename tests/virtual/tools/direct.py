@@ -30,7 +30,6 @@ from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat.exchange.cyclic import layout, places
 from drivers.ethercat.exchange.mapping import Pdo, plan_station
-from drivers.ethercat.exchange.setup import interpolation_period
 from drivers.halt import HaltCause, Halted, LoopState
 from drivers.link import (
     Address,
@@ -43,6 +42,7 @@ from drivers.link import (
     Trajectory,
     Unsubscribe,
 )
+from drivers.motion.interpolation import interpolation_period
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Motion, limits_of
 from drivers.virtual.device import Device, SdoAbort

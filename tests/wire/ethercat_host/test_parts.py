@@ -17,7 +17,6 @@ from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat.exchange.cyclic import percentile_us
 from drivers.ethercat.exchange.ring import RING_BYTES, SLOT, VALID, Ring
 from drivers.ethercat.exchange.samples import contiguous
-from drivers.ethercat.exchange.setup import interpolation_period
 from drivers.ethercat.process import permissions, protocol
 from drivers.ethercat.process.station import Station, _to_preop, change_state
 from drivers.ethercat.wire import esc, sii
@@ -26,6 +25,7 @@ from drivers.ethercat.wire.frames import Request
 from drivers.ethercat.wire.lanes import Lanes
 from drivers.ethercat.wire.mailbox import Mailbox
 from drivers.ethercat.wire.steps import Pause, Read, Step, Steps, Write
+from drivers.motion.interpolation import interpolation_period
 
 
 @pytest.fixture

@@ -1,0 +1,17 @@
+"""The interpolation period as drives take it, for every bus with a cycle."""
+
+from __future__ import annotations
+
+from drivers.errors import NotAllowed
+
+
+def interpolation_period(cycle_ns: int) -> tuple[int, int]:
+    """Value and power of ten for 60C2h (CiA 402-2 clause 12.5): value × 10^exponent seconds."""
+    for exponent in (-3, -4, -5, -6):
+        unit_ns = 10 ** (9 + exponent)
+        if cycle_ns % unit_ns == 0 and cycle_ns // unit_ns <= 255:
+            return cycle_ns // unit_ns, exponent
+    raise NotAllowed(
+        f"a cycle of {cycle_ns / 1000:g} µs cannot be told to the drive",
+        remedy="choose another cycle, such as 1 ms",
+    )
