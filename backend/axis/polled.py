@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from backend.axis.scaled import ScaledAxis
-from backend.axis.units import AxisUnits
+from backend.scales.units import AxisUnits
 from backend.scales.words import halt_remedy, halt_words
 from drivers.errors import motion_halted
 from drivers.motion.guard import SpeedGuard

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from backend.functions.gear_calculator import Mechanics
+from backend.scales.gear_calculator import Mechanics
 from backend.scales.taught import Taught
 from backend.store.files import write_atomically
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from backend.axis.power import PowerState
-from backend.axis.units import AxisUnits, read_units
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.scales.taught import Taught
+from backend.scales.units import AxisUnits, read_units
 from profiles.schema import Raw
 
 

@@ -14,9 +14,9 @@ from backend.commands import local_functions, remote_functions
 from backend.commands.function_answers import Faults, Gear, Terminal, of_plan
 from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
 from backend.commands.session import run, told
-from backend.functions.gear_calculator import Mechanics, plan_gear
 from backend.functions.regeneration import BrakingCycle, BrakingLimits, Resistor
 from backend.functions.regeneration import braking as braking_of
+from backend.scales.gear_calculator import Mechanics, plan_gear
 from drivers.errors import OutOfRange
 from profiles import load_profile
 

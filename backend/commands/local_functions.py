@@ -11,7 +11,7 @@ from backend.commands.session import drive_at
 from backend.drive.faults import read_active_faults
 from backend.drive.terminals import read_terminals
 from backend.functions import gear as gears
-from backend.functions.gear_calculator import Mechanics
+from backend.scales.gear_calculator import Mechanics
 
 
 async def terminals(place: Place) -> list[Terminal]:

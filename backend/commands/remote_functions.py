@@ -7,7 +7,7 @@ from backend.api.drive.models_functions import FaultHistoryInfo, GearPlanInfo, G
 from backend.commands.function_answers import Faults, Gear, Past, Terminal
 from backend.commands.options import Place
 from backend.commands.remote_params import remote_drive
-from backend.functions.gear_calculator import Mechanics
+from backend.scales.gear_calculator import Mechanics
 
 
 async def terminals(place: Place) -> list[Terminal]:

@@ -13,6 +13,7 @@ import typer
 from pydantic import ValidationError
 
 from backend.api.drive.models_scales import ScalesInfo
+from backend.axis import teaching
 from backend.axis.axis import Axis
 from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
 from backend.commands.remote_params import remote_drive
@@ -20,7 +21,6 @@ from backend.commands.session import drive_at, progress, run, run_in_order
 from backend.commands.state import state_folder
 from backend.drive.drive import Drive
 from backend.drive.identity import read_serial
-from backend.scales import teaching
 from backend.scales.scale import Scale, what_to_do
 from backend.scales.taught import Taught
 from backend.store.files import write_atomically

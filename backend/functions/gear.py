@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from backend.axis.axis import Axis
 from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
-from backend.axis.units import encoder_counts
-from backend.functions.gear_calculator import GearPlan, GearValue, Mechanics, plan_gear
+from backend.scales.gear_calculator import GearPlan, GearValue, Mechanics, plan_gear
+from backend.scales.units import encoder_counts
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed, Rejected
 from profiles.schema import Raw

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from backend.motion.travel_units import TravelUnit
+from backend.scales.travel_units import TravelUnit
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from backend.functions.gear_calculator import Mechanics
+from backend.scales.gear_calculator import Mechanics
 from drivers.errors import NotAllowed
 
 if TYPE_CHECKING:
-    from backend.axis.units import AxisUnits
+    from backend.scales.units import AxisUnits
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backend.axis.units import AxisUnits
+from backend.scales.units import AxisUnits
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
 from drivers.motion.feedback import Disagreement, disagreement
 

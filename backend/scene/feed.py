@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from backend.axis.units import AxisUnits
 from backend.drive.drive import Drive
-from backend.functions.gear_calculator import Mechanics
+from backend.scales.gear_calculator import Mechanics
+from backend.scales.units import AxisUnits
 from backend.scene.geometry import Track, Travel, track_of, travel_of
 from backend.scope.hub import Subscription
 from backend.station.bench import Bench

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import viser
 
-from backend.functions.gear_calculator import Mechanics
+from backend.scales.gear_calculator import Mechanics
 from backend.scene.geometry import HALF_TRACK, Track, Travel, turn
 
 #: Distance of two axes; the page's camera knows it too (webui/src/pages/scene/SceneFrame.tsx).

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from backend.axis.units import AxisUnits
 from backend.drive.drive import Drive
+from backend.scales.units import AxisUnits
 from profiles.schema import Parameter
 
 #: Roles whose numbers are of the kind although their parameter may print another unit.

@@ -12,10 +12,10 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from backend.axis.axis import Axis
-from backend.axis.units import AxisUnits
 from backend.drive.faults import active_faults, fault_keys, integer
 from backend.drive.readings import Reading
 from backend.people.identity import by_itself
+from backend.scales.units import AxisUnits
 from backend.stopping.turning import Turning, TurnWatch, told
 from backend.work.journal import Journal, Level
 from drivers import cia402

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from backend.axis.units import AxisUnits
 from backend.drive.drive import Drive
 from backend.drive.optional import existing
+from backend.scales.units import AxisUnits
 from backend.stopping.settings import COAST, OPTION, braking_option
 from profiles.schema import Parameter, Raw
 

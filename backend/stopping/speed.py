@@ -9,8 +9,8 @@ from collections import deque
 from dataclasses import dataclass
 
 from backend.axis.axis import Axis
-from backend.axis.units import AxisUnits
 from backend.drive.faults import integer
+from backend.scales.units import AxisUnits
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout
 

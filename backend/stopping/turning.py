@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
-from backend.axis.units import AxisUnits
+from backend.scales.units import AxisUnits
 from drivers.cia402 import State
 
 #: Slower is noise, or a shaft that is held and trembles.

@@ -10,7 +10,7 @@ from backend.api.drive.models_motion import (
 )
 from backend.api.live.messages import JogStart
 from backend.axis.axis import Envelope
-from backend.motion.travel_units import REVOLUTIONS, TravelUnit, travel_unit
+from backend.scales.travel_units import REVOLUTIONS, TravelUnit, travel_unit
 from backend.station.bench import Bench
 from backend.station.connected_drive import Member
 from backend.tools.jog.cyclic import GeneratorSettings

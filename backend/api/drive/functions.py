@@ -29,12 +29,12 @@ from backend.audit.asked import note_before
 from backend.axis.axis import Envelope
 from backend.axis.fault_history import PastFault, history_of, read_history
 from backend.axis.remembered import AxisRecord, AxisStore
-from backend.axis.units import gentlest_ramp_rpm_s
 from backend.drive.catalog import functions_of
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.functions import gear, regeneration
-from backend.functions.gear_calculator import GearPlan, Mechanics
+from backend.scales.gear_calculator import GearPlan, Mechanics
+from backend.scales.units import gentlest_ramp_rpm_s
 from backend.station.connected_drive import Member
 from backend.tools.moves import identification
 from drivers.errors import DriveError

@@ -16,11 +16,11 @@ from backend.api.drive.models_scales import (
 )
 from backend.api.models import JobInfo
 from backend.audit.asked import note_before
+from backend.axis import teaching
 from backend.axis.restoring import shielded
-from backend.axis.units import AxisUnits
-from backend.scales import teaching
 from backend.scales.scale import Scale, what_to_do
 from backend.scales.taught import Taught
+from backend.scales.units import AxisUnits
 from backend.station.bench import Bench
 from backend.station.connected_drive import Member
 from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for

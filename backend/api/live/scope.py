@@ -18,7 +18,7 @@ from pydantic import BaseModel
 from backend.api.errors import problem_of
 from backend.api.live.messages import ScopeChannelInfo, ScopeInfo, ScopeStart, ScopeStop
 from backend.api.live.scope_blocks import encode_block
-from backend.axis.units import AxisUnits
+from backend.scales.units import AxisUnits
 from backend.scope.hub import Subscription
 from backend.scope.units import axis_scale
 from backend.station.bench import Bench

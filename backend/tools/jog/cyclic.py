@@ -20,9 +20,9 @@ from backend.axis import loop
 from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
 from backend.axis.cyclic_mode import keeping_mode
-from backend.axis.units import AxisUnits
 from backend.drive.drive import Drive
 from backend.drive.ports import address_of
+from backend.scales.units import AxisUnits
 from backend.scales.words import halt_remedy, halt_words
 from backend.tools.jog.hold import Hold
 from backend.tools.jog.run import JogSettings, require_scale

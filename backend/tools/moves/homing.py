@@ -7,9 +7,9 @@ import time
 from dataclasses import dataclass
 
 from backend.axis.axis import Axis, Envelope
-from backend.axis.units import ramp_raw
+from backend.axis.polled import PolledGuard
 from backend.drive.readings import Reading
-from backend.scales.polled import PolledGuard
+from backend.scales.units import ramp_raw
 from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State

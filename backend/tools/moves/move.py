@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from backend.axis.axis import Axis, Envelope
-from backend.axis.units import AxisUnits, ramp_raw
+from backend.axis.polled import PolledGuard
 from backend.drive.optional import ramp_keys
-from backend.scales.polled import PolledGuard
+from backend.scales.units import AxisUnits, ramp_raw
 from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State

@@ -15,7 +15,6 @@ from backend.api.live.live import LiveHub
 from backend.api.security.socket import OpenSockets
 from backend.axis.cyclic import CyclicState
 from backend.functions.gear import write_gear
-from backend.functions.gear_calculator import GearValue
 from backend.people.elapsed import elapsed_s, moment_of
 from backend.people.identity import LOCAL, Actor, acting
 from backend.people.lease import Leases
@@ -24,6 +23,7 @@ from backend.people.station import People
 from backend.people.support import Support
 from backend.restore.identity import identity_of
 from backend.restore.store import RestoreStore
+from backend.scales.gear_calculator import GearValue
 from backend.station.bench import Bench
 from backend.station.connected_drive import Member
 from backend.station.measuring import Exchange, exchange_for

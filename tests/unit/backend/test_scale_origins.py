@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
+from backend.axis import teaching
 from backend.axis.axis import Axis
 from backend.axis.remembered import AxisRecord, AxisStore
-from backend.axis.units import AxisUnits, read_units
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
-from backend.scales import teaching
 from backend.scales.resolve import Told, scales_of
 from backend.scales.scale import Doubt, Origin, ScaleUnknown
 from backend.scales.taught import Taught
+from backend.scales.units import AxisUnits, read_units
 from backend.scales.units_found import nearest_unit
 from backend.scales.words import apart, halt_words
 from drivers.errors import NotAllowed, OutOfRange

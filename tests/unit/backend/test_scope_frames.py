@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from backend.api.live.scope_blocks import encode_block
-from backend.axis.units import AxisUnits
 from backend.drive.drive import Drive
+from backend.scales.units import AxisUnits
 from backend.scope.units import axis_scale
 from drivers.link import ScopeBlock
 from profiles.loader import load_profile

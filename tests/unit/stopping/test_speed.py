@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from backend.axis.units import AxisUnits
+from backend.scales.units import AxisUnits
 from backend.stopping.speed import Sample, SpeedWatch
 from backend.stopping.turning import TurnKind, TurnWatch
 from drivers.cia402 import State

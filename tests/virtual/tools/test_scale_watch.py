@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
+from backend.axis import teaching
 from backend.axis.axis import Envelope
-from backend.scales import teaching
 from backend.scales.scale import Doubt, Origin, ScaleUnknown
 from backend.tools.autotune.run import AutotuneSettings, autotune
 from backend.tools.inertia.evaluation import InertiaSettings
