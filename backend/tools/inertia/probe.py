@@ -18,7 +18,15 @@ from backend.axis.cyclic import CyclicSession
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.interrupted import Interrupted, require_enabled
-from backend.tools.measuring.recording import Play, Recording, bus_limits, cycle_s, enabled, play
+from backend.tools.measuring.recording import (
+    Play,
+    Recording,
+    bus_limits,
+    cycle_s,
+    dwell,
+    enabled,
+    play,
+)
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
 
@@ -137,7 +145,8 @@ async def probe_axis(
             if moved < _STOOD * enough and not waited:
                 # A brake that opens late must not let go of an axis under ever more torque.
                 waited = True
-                await asyncio.sleep(_BRAKE_S)
+                # The last setpoint, no torque, is renewed: unrenewed it would expire and disable.
+                await dwell(axis, session, _BRAKE_S)
                 continue
             # Doubling brings a free axis to the wanted speed without ever jumping past it.
             peak = min(2.0 * peak, highest)

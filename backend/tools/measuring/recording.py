@@ -232,6 +232,19 @@ async def _forgotten(axis: Axis, session: CyclicSession) -> None:
         await asyncio.sleep(_RENEW_S / 2)
 
 
+async def dwell(axis: Axis, session: CyclicSession, seconds: float) -> None:
+    """Hold the last setpoint of a sequence for this time [s], on an axis that stays enabled.
+
+    Raises:
+        Interrupted: the loop ended the motion meanwhile.
+    """
+    station, end = session.station(axis.drive), time.monotonic() + seconds
+    while time.monotonic() < end:
+        raise_if_ended(axis, session)
+        await session.cyclic.renew(station)
+        await asyncio.sleep(_RENEW_S)
+
+
 async def bus_limits(axis: Axis, envelope: Envelope, start_raw: int) -> bus.Envelope:
     """An envelope around a starting point in raw units."""
     units = await axis.units()
