@@ -8232,6 +8232,22 @@ export interface components {
             turned_rev: number;
         };
         /**
+         * TurningInfo
+         * @description An axis that turns although nobody may move it.
+         */
+        TurningInfo: {
+            /**
+             * Kind
+             * @description without power: by hand or by gravity, or the drive's own jog; or enabled
+             * @enum {string}
+             */
+            kind: "disabled" | "without_grant";
+            /** Speed */
+            speed: number;
+            /** Unit */
+            unit: string;
+        };
+        /**
          * Undo
          * @description Raw values that were there before; writing them back undoes the change.
          *
@@ -8600,6 +8616,7 @@ export type TokenInfo = components['schemas']['TokenInfo'];
 export type TouchProbe = components['schemas']['TouchProbe'];
 export type TransitionRequest = components['schemas']['TransitionRequest'];
 export type TurnedUpdate = components['schemas']['TurnedUpdate'];
+export type TurningInfo = components['schemas']['TurningInfo'];
 export type Undo = components['schemas']['Undo'];
 export type ValuesChanged = components['schemas']['ValuesChanged'];
 export type VersionInfo = components['schemas']['VersionInfo'];
