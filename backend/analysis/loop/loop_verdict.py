@@ -31,7 +31,15 @@ _UNSEEN, _UNSEEN_S = 0.17, 200e-6
 _FEW = 6
 
 Coverage = Literal["measured", "gain_steps", "predicted"]
-Missing = Literal["phase_margin", "gain_margin", "peak_sensitivity", "stability", "coverage"]
+Missing = Literal[
+    "phase_margin", "gain_margin", "peak_sensitivity", "stability", "coverage", "contradiction"
+]
+#: What a figure that misses is: the stated value, or the worst end of the interval of one band.
+End = Literal["stated", "measured", "predicted"]
+#: The worst end of an interval is no more than this below a promise: degrees, dB, and that many dB
+#: as a factor of the sensitivity.
+WORST_DEG, WORST_DB = 5.0, 1.0
+_WORST_RATIO = 10 ** (WORST_DB / 20.0)
 
 
 @dataclass(frozen=True)
@@ -60,11 +68,12 @@ class BandVerdict:
 
 @dataclass(frozen=True)
 class Missed:
-    """One figure that is worse than asked for."""
+    """One figure that is worse than asked for; ``end`` tells which one of its interval."""
 
     what: Missing
     value: float
     limit: float
+    end: End = "stated"
 
 
 @dataclass(frozen=True)
@@ -76,6 +85,8 @@ class LoopVerdict:
     ``shown_gain_db``; or they are predicted, which keeps no design. ``stated`` are the worst
     figures of both bands, ``worst`` the ends of their intervals; None where no crossing is known.
     ``delay_s`` and ``gain_db`` are what the measured lines add to the prediction.
+    ``contradicted``: the loop was stable with a raised gain with which none of the possible ones
+    is, so that nothing is known beyond the band.
     """
 
     measured: BandVerdict | None
@@ -88,15 +99,19 @@ class LoopVerdict:
     stable: bool
     delay_s: Interval
     gain_db: Interval
+    contradicted: bool = False
 
     def missed(
         self, promised: Goals, margin_deg: float, margin_db: float, ms_ratio: float
     ) -> tuple[Missed, ...]:
         """What is worse than promised, less what a margin may be off by; empty where all is kept.
 
-        The stated figures must reach the promise, the ends of their intervals twice as far below.
+        The stated figures must reach the promise but for that. The worst ends of the intervals, of
+        each band, must not be more than `WORST_DEG` or `WORST_DB` below it.
         """
         found = []
+        if self.contradicted:
+            found.append(Missed("contradiction", self.shown_gain_db or 0.0, 0.0))
         if not self.stable:
             found.append(Missed("stability", 0.0, 1.0))
         if self.coverage == "predicted":
@@ -111,7 +126,25 @@ class LoopVerdict:
                 found.append(Missed(what, value, limit))
         if self.stated.ms > promised.ms * ms_ratio:
             found.append(Missed("peak_sensitivity", self.stated.ms, promised.ms))
-        return tuple(found)
+        told = {each.what for each in found}
+        ends = (*_short(self.measured, "measured", promised),
+                *_short(self.predicted, "predicted", promised))  # fmt: skip
+        return (*found, *(each for each in ends if each.what not in told))
+
+
+def _short(band: BandVerdict | None, end: End, promised: Goals) -> list[Missed]:
+    """The worst ends of a band's intervals that are too far below a promise."""
+    if band is None:
+        return []
+    found = []
+    phase, gain, peak = band.phase_margin_deg, band.gain_margin_db, band.peak_sensitivity
+    if phase is not None and phase.low < promised.phase_margin_deg - WORST_DEG:
+        found.append(Missed("phase_margin", phase.low, promised.phase_margin_deg, end))
+    if gain is not None and gain.low < promised.gain_margin_db - WORST_DB:
+        found.append(Missed("gain_margin", gain.low, promised.gain_margin_db, end))
+    if peak is not None and peak.high > promised.ms * _WORST_RATIO:
+        found.append(Missed("peak_sensitivity", peak.high, promised.ms, end))
+    return found
 
 
 @dataclass(frozen=True)
@@ -147,11 +180,13 @@ def judge(
     # What is measured makes a prediction worse where it is, and never better beyond it.
     delay = Interval(max(delay.value, 0.0), max(delay.low, 0.0), max(delay.high, _LATE_S))
     possible = _moved(frequency_hz, loops, gain, delay)
+    contradicted = False
     if shown_gain_db is not None:
         more = possible * 10 ** (shown_gain_db / 20.0)
         left = possible[np.asarray(stable(more))]
-        # Where nothing in the set explains what was seen, the set is wrong: it says nothing less.
-        possible = left if left.size else possible
+        # Where nothing in the set explains what was seen, the set is wrong, and tells nothing.
+        contradicted = not left.size
+        possible = possible if contradicted else left
     over = np.abs(possible) > 1.0
     crossing = np.flatnonzero(np.any(over[:, 1:] != over[:, :-1], axis=0))
     last = float(frequency_hz[crossing[-1] + 1]) if crossing.size else 0.0
@@ -163,7 +198,7 @@ def judge(
     stated, worst = _worst(measured, beyond)
     return LoopVerdict(
         measured, beyond, last, coverage, shown_gain_db, stated, worst, sound,
-        delay, _in_db(gain),
+        delay, _in_db(gain), contradicted,
     )  # fmt: skip
 
 
@@ -192,7 +227,7 @@ def _measured(lines: Lines) -> BandVerdict:
         value = float(np.degrees(abs(turn[0] * (1 - share) + turn[1] * share)))
         off = _CI95 * float(np.degrees(max(steep[i], steep[i + 1])))
         margins.append(Interval(value, value - off, value + off))
-    phase = min(margins, key=lambda m: m.value, default=None)
+    phase = _least(margins)
     gains = []
     flips = (loop.imag[1:] > 0) != (loop.imag[:-1] > 0)
     for i in np.flatnonzero(flips & (loop.real[1:] < 0) & (loop.real[:-1] < 0)):
@@ -202,8 +237,17 @@ def _measured(lines: Lines) -> BandVerdict:
             value = float(-20.0 * np.log10(level))
             off = _CI95 * 20.0 / np.log(10.0) * float(max(steep[i], steep[i + 1]))
             gains.append(Interval(value, value - off, value + off))
-    gain = min(gains, key=lambda m: m.value, default=None)
+    gain = _least(gains)
     return BandVerdict(float(f[0]), float(f[-1]), phase, gain, peak)
+
+
+def _least(margins: list[Interval]) -> Interval | None:
+    """The smallest of several margins: another one than the smallest value may have its low end."""
+    if not margins:
+        return None
+    return Interval(
+        min(m.value for m in margins), min(m.low for m in margins), min(m.high for m in margins)
+    )
 
 
 def _share(before: float, after: float) -> float:

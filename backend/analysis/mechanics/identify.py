@@ -16,6 +16,7 @@ import numpy as np
 
 from backend.analysis.loop.loop_fit import fit_loop
 from backend.analysis.mechanics.fit_problem import KnownInertia
+from backend.analysis.mechanics.inertia_by_place import InertiaByPlace, inertia_by_place
 from backend.analysis.mechanics.mode_uncertainty import ModeDoubt, mode_doubts
 from backend.analysis.mechanics.model_fit import Solution, fit_sampled_model, views_of
 from backend.analysis.mechanics.reversals import with_balanced_reversals
@@ -80,8 +81,9 @@ _AVERAGED = 0.5
 #: by no more than two deviations or this at once.
 _STEP, _SETTLED, _LONGEST_STEP = 0.02, 0.2, 0.1
 #: A path by the motion alone is taken where the criterion is better by so much and the misfit is
-#: smaller than this share (fitted to the torques of `benchmarks.rough_campaign`: filtered or copied
-#: ones leave 1.5 to 10 times the misfit, right ones 0.95 to 1.1 times).
+#: smaller than this share: chosen by hand on a few axes of `benchmarks.rough_campaign`, where
+#: filtered or copied torques left about 1.4 to 10 times the misfit. Those that leave less than 1.3
+#: times are not noticed by this; what right ones leave was not tabulated.
 _BY_MOTION, _CLEARLY = 60.0, 0.77
 _MOTION_PASSES = 3
 #: A median misfit (relative) that a path by the motion leaves where it is right.
@@ -123,6 +125,8 @@ class Identification:
     """Whether the reported torque cannot be the mechanics' input, and was not used as such."""
     torque_unexplained: bool = False
     """Whether hold, delay and one lag do not explain the reported torque."""
+    by_place: InertiaByPlace | None = None
+    """The inertia's part that goes with the place; the band holds the response of all places."""
 
 
 def identify_mechanics(
@@ -473,25 +477,38 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
     """The estimates with what the fit found taken out."""
     views, path, fit = trial.views, trial.path, trial.fit
     spoilt = distortion(task.records, path, task.quantity, views.velocity)
+    by_place = inertia_by_place(
+        task.records, fit.path, task.quantity, views.velocity.coulomb_nm
+    )  # fmt: skip
+
+    def everywhere(frf: Frf) -> Frf:
+        return frf if by_place is None else by_place.charged(frf)
+
     if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
         # A filter of the speed that nobody tells would stay in the lines; the position has none.
         if views.position is not None and path.response_bandwidth_hz is None:
             plain = unexplained(views.position, trial.solution, 1)
         else:
             plain = unexplained(views.velocity, trial.solution, 0)
-        return Identification(plain, plain, fit, False, spoilt)
+        plain = everywhere(plain)
+        return Identification(plain, plain, fit, False, spoilt, by_place=by_place)
     parts = ways_of(views.velocity, views.position, path, fit, doubt)
     # Images stay in the direct estimate: its band must contain them.
     direct = [widened(p.lines, p.factor, 1.0, p.direct) for p in parts]
     corrected = [without_images(p.lines, p.factor, task.jitter_s, p.corrected) for p in parts]
     # Play changes stiffness, and so everything above the frequency where it shows most.
     share = np.maximum.accumulate(spoilt.share) if spoilt.play else _AVERAGED * spoilt.share
-    best, lines = (distorted(pooled(parts), share) for parts in (corrected, direct))
+    best, lines = (everywhere(distorted(pooled(parts), share)) for parts in (corrected, direct))
     if spoilt.play:
         lines = lines.cut(lines.valid_band_hz[1])
-        return Identification(lines, lines, fit, False, spoilt)
+        return Identification(lines, lines, fit, False, spoilt, by_place=by_place)
     best = ended_where_unknown(best)
-    return Identification(lines, best, fit, True, spoilt, _mode_doubts(trial, doubt))
+    moved = None if by_place is None else by_place.share(best)
+    doubts = tuple(
+        each.with_band(mode, best.frequency_hz, spoilt.share, moved)
+        for mode, each in zip(fit.model.modes, _mode_doubts(trial, doubt), strict=True)
+    )
+    return Identification(lines, best, fit, True, spoilt, doubts, by_place=by_place)
 
 
 def _hidden_by_friction(trial: _Trial) -> bool:

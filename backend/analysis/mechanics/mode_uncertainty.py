@@ -14,11 +14,12 @@ where it is not known to half of itself it begins at zero.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from backend.analysis.mechanics.fit_problem import Problem, robust_rows
+from backend.analysis.mechanics.mechanical_model import Mode
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: What path and interpolation leave of frequency and damping however long one measures, and of
@@ -38,6 +39,27 @@ class ModeDoubt:
     frequency: float
     damping: float
     residue: float
+
+    def with_band(
+        self, mode: Mode, frequency_hz: FloatArray, distortion: FloatArray,
+        by_place: FloatArray | None,
+    ) -> ModeDoubt:  # fmt: skip
+        """Wider by what the model leaves open: ``distortion`` and ``by_place`` [lines] of the band.
+
+        A line's phase beside a mode turns by 1/damping of a relative change of its frequency. An
+        inertia moves a frequency by half of what it moves the lines above it, as its root.
+        """
+        phase = float(np.interp(mode.frequency_hz, frequency_hz, distortion))
+        above = frequency_hz > mode.frequency_hz
+        place = 0.0
+        if by_place is not None and np.any(above):
+            place = float(np.median(by_place[above]))
+        frequency = (self.frequency, mode.damping * phase, 0.5 * place)
+        damping = (self.damping, phase, place)
+        return replace(
+            self, frequency=float(np.linalg.norm(frequency)),
+            damping=float(np.linalg.norm(damping)),
+        )  # fmt: skip
 
     def damping_interval(self, damping: float, deviations: float) -> tuple[float, float]:
         """Within so many deviations of a damping ratio."""

@@ -105,7 +105,12 @@ def in_words(missed: tuple[Missed, ...]) -> list[str]:
     """What a verdict misses, for people."""
     words = []
     for each in missed:
-        if each.what == "stability":
+        if each.what == "contradiction":
+            words.append(
+                f"stable with {each.value:.1f} dB more gain, with which no loop is that the "
+                "measurements allow: nothing is known above the measured band"
+            )
+        elif each.what == "stability":
             words.append("not stable for everything that the axis may be")
         elif each.what == "coverage":
             words.append(
@@ -114,8 +119,10 @@ def in_words(missed: tuple[Missed, ...]) -> list[str]:
             )
         else:
             name, unit, digits = _UNITS[each.what]
+            worst = "" if each.end == "stated" else f" at worst ({each.end})"
             words.append(
-                f"{name} {each.value:.{digits}f}{unit} instead of {each.limit:.{digits}f}{unit}"
+                f"{name} {each.value:.{digits}f}{unit}{worst} instead of "
+                f"{each.limit:.{digits}f}{unit}"
             )
     return words
 

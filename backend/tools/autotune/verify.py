@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from backend.analysis.loop.design import Candidate
 from backend.analysis.loop.loop_goals import Goals
-from backend.analysis.loop.loop_verdict import LoopVerdict
+from backend.analysis.loop.loop_verdict import WORST_DB, LoopVerdict, Missed
 from backend.analysis.loop.margins import bandwidth, open_from_closed
 from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.response.frf import Frf
@@ -31,6 +31,7 @@ from backend.tools.autotune.verdict import (
     WITHIN,
     in_words,
     misses,
+    sharp_lines,
     verdict_of,
 )
 from backend.tools.inertia.probe import holding_torque
@@ -147,7 +148,10 @@ async def verify(
     looks = LOOKS - bool(check.pairs_before) if read else 0
     pairs = clock.pairs(time.monotonic() - begun_s, MOST_PAIRS, looks)
     missed = worse_than(promised, read)
-    unsure = not read or not _as_predicted(candidate.bandwidth_hz, _width_of(read), _DOUBTED)
+    verdict = _verdict(axis, check, candidate, swept, None)
+    blurred = any(each.end == "measured" for each in _misses(verdict, promised))
+    as_predicted = _as_predicted(candidate.bandwidth_hz, _width_of(read), _DOUBTED)
+    unsure = not read or blurred or not as_predicted
     every: Frf | None = None
     if unsure and pairs > 1 and not missed:
         settings = replace(settings, realisations=pairs)
@@ -155,14 +159,15 @@ async def verify(
             more = await sweep_tool.sweep(axis, session, settings, measuring, keep, again)
         every = more.frf
         missed = worse_than(promised, sharp_margins(more))
+        if blurred and sharp_lines(more.frf) is not None:
+            verdict = _verdict(axis, check, candidate, more, None)
         swept, read = _joined(swept, read, more)
     if again.left_out:
         clock.give_up(NOT_AGAIN)
     measured = _width_of(read)
-    verdict = _verdict(axis, check, candidate, swept, None)
-    beyond = () if verdict is None else misses(verdict, promised)
-    covered = all(each.what != "coverage" for each in beyond)
-    missed = missed or in_words(tuple(each for each in beyond if each.what != "coverage"))
+    beyond = _misses(verdict, promised)
+    open_above = tuple(each for each in beyond if _by_raised_gain(each))
+    missed = missed or in_words(tuple(each for each in beyond if each not in open_above))
     why = _named(candidate, "; ".join(missed))
     shown: GainSteps | None = None
     step: step_tool.StepResult | None = None
@@ -178,8 +183,8 @@ async def verify(
         words = [hum(step), restless_why]
         why = _named(candidate, "; ".join(word for word in words if word))
         only_hums = bool(words[0]) and not restless_why
-        if not why and not covered:
-            wanted_db = min(promised.gain_margin_db - _NOT_SHOWN_DB, _MOST_SHOWN_DB)
+        if not why and open_above:
+            wanted_db = _wanted_db(open_above, promised)
             shown = await gain_steps(axis, session, settings_of_step, step, wanted_db, stepping)
             verdict = _verdict(axis, check, candidate, swept, shown.shown_db)
             why = _named(candidate, "; ".join(_not_shown(verdict, promised, shown, wanted_db)))
@@ -200,6 +205,22 @@ def _verdict(
     return verdict_of(
         axis, check.facts, check.plant, candidate, swept.frf, check.hold, shown_db
     )  # fmt: skip
+
+
+def _misses(verdict: LoopVerdict | None, promised: Goals) -> tuple[Missed, ...]:
+    return () if verdict is None else misses(verdict, promised)
+
+
+def _by_raised_gain(missed: Missed) -> bool:
+    """Whether a raised gain can still show it: what is possible above the measured band."""
+    return missed.what == "coverage" or missed.end == "predicted"
+
+
+def _wanted_db(missed: tuple[Missed, ...], promised: Goals) -> float:
+    """How much more gain is tried: all of the promise but its tolerance where that is in doubt."""
+    if any(each.what != "coverage" for each in missed):
+        return promised.gain_margin_db - WORST_DB
+    return min(promised.gain_margin_db - _NOT_SHOWN_DB, _MOST_SHOWN_DB)
 
 
 def _not_shown(

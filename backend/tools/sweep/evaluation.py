@@ -331,6 +331,12 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
         )
     if found.torque_dropped:
         words.append(_DROPPED)
+    if found.by_place is not None:
+        about = f", about ±{found.by_place.amplitude_kgm2:.2g} kg·m²" if facts.torque_known else ""
+        words.append(
+            f"the inertia or the torque depends on the place (once per revolution of the motor"
+            f"{about}), as with a crank, a cam or a load off its axis: the band holds every place"
+        )
     if saturated > 0.02:
         words.append(
             f"the torque was at its limit, or not what was commanded, for {saturated:.0%} of the "

@@ -79,6 +79,47 @@ def test_a_delay_that_lines_show_counts_beyond_them() -> None:
     assert "phase_margin" in [m.what for m in found.missed(PROMISED, 1.0, 1.0, 1.03)]
 
 
+def test_the_worst_end_of_an_interval_counts_as_well() -> None:
+    """90° - 360° x 60 Hz x 1.85 ms = 50.0°, known to +-1.96 x 4°/|S|: 3° below 48° is allowed."""
+    promised = Goals(4.0, 48.0, 2.5)
+    sharp = verdict_of(60.0, 1.85e-3, 400.0, deviation=0.01)
+    assert not sharp.missed(promised, 1.0, 1.0, 1.03)
+    blurred = verdict_of(60.0, 1.85e-3, 400.0, deviation=0.1)
+    found = [(m.what, m.end) for m in blurred.missed(promised, 1.0, 1.0, 1.03)]
+    assert ("phase_margin", "measured") in found
+
+
+def test_a_worst_gain_margin_below_the_promise_keeps_no_design() -> None:
+    """A set that holds a loop of 6.8 dB beside the nominal 10 dB; 8 dB were promised."""
+    crossover_hz, promised = 60.0, Goals(8.0, 30.0, 2.5)
+
+    def delay_for(gain_db: float) -> float:
+        return float(1 / (4 * crossover_hz * 10 ** (gain_db / 20)))
+
+    f = np.linspace(5.0, 100.0, 100)
+    loop = loop_of(f, crossover_hz, delay_for(10.0))
+    lines = Lines(f, loop / (1 + loop), np.full(f.size, 0.01))
+    every = np.stack([loop_of(DENSE, crossover_hz, delay_for(db)) for db in (10.0, 6.8)])
+    known = {"late_s": (0.0, 1e-6), "size": (0.0, 1e-3)}
+    found = judge(lines, DENSE, every, every[0], **known)
+    assert found.coverage == "measured"
+    assert found.worst.gain_margin_db < 6.8
+    missed = found.missed(promised, 1.0, 1.0, 1.03)
+    assert ("gain_margin", "predicted") in [(m.what, m.end) for m in missed]
+    # Stable with 7.2 dB more: the loop of 6.8 dB is none of those that are left.
+    shown = judge(lines, DENSE, every, every[0], shown_gain_db=7.2, **known)
+    assert not shown.missed(promised, 1.0, 1.0, 1.03)
+
+
+def test_a_raised_gain_that_contradicts_all_that_is_possible_keeps_no_design() -> None:
+    """A delay of 0.35 ms leaves 3.6 dB at 474 Hz: stable with 6 dB more it is another loop."""
+    found = verdict_of(474.0, 0.35e-3, 246.0, shown_db=6.0)
+    assert found.contradicted
+    low = Goals(1.0, 10.0, 6.0)
+    assert [m.what for m in found.missed(low, 1.0, 1.0, 1.03)] == ["contradiction"]
+    assert not verdict_of(474.0, 0.1e-3, 246.0, shown_db=6.0).contradicted
+
+
 def test_peak_sensitivity_over_all_frequencies_is_never_below_one() -> None:
     """Bode's integral: what is seen of |S| within a band may be below 1, the loop's peak is not."""
     found = verdict_of(474.0, 0.1e-3, 100.0, shown_db=6.0)

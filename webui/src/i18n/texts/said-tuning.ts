@@ -332,6 +332,42 @@ export const saidOfTuning = {
     'the torque hums with {rms} % of the rated while it stands',
     '静止时转矩有 {rms} % 额定值的波动',
   ],
+  'said.tMsWorstMeasured': [
+    'sensitivity {ms} at worst (measured) instead of {promised}',
+    '灵敏度最差 {ms}（实测），应为 {promised}',
+  ],
+  'said.tPmWorstMeasured': [
+    'phase margin {pm}° at worst (measured) instead of {promised}°',
+    '相位裕度最差 {pm}°（实测），应为 {promised}°',
+  ],
+  'said.tGmWorstMeasured': [
+    'gain margin {gm} dB at worst (measured) instead of {promised} dB',
+    '增益裕度最差 {gm} dB（实测），应为 {promised} dB',
+  ],
+  'said.tMsWorstPredicted': [
+    'sensitivity {ms} at worst (predicted) instead of {promised}',
+    '灵敏度最差 {ms}（预测），应为 {promised}',
+  ],
+  'said.tPmWorstPredicted': [
+    'phase margin {pm}° at worst (predicted) instead of {promised}°',
+    '相位裕度最差 {pm}°（预测），应为 {promised}°',
+  ],
+  'said.tGmWorstPredicted': [
+    'gain margin {gm} dB at worst (predicted) instead of {promised} dB',
+    '增益裕度最差 {gm} dB（预测），应为 {promised} dB',
+  ],
+  'said.tContradicted': [
+    'stable with {gain} dB more gain, with which no loop is that the measurements allow: nothing is known above the measured band',
+    '增益提高 {gain} dB 时仍稳定，而测量所允许的回路均不稳定：所测频带以上一无所知',
+  ],
+  'said.tByPlace': [
+    'the inertia or the torque depends on the place (once per revolution of the motor, about ±{kgm2} kg·m²), as with a crank, a cam or a load off its axis: the band holds every place',
+    '惯量或转矩随位置变化（电机每转一次，约 ±{kgm2} kg·m²），如曲柄、凸轮或偏心负载：误差带涵盖所有位置',
+  ],
+  'said.tByPlaceUnknown': [
+    'the inertia or the torque depends on the place (once per revolution of the motor), as with a crank, a cam or a load off its axis: the band holds every place',
+    '惯量或转矩随位置变化（电机每转一次），如曲柄、凸轮或偏心负载：误差带涵盖所有位置',
+  ],
   'said.tMs': ['sensitivity {ms} instead of {promised}', '灵敏度 {ms}，应为 {promised}'],
   'said.tPm': ['phase margin {pm}° instead of {promised}°', '相位裕度 {pm}°，应为 {promised}°'],
   'said.tGm': [
