@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from backend.motion.envelope import Envelope
 from backend.motion.grant import Grant, NotGranted
-from backend.people.identity import acting_person
+from backend.people.identity import acting_person, acting_session
 from drivers.errors import Busy
 
 #: No motion is permitted for longer than this without being asked for anew.
@@ -24,7 +24,8 @@ LONGEST_S = 4 * 3600.0
 #: An axis that was left enabled through no page loses its power after this time.
 UNATTENDED_S = 600.0
 
-#: Called with the reason when the time of a grant is over before the work that holds it ends.
+#: Called with the reason when a grant ends before the work that holds it: its time is over, or
+#: whoever asked for it may move nothing any more.
 Ended = Callable[[str], None]
 
 _held: ContextVar[tuple[Grant, ...]] = ContextVar("grants", default=())
@@ -156,7 +157,10 @@ class MotionAuthority:
         for record in list(self._records.get(drive, ())):
             if record.grant.standing:
                 self.end(record.grant)
-        grant = Grant(drive, acting_person(), purpose, time.monotonic() + lasts_s, standing=True)
+        until = time.monotonic() + lasts_s
+        grant = Grant(
+            drive, acting_person(), purpose, until, standing=True, session=acting_session()
+        )
         self._add(_Record(grant, ended))
         return grant
 
@@ -181,10 +185,21 @@ class MotionAuthority:
             record.why = record.why or why
         self._changed(drive)
 
-    def _expire(self, record: _Record) -> None:
+    def end_of(self, session: str, why: str) -> None:
+        """All grants asked for by this session, token or invitation end now, on every axis.
+
+        Their holders are told, as when the time of a grant is over: each brings its axis to rest.
+        """
+        if not session:
+            return  # the one user of a station without accounts, or the program itself
+        for record in [each for kept in self._records.values() for each in kept]:
+            if record.grant.session == session:
+                self._expire(record, why)
+
+    def _expire(self, record: _Record, why: str = "its time is over") -> None:
         if record.why:
             return
-        record.why = "its time is over"
+        record.why = why
         self._changed(record.grant.drive)
         if record.ended is not None:
             record.ended(record.why)
@@ -218,7 +233,9 @@ class MotionAuthority:
         until = time.monotonic() + lasts_s
         if outer is not None:
             until = min(until, outer.until)
-        grant = Grant(drive, acting_person(), purpose, until, envelope, keys)
+        grant = Grant(
+            drive, acting_person(), purpose, until, envelope, keys, session=acting_session()
+        )
         self._add(_Record(grant, ended))
         return grant
 

@@ -20,6 +20,7 @@ class Grant:
     that holds it, the page, the control lease. ``envelope`` is None where none is known yet, or
     where nothing is moved (enabling, a procedure). ``keys`` limits it to these objects; None is
     the whole axis. ``standing``: the axis was left enabled by a person; it bounds no other grant.
+    ``session`` names the log-in, token or invitation by which the person asked; it ends with that.
     """
 
     drive: str
@@ -29,6 +30,7 @@ class Grant:
     envelope: Envelope | None = None
     keys: frozenset[str] | None = None
     standing: bool = False
+    session: str = ""
 
     def covers(self, key: str) -> bool:
         """Whether this object may be written with it."""

@@ -38,7 +38,11 @@ def utc_now() -> datetime:
 
 
 class Accounts:
-    """The people of a station. ``ended`` is called with the id of every session that ends."""
+    """The people of a station.
+
+    ``ended`` is called with the id of every session and token that ends, ``lowered`` with the id
+    of each whose account may move nothing any more.
+    """
 
     def __init__(
         self,
@@ -46,9 +50,10 @@ class Accounts:
         passwords: Passwords,
         now: Callable[[], datetime] = utc_now,
         ended: Callable[[str], None] = lambda _session: None,
+        lowered: Callable[[str], None] = lambda _session: None,
     ) -> None:
         self._store, self._passwords, self._now = store, passwords, now
-        self.directory = Directory(now, ended)
+        self.directory = Directory(now, ended, lowered)
         self._changing = asyncio.Lock()
         self._turns = HashTurns()
         self._budgets = LoginBudgets()

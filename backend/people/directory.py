@@ -13,17 +13,26 @@ from backend.people.credentials import digest, name_key
 from backend.people.errors import NoSuchPerson
 from backend.people.identity import Identity
 from backend.people.records import REMEMBERED, Account, LoginSession, Records, Token
-from backend.people.rights import RIGHTS, Role
+from backend.people.rights import MOVING, RIGHTS, Role
 from drivers.errors import NotAllowed
 
 _WRITE_USE = timedelta(minutes=1)
 
 
 class Directory:
-    """Of one station. ``ended`` is called with the id of every session that ends."""
+    """Of one station.
 
-    def __init__(self, now: Callable[[], datetime], ended: Callable[[str], None]) -> None:
-        self._now, self._ended = now, ended
+    ``ended`` is called with the id of every session and token that ends, ``lowered`` with the id
+    of each whose account may move nothing any more.
+    """
+
+    def __init__(
+        self,
+        now: Callable[[], datetime],
+        ended: Callable[[str], None],
+        lowered: Callable[[str], None] = lambda _session: None,
+    ) -> None:
+        self._now, self._ended, self._lowered = now, ended, lowered
         self._accounts: dict[int, Account] = {}
         self._sessions: dict[str, LoginSession] = {}
         self._written: dict[str, datetime] = {}
@@ -149,7 +158,13 @@ class Directory:
 
     def put(self, account: Account) -> None:
         """An account that is new or has changed."""
+        before = self._accounts.get(account.id)
         self._accounts[account.id] = account
+        lost = frozenset() if before is None else RIGHTS[before.role] - RIGHTS[account.role]
+        if lost & MOVING:
+            known = [session.id for session in self.sessions(account.id)]
+            for each in (*known, *(token.id for token in self.tokens(account.id))):
+                self._lowered(each)
 
     def begin(self, session: LoginSession) -> None:
         """A log-in that is written down."""
@@ -206,7 +221,8 @@ class Directory:
         for each in gone:
             self.forget(each)
         self._dead &= kept.sessions.keys() | kept.tokens.keys()
-        self._accounts = kept.accounts
+        for changed in kept.accounts.values():
+            self.put(changed)
         self._tokens = {k: t for k, t in kept.tokens.items() if k not in self._dead}
         for key, session in kept.sessions.items():
             known = self._sessions.get(key)

@@ -61,3 +61,9 @@ def acting_person() -> str:
     """Name of who acts now; empty where the program acts by itself."""
     actor = acting.get()
     return "" if actor is None else actor.identity.person
+
+
+def acting_session() -> str:
+    """The session, token or invitation of who acts now; empty without one."""
+    actor = acting.get()
+    return "" if actor is None else actor.identity.session

@@ -43,7 +43,11 @@ class People:
         self._store = Store(folder)
         #: Called with the id of a session, token or guest that is over.
         self.on_ended: list[Callable[[str], None]] = []
-        self.accounts = Accounts(self._store, passwords or Passwords(), ended=self._ended)
+        #: Called with the id of a session or token whose account may move nothing any more.
+        self.on_lowered: list[Callable[[str], None]] = []
+        self.accounts = Accounts(
+            self._store, passwords or Passwords(), ended=self._ended, lowered=self._lowered
+        )
         self._marker = AccountsMarker(folder)
         self.accounts.on_set_up = self._set_up
         self.support = Support()
@@ -173,6 +177,10 @@ class People:
 
     def _ended(self, session: str) -> None:
         for listener in self.on_ended:
+            listener(session)
+
+    def _lowered(self, session: str) -> None:
+        for listener in self.on_lowered:
             listener(session)
 
 

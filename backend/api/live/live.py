@@ -32,6 +32,7 @@ class LiveHub:
         self.people = PeopleLive(bench, people, self.connections)
         self._known, self._sockets = people, sockets
         people.on_ended.append(self._ended)
+        people.on_lowered.append(self._lowered)
         self._numbers = itertools.count(1)
         bench.on_snapshot.append(self._snapshot)
         bench.on_readings.append(self._readings)
@@ -66,6 +67,14 @@ class LiveHub:
             if connection.identity.session == session:
                 connection.release(None, "the session is over")
         self._sockets.end(session)
+        self.bench.authority.end_of(session, "the session of whoever began it is over")
+
+    def _lowered(self, session: str) -> None:
+        """An account may move nothing any more: what it still moves is brought to rest."""
+        for connection in self._each():
+            if connection.identity.session == session:
+                connection.release(None, "the account has another role now")
+        self.bench.authority.end_of(session, "the account of whoever began it has another role")
 
     def _each(self) -> list[Connection]:
         return list(self.connections.values())

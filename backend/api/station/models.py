@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from backend.api.models import Message
+from backend.api.station.printed import PrintedLines, PrintedName
 
 
 class Health(Message):
@@ -136,7 +137,7 @@ class ConnectRequest(Message):
     url: str
     station: int = Field(ge=0, le=65535)
     profile: str
-    name: str = Field(default="", max_length=60)
+    name: PrintedName = Field(default="", max_length=60)
 
 
 class PortRequest(Message):
@@ -152,8 +153,8 @@ class PortRequest(Message):
 class DriveUpdate(Message):
     """Name or notes of a drive."""
 
-    name: str | None = Field(default=None, min_length=1, max_length=60)
-    notes: str | None = Field(default=None, max_length=4000)
+    name: PrintedName | None = Field(default=None, min_length=1, max_length=60)
+    notes: PrintedLines | None = Field(default=None, max_length=4000)
     accept_identity: bool = Field(
         default=False, description="the drive at this place was exchanged on purpose"
     )

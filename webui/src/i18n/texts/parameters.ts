@@ -97,16 +97,6 @@ export const parameters = {
   'mark.stopped': ['set at stop', '停机设置'],
   'mark.readOnly': ['read only', '只读'],
   'mark.energises': ['moves', '致动'],
-  'parameters.motion': ['Motion', '运动'],
-  'motion.none': ['cannot move the axis', '不会使轴运动'],
-  'motion.at_enable': [
-    'changes how the axis moves: set only while it is disabled',
-    '影响轴的运动：仅在未使能时可设置',
-  ],
-  'motion.at_enable.safe': [
-    'changes how the axis moves; may be set while it is enabled',
-    '影响轴的运动；使能时也可设置',
-  ],
   'motion.energises': [
     'can put energy into the motor: not written here',
     '可能使电机得电：不能在此写入',

@@ -37,7 +37,7 @@ export function ScalesPanel({ drive }: { drive: string }) {
           <p className={info.certain ? 'good-text' : 'note warn'}>
             {t(info.certain ? 'scales.certain' : 'scales.uncertain')}
           </p>
-          <dl className="quantities">
+          <dl className="scale-list">
             {info.scales.map((scale) => (
               <One key={scale.quantity} scale={scale} />
             ))}

@@ -306,12 +306,6 @@ function Facts({ row }: { row: ParameterRow }) {
         <dd>{t(`effective.${pendingKey(row.effective)}`)}</dd>
         <dt>{t('parameters.settable')}</dt>
         <dd>{t(row.settable === 'stopped' ? 'settable.stopped' : 'settable.any')}</dd>
-        {row.access !== 'ro' && (
-          <>
-            <dt>{t('parameters.motion')}</dt>
-            <dd>{t(row.safe_in_motion ? 'motion.at_enable.safe' : `motion.${row.motion}`)}</dd>
-          </>
-        )}
         {row.motor_individual && (
           <>
             <dt>{t('parameters.individual')}</dt>
