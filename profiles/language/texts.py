@@ -80,7 +80,7 @@ def _of_procedure(procedure: Procedure) -> Iterator[Text]:
 def _of_functions(profile: Profile) -> Iterator[Text]:
     functions = profile.functions
     for forcing in functions.terminals.forcing:
-        place = ("forcing", forcing.name)
+        place: Place = ("forcing", forcing.name)
         yield Text("notes on the drive", (*place, "title"), forcing.title)
         yield Text("notes on the drive", (*place, "help"), forcing.help)
         yield Text("safety", (*place, "warning"), forcing.warning)
