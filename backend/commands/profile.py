@@ -31,6 +31,8 @@ from profiles.importer import (
     import_file,
     write_profile,
 )
+from profiles.language.overlay import LANGUAGES, load_overlay
+from profiles.language.texts import check_overlay, overlay_coverage
 from profiles.loader import ProfileError, user_folder
 from profiles.motion import decisions
 from profiles.motion.rule import Motion
@@ -236,15 +238,20 @@ def check(drive: Annotated[str | None, typer.Argument()] = None) -> None:
     for name in [drive] if drive else drive_names():
         try:
             profile = load_profile(name)
+            overlays = {language: load_overlay(name, language) for language in LANGUAGES}
         except ProfileError as error:
             print(error)
             failed = True
             continue
         findings = check_profile(profile)
+        for overlay in overlays.values():
+            findings += check_overlay(profile, overlay)
         print(f"{name}: {len(profile.parameters)} parameters, {len(profile.faults)} faults, "
               f"{len(findings)} findings")  # fmt: skip
         counts = ", ".join(f"{count} {motion}" for motion, count in motion_counts(profile).items())
         print(f"  motion classes: {counts}; {len(unclassified(profile))} not classified")
+        for language, overlay in overlays.items():
+            print(f"  in {language}: {', '.join(overlay_coverage(profile, overlay))}")
         for finding in findings:
             print(f"  {finding}")
         for line in coverage(profile):

@@ -19,6 +19,7 @@ from backend.api.station.models_description import (
     LineSearchRequest,
     LineSearchResult,
     MissingPort,
+    ProfileTexts,
     ReadDictionaryRequest,
 )
 from backend.station.description import BadDescription, drive_task, import_in_process
@@ -31,6 +32,8 @@ from profiles import drive_names, load_profile
 from profiles.importer import ImportFailed, export_eds
 from profiles.importer.esi import MAX_BYTES
 from profiles.importer.process import DevicesTask, FileTask
+from profiles.language.overlay import Language, load_overlay
+from profiles.language.texts import translations
 from profiles.loader import ProfileError, user_folder
 from profiles.schema import LinkKind
 
@@ -160,6 +163,20 @@ async def export_profile(
         media_type="text/plain; charset=utf-8",
         headers={"Content-Disposition": f'attachment; filename="{known.drive}.eds"'},
     )
+
+
+@router.get("/profiles/{profile}/texts")
+async def profile_texts(
+    profile: Annotated[str, Path(pattern=PROFILE_NAME, description="name of the profile")],
+    language: Annotated[Language, Query(description="language of the texts")],
+) -> ProfileTexts:
+    """The texts of a profile in another language, by their English original."""
+    try:
+        known = load_profile(profile)
+        overlay = load_overlay(profile, language)
+    except ProfileError as error:
+        raise NotFound(str(error), value=profile, remedy="see the list of profiles") from error
+    return ProfileTexts(profile=profile, language=language, texts=translations(known, overlay))
 
 
 @router.post("/search-line", status_code=202)

@@ -115,3 +115,13 @@ class ImportedList(Message):
     file: str
     parameters: int
     problems: list[str]
+
+
+class ProfileTexts(Message):
+    """Texts of a profile in another language."""
+
+    profile: str
+    language: Literal["zh"]
+    texts: dict[str, str] = Field(
+        description="English text of the profile to its translation; what is missing has none"
+    )

@@ -2144,6 +2144,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/profiles/{profile}/texts": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Profile Texts
+         * @description The texts of a profile in another language, by their English original.
+         */
+        get: operations["profile_texts"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/recordings": {
         parameters: {
             query?: never;
@@ -6405,6 +6425,26 @@ export interface components {
             why: string;
         };
         /**
+         * ProfileTexts
+         * @description Texts of a profile in another language.
+         */
+        ProfileTexts: {
+            /**
+             * Language
+             * @constant
+             */
+            language: "zh";
+            /** Profile */
+            profile: string;
+            /**
+             * Texts
+             * @description English text of the profile to its translation; what is missing has none
+             */
+            texts: {
+                [key: string]: string;
+            };
+        };
+        /**
          * Quality
          * @description Counters of one link or station since it was opened.
          */
@@ -8542,6 +8582,7 @@ export type ProcedureInfo = components['schemas']['ProcedureInfo'];
 export type ProcedureRequest = components['schemas']['ProcedureRequest'];
 export type ProfileInfo = components['schemas']['ProfileInfo'];
 export type ProfileMatch = components['schemas']['ProfileMatch'];
+export type ProfileTexts = components['schemas']['ProfileTexts'];
 export type Quality = components['schemas']['Quality'];
 export type Quantity = components['schemas']['Quantity'];
 export type ReadAllRequest = components['schemas']['ReadAllRequest'];
@@ -26419,6 +26460,149 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MotionClass"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    profile_texts: {
+        parameters: {
+            query: {
+                /** @description language of the texts */
+                language: "zh";
+            };
+            header?: never;
+            path: {
+                /** @description name of the profile */
+                profile: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ProfileTexts"];
                 };
             };
             /** @description Not a request of this interface */

@@ -7,6 +7,8 @@ import { setJob, useLink } from '../live/store'
 import { JobNote, useJobEnd } from './JobNote'
 import { Panel } from './Panel'
 import { ProblemNote } from './ProblemNote'
+import { OriginalSwitch, ProfileText } from './profile-text/ProfileText'
+import { useTexts } from './profile-text/texts'
 import { useAction } from './useAction'
 import { WaitingValues } from './WaitingValues'
 
@@ -34,6 +36,7 @@ export function useProcedures(drive: string): ProcedureInfo[] | null {
 export function Procedures({ drive }: { drive: string }) {
   const t = useT()
   const list = useProcedures(drive)
+  const texts = useTexts(drive)
   const [chosen, setChosen] = useState<ProcedureInfo | null>(null)
   const [job, setId] = useState<string | null>(null)
   if (!list || list.length === 0) return null
@@ -42,7 +45,7 @@ export function Procedures({ drive }: { drive: string }) {
       <div className="row wrap">
         {list.map((each) => (
           <Button key={each.name} onClick={() => setChosen(each)}>
-            {known(t, 'procedure', each.title)}
+            {texts?.get(each.title) ?? known(t, 'procedure', each.title)}
           </Button>
         ))}
       </div>
@@ -74,6 +77,7 @@ export function ProcedureDialog({
   const t = useT()
   const [agreed, setAgreed] = useState<boolean[]>(procedure.confirm.map(() => false))
   const run = useAction()
+  const title = useTexts(drive)?.get(procedure.title) ?? known(t, 'procedure', procedure.title)
   const start = async () => {
     const ok = await run.run(async () => {
       const job = await ask(
@@ -88,10 +92,17 @@ export function ProcedureDialog({
     if (ok) onClose()
   }
   return (
-    <Modal opened onClose={onClose} title={known(t, 'procedure', procedure.title)}>
-      <p>{procedure.help}</p>
+    <Modal opened onClose={onClose} title={title}>
+      <OriginalSwitch />
+      <p>
+        <ProfileText drive={drive} text={procedure.help} />
+      </p>
       <WaitingValues drive={drive} procedure={procedure.name} />
-      {procedure.warning && <p className="note warn">{procedure.warning}</p>}
+      {procedure.warning && (
+        <p className="note warn">
+          <ProfileText drive={drive} text={procedure.warning} />
+        </p>
+      )}
       {procedure.requires_stop && <p>{t('procedures.stopped')}</p>}
       <details>
         <summary>{t('procedures.steps', { count: procedure.steps.length })}</summary>
@@ -106,7 +117,7 @@ export function ProcedureDialog({
       {procedure.confirm.map((text, i) => (
         <Checkbox
           key={text}
-          label={text}
+          label={<ProfileText drive={drive} text={text} />}
           checked={agreed[i] ?? false}
           onChange={(event) => setAgreed(agreed.with(i, event.currentTarget.checked))}
         />

@@ -7,6 +7,7 @@ import { useRows } from '../../live/store'
 import { dateTime, shown } from '../../widgets/format'
 import { Panel } from '../../widgets/Panel'
 import { ParameterText } from '../../widgets/ParameterText'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProcedureButton } from '../../widgets/Procedures'
 import { useAction } from '../../widgets/useAction'
@@ -101,7 +102,7 @@ function Past({ drive, entry }: { drive: string; entry: PastFaultInfo }) {
     <li className={entry.kind ?? ''}>
       <h3>
         <small className="dim">{entry.name}</small> <span className="mono">{entry.code}</span>{' '}
-        {entry.known ? entry.title : t('history.notInProfile')}
+        {entry.known ? <ProfileText drive={drive} text={entry.title} /> : t('history.notInProfile')}
       </h3>
       {values.length > 0 && (
         <details>

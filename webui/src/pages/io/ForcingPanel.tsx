@@ -6,6 +6,7 @@ import { useT } from '../../i18n'
 import { useJob } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useAction } from '../../widgets/useAction'
 
 /** The server lets go five seconds after the last sign of life. */
@@ -79,8 +80,12 @@ export function ForcingPanel({
   const holding = mine !== null && !over
   return (
     <Panel title={forcing.title}>
-      <p className="prose">{forcing.help}</p>
-      <p className="note warn">{forcing.warning}</p>
+      <p className="prose">
+        <ProfileText drive={drive} text={forcing.help} />
+      </p>
+      <p className="note warn">
+        <ProfileText drive={drive} text={forcing.warning} />
+      </p>
       {forcing.notes && <p className="dim">{forcing.notes}</p>}
       {over && job?.problem && <ProblemNote problem={job.problem} onClose={() => setMine(null)} />}
       {over && !job?.problem && (

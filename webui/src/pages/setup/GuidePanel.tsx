@@ -9,6 +9,7 @@ import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ParameterFields } from '../../widgets/ParameterFields'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { StartButton } from '../../widgets/StartButton'
 import { ProcedureDialog, useProcedures } from '../../widgets/Procedures'
 import { useAction } from '../../widgets/useAction'
@@ -24,7 +25,11 @@ export function GuidePanel({ drive, guide }: { drive: string; guide: Guide }) {
   const [job, setShown] = useState<string | null>(null)
   return (
     <Panel title={guide.title}>
-      {guide.warning && <p className="note warn">{guide.warning}</p>}
+      {guide.warning && (
+        <p className="note warn">
+          <ProfileText drive={drive} text={guide.warning} />
+        </p>
+      )}
       {guide.notes && <p className="dim">{guide.notes}</p>}
       <ol className="guide">
         {guide.steps.map((step, i) => {
@@ -96,7 +101,9 @@ function Identify({ drive, onStarted }: { drive: string; onStarted: (job: string
     })
   return (
     <>
-      <p className="note warn">{spec.warning}</p>
+      <p className="note warn">
+        <ProfileText drive={drive} text={spec.warning} />
+      </p>
       <div className="fields">
         <NumberField
           label={t('motion.travelLimit')}

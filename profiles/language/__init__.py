@@ -1,0 +1,1 @@
+"""Texts of the profiles in other languages, as overlays beside each profile."""

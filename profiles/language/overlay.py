@@ -1,0 +1,159 @@
+"""Reads the translated texts of a drive family: ``profiles/<drive>/<language>/*.yaml``.
+
+The English texts of a profile are its manual's and never change. An overlay holds the same texts
+in another language, by the key of the record that they belong to. What has no translation is left
+out: a reader then sees the English text, marked as not translated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, get_args
+
+import yaml
+from pydantic import Field, ValidationError
+
+from profiles.loader import ProfileError, user_folder
+from profiles.record import Frozen
+
+_PROFILES = Path(__file__).parents[1]
+_SafeLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+Language = Literal["zh"]
+LANGUAGES: tuple[Language, ...] = get_args(Language)
+#: Where a text stands: ``("faults", "0x2300", "causes", "0")``.
+Place = tuple[str, ...]
+
+
+class ParameterWords(Frozen):
+    """Translated texts of a parameter."""
+
+    name: str = ""
+    help: str = ""
+    enum: dict[int, str] = Field(default_factory=dict)
+    bits: dict[str, str] = Field(default_factory=dict)
+
+
+class FaultWords(Frozen):
+    """Translated texts of a fault; causes and remedies one for one in the profile's order."""
+
+    name: str = ""
+    causes: tuple[str, ...] = ()
+    remedies: tuple[str, ...] = ()
+    reset: str = ""
+
+
+class ProcedureWords(Frozen):
+    """Translated texts of a procedure; ``confirm`` in the order of its confirm steps."""
+
+    title: str = ""
+    help: str = ""
+    warning: str = ""
+    confirm: tuple[str, ...] = ()
+
+
+class NamedWords(Frozen):
+    """Translated name and help of a homing method."""
+
+    name: str = ""
+    help: str = ""
+
+
+class FunctionWords(Frozen):
+    """Translated texts of a way of forcing, of a guide or of the drive's own identification."""
+
+    title: str = ""
+    help: str = ""
+    warning: str = ""
+
+
+class Overlay(Frozen):
+    """The translated texts of one family in one language."""
+
+    common: dict[str, str] = Field(
+        default_factory=dict,
+        description="English text to its translation, for what several records say alike",
+    )
+    parameters: dict[str, ParameterWords] = Field(default_factory=dict)
+    faults: dict[str, FaultWords] = Field(default_factory=dict)
+    procedures: dict[str, ProcedureWords] = Field(default_factory=dict)
+    homing_methods: dict[int, NamedWords] = Field(default_factory=dict)
+    forcing: dict[str, FunctionWords] = Field(default_factory=dict)
+    guides: dict[str, FunctionWords] = Field(default_factory=dict)
+    identification: FunctionWords = FunctionWords()
+    quirks: dict[str, str] = Field(default_factory=dict, description="by the quirk's kind")
+    watchdogs: dict[str, str] = Field(default_factory=dict, description="by the kind of link")
+    wiring: dict[str, str] = Field(default_factory=dict, description="by the kind of link")
+
+    def placed(self) -> dict[Place, str]:
+        """Every translated text that belongs to one record, by its place."""
+        found = dict(_walk((), self.model_dump(exclude={"common"})))
+        return {place: text for place, text in found.items() if text}
+
+
+def _walk(place: Place, node: Any) -> Iterator[tuple[Place, str]]:
+    if isinstance(node, str):
+        yield place, node
+    elif isinstance(node, dict):
+        for key, value in node.items():
+            yield from _walk((*place, str(key)), value)
+    else:
+        for number, value in enumerate(node):
+            yield from _walk((*place, str(number)), value)
+
+
+class _Version(NamedTuple):
+    path: Path
+    mtime_ns: int
+
+
+def load_overlay(drive: str, language: Language) -> Overlay:
+    """The translated texts of a family; empty where it has none in this language.
+
+    Raises:
+        ProfileError: broken YAML, or a key that the overlay does not know.
+    """
+    own = not (_PROFILES / drive / "profile.yaml").exists()
+    folder = (user_folder() if own else _PROFILES) / drive / language
+    files = sorted(folder.glob("*.yaml"))
+    return _load(drive, language, tuple(_Version(p, p.stat().st_mtime_ns) for p in files))
+
+
+@cache
+def _load(drive: str, language: Language, versions: tuple[_Version, ...]) -> Overlay:
+    texts = {version.path.name: version.path.read_text("utf-8") for version in versions}
+    return parse_overlay(f"{drive}/{language}", texts)
+
+
+def parse_overlay(label: str, texts: dict[str, str]) -> Overlay:
+    """Join YAML texts (file name to content) and check them.
+
+    Raises:
+        ProfileError: with file name for broken YAML or a text given twice, with the place for an
+            unknown key.
+    """
+    merged: dict[str, Any] = {}
+    for name, text in texts.items():
+        try:
+            data = yaml.load(text, Loader=_SafeLoader)  # noqa: S506 - both loaders are safe
+        except yaml.YAMLError as error:
+            raise ProfileError(f"{label}/{name}: {error}") from error
+        if not isinstance(data, dict):
+            raise ProfileError(f"{label}/{name}: the file must hold a mapping of overlay fields")
+        for field, value in data.items():
+            before = merged.setdefault(field, {})
+            if not isinstance(value, dict) or not isinstance(before, dict):
+                raise ProfileError(f"{label}/{name}: {field} must hold a mapping")
+            if twice := before.keys() & value.keys():
+                raise ProfileError(
+                    f"{label}/{name}: {field} gives {', '.join(map(str, sorted(twice)))} again; "
+                    "keep one of the two"
+                )
+            merged[field] = before | value
+    try:
+        return Overlay.model_validate(merged)
+    except ValidationError as error:
+        lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()[:20]]
+        raise ProfileError(f"overlay {label}: " + "; ".join(lines)) from error

@@ -1,0 +1,165 @@
+"""The texts of a profile, kind by kind, and their translations from an overlay."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from profiles.check import Finding
+from profiles.language.overlay import Overlay, Place
+from profiles.schema import ConfirmStep, Fault, Parameter, Procedure, Profile
+
+#: ``safety``: warnings and the texts that a person must agree to before anything moves.
+Kind = Literal[
+    "safety", "faults", "procedures", "homing", "terminals", "parameter names", "parameter help",
+    "values", "notes on the drive",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A text of the profile in English. Terminals' texts have no place: they are shared."""
+
+    kind: Kind
+    place: Place
+    english: str
+
+
+def texts_of(profile: Profile) -> Iterator[Text]:
+    """Every text of a profile that can be translated; empty ones are left out."""
+    for text in _all(profile):
+        if text.english.strip():
+            yield text
+
+
+def _all(profile: Profile) -> Iterator[Text]:
+    for fault in profile.faults:
+        yield from _of_fault(fault)
+    for procedure in profile.procedures:
+        yield from _of_procedure(procedure)
+    for method in profile.homing_methods:
+        place = ("homing_methods", str(method.method))
+        yield Text("homing", (*place, "name"), method.name)
+        yield Text("homing", (*place, "help"), method.help)
+    yield from _of_functions(profile)
+    for terminal in profile.terminals:
+        for function in terminal.functions:
+            yield Text("terminals", (), function.name)
+            yield Text("terminals", (), function.help)
+    for parameter in profile.parameters:
+        yield from _of_parameter(parameter)
+    for quirk in profile.quirks:
+        yield Text("notes on the drive", ("quirks", quirk.kind), quirk.help)
+    for link in profile.links:
+        yield Text("notes on the drive", ("watchdogs", link.kind), link.watchdog.help)
+        yield Text("notes on the drive", ("wiring", link.kind), link.wiring)
+
+
+def _of_fault(fault: Fault) -> Iterator[Text]:
+    place = ("faults", fault.code)
+    yield Text("faults", (*place, "name"), fault.name)
+    for number, cause in enumerate(fault.causes):
+        yield Text("faults", (*place, "causes", str(number)), cause)
+    for number, remedy in enumerate(fault.remedies):
+        yield Text("faults", (*place, "remedies", str(number)), remedy)
+    yield Text("faults", (*place, "reset"), fault.reset)
+
+
+def _of_procedure(procedure: Procedure) -> Iterator[Text]:
+    place = ("procedures", procedure.name)
+    yield Text("procedures", (*place, "title"), procedure.title)
+    yield Text("procedures", (*place, "help"), procedure.help)
+    yield Text("safety", (*place, "warning"), procedure.warning)
+    agreed = (step.text for step in procedure.steps if isinstance(step, ConfirmStep))
+    for number, text in enumerate(agreed):
+        yield Text("safety", (*place, "confirm", str(number)), text)
+
+
+def _of_functions(profile: Profile) -> Iterator[Text]:
+    functions = profile.functions
+    for forcing in functions.terminals.forcing:
+        place: Place = ("forcing", forcing.name)
+        yield Text("notes on the drive", (*place, "title"), forcing.title)
+        yield Text("notes on the drive", (*place, "help"), forcing.help)
+        yield Text("safety", (*place, "warning"), forcing.warning)
+    for guide in functions.guides:
+        place = ("guides", guide.name)
+        yield Text("notes on the drive", (*place, "title"), guide.title)
+        yield Text("safety", (*place, "warning"), guide.warning)
+    if functions.identification is not None:
+        yield Text("safety", ("identification", "warning"), functions.identification.warning)
+
+
+def _of_parameter(parameter: Parameter) -> Iterator[Text]:
+    place = ("parameters", parameter.key)
+    yield Text("parameter names", (*place, "name"), parameter.name)
+    yield Text("parameter help", (*place, "help"), parameter.help)
+    for code, meaning in parameter.enum.items():
+        yield Text("values", (*place, "enum", str(code)), meaning)
+    for bits, meaning in parameter.bits.items():
+        yield Text("values", (*place, "bits", bits), meaning)
+
+
+def translation(text: Text, overlay: Overlay, placed: dict[Place, str]) -> str | None:
+    """The translation of one text: the record's own, else the common one, else None."""
+    return placed.get(text.place) or overlay.common.get(text.english)
+
+
+def translations(profile: Profile, overlay: Overlay) -> dict[str, str]:
+    """English text to its translation, for everything that is translated.
+
+    By the English text, so that a text that was corrected since is shown in English rather than
+    with the translation of what it said before.
+    """
+    placed = overlay.placed()
+    found: dict[str, str] = {}
+    for text in texts_of(profile):
+        said = translation(text, overlay, placed)
+        if said is not None:
+            found.setdefault(text.english, said)
+    return found
+
+
+def untranslated(profile: Profile, overlay: Overlay, *kinds: Kind) -> list[Text]:
+    """Texts of these kinds (all where none is given) without a translation."""
+    placed = overlay.placed()
+    return [
+        text
+        for text in texts_of(profile)
+        if (not kinds or text.kind in kinds) and translation(text, overlay, placed) is None
+    ]
+
+
+def check_overlay(profile: Profile, overlay: Overlay) -> list[Finding]:
+    """Texts of something that no longer exists, and English texts with two translations."""
+    texts = list(texts_of(profile))
+    placed = overlay.placed()
+    places = {text.place for text in texts}
+    english = {text.english for text in texts}
+    findings = [
+        Finding(".".join(place), "a translation of something that the profile does not have")
+        for place in placed
+        if place not in places
+    ]
+    findings += [
+        Finding(repr(text), "a common translation of a text that the profile does not have")
+        for text in overlay.common
+        if text not in english
+    ]
+    said: dict[str, str] = {}
+    for text in texts:
+        now = translation(text, overlay, placed)
+        if now is not None and said.setdefault(text.english, now) != now:
+            findings.append(
+                Finding(".".join(text.place), f"{text.english!r} has another translation elsewhere")
+            )
+    return findings
+
+
+def overlay_coverage(profile: Profile, overlay: Overlay) -> list[str]:
+    """A line per kind of text: how many of how many are translated."""
+    every = Counter(text.kind for text in texts_of(profile))
+    missing = Counter(text.kind for text in untranslated(profile, overlay))
+    return [f"{kind} {count - missing[kind]} of {count}" for kind, count in every.items()]

@@ -1,0 +1,85 @@
+"""Chinese texts of the profiles: complete where safety needs them, and saying the same."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from profiles import load_profile
+from profiles.language.overlay import load_overlay, parse_overlay
+from profiles.language.texts import Kind, check_overlay, translations, untranslated
+from profiles.loader import ProfileError
+
+FAMILIES = ("mms7", "ds_c", "ep3e", "m6l", "r6l")
+COMPLETE: tuple[Kind, ...] = ("safety", "faults", "procedures")
+#: Wrong terms of the term base, with the right one.
+FORBIDDEN = {
+    "模数": "取模", "制动器": "抱闸", "去使能": "断使能", "断开使能": "断使能", "共振": "谐振",
+    "幅值裕度": "增益裕度", "调整时间": "调节时间", "准备接通": "准备就绪", "总线关闭": "总线离线",
+    "零点": "原点", "空轴": "裸轴", "设定点": "设定值", "刚度过高": "增益过高", "帧错误": "帧格式错误",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_safety_texts_faults_and_procedures_are_all_translated(family: str) -> None:
+    missing = untranslated(load_profile(family), load_overlay(family, "zh"), *COMPLETE)
+    assert [(text.place, text.english) for text in missing] == []
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_overlay_is_about_texts_that_exist(family: str) -> None:
+    assert check_overlay(load_profile(family), load_overlay(family, "zh")) == []
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_number_of_the_english_text_stands_in_the_chinese_one(family: str) -> None:
+    number = re.compile(r"\d+(?:\.\d+)?")
+    texts = translations(load_profile(family), load_overlay(family, "zh"))
+    wrong = [
+        (english, chinese)
+        for english, chinese in texts.items()
+        if set(number.findall(english)) != set(number.findall(chinese))
+    ]
+    assert wrong == []
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_no_wrong_term_is_used(family: str) -> None:
+    texts = translations(load_profile(family), load_overlay(family, "zh")).values()
+    assert [(wrong, text) for text in texts for wrong in FORBIDDEN if wrong in text] == []
+
+
+def test_a_new_fault_without_chinese_is_found() -> None:
+    profile = load_profile("mms7")
+    added = profile.faults[0].model_copy(update={"code": "0xFFFF", "name": "A fault of next year"})
+    grown = profile.model_copy(update={"faults": (*profile.faults, added)})
+    missing = untranslated(grown, load_overlay("mms7", "zh"), "faults")
+    assert ("faults", "0xFFFF", "name") in {text.place for text in missing}
+
+
+def test_translation_of_a_text_that_was_corrected_is_not_shown() -> None:
+    profile = load_profile("mms7")
+    overlay = load_overlay("mms7", "zh")
+    assert translations(profile, overlay)["Over-current"] == "过流"
+    assert "Overcurrent" not in translations(profile, overlay)
+
+
+def test_text_about_nothing_is_reported() -> None:
+    overlay = parse_overlay("mms7/zh", {"a.yaml": 'faults: {"0x0001": {name: 无此故障}}'})
+    assert [f.key for f in check_overlay(load_profile("mms7"), overlay)] == ["faults.0x0001.name"]
+
+
+def test_unknown_field_is_refused() -> None:
+    with pytest.raises(ProfileError, match="remedy"):
+        parse_overlay("mms7/zh", {"a.yaml": 'faults: {"0x2300": {remedy: 复位}}'})
+
+
+def test_text_given_in_two_files_is_refused() -> None:
+    one = 'faults: {"0x2300": {name: 过流}}'
+    with pytest.raises(ProfileError, match="0x2300"):
+        parse_overlay("mms7/zh", {"a.yaml": one, "b.yaml": one})
+
+
+def test_family_without_an_overlay_has_no_translations() -> None:
+    assert translations(load_profile("generic402"), load_overlay("generic402", "zh")) == {}

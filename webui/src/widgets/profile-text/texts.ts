@@ -1,0 +1,66 @@
+import { useEffect, useSyncExternalStore } from 'react'
+import { api, ask } from '../../api/client'
+import { useLanguage } from '../../i18n'
+import { useDrive, useLink } from '../../live/store'
+
+/** English text of a profile to its translation; null until the server has said it. */
+export type Texts = ReadonlyMap<string, string> | null
+
+const loaded = new Map<string, Texts>()
+const asked = new Set<string>()
+const listeners = new Set<() => void>()
+
+const ORIGINAL = 'servodeck.original'
+let original = globalThis.localStorage?.getItem(ORIGINAL) === 'yes'
+
+function changed(): void {
+  for (const listener of listeners) listener()
+}
+
+function subscribe(listener: () => void): () => void {
+  listeners.add(listener)
+  return () => listeners.delete(listener)
+}
+
+/** Once for each profile; asked again by the next reader when the server did not answer. */
+function load(profile: string): void {
+  if (asked.has(profile)) return
+  asked.add(profile)
+  ask(
+    api.GET('/api/v1/profiles/{profile}/texts', {
+      params: { path: { profile }, query: { language: 'zh' } },
+    }),
+  ).then(
+    (found) => {
+      loaded.set(profile, new Map(Object.entries(found.texts)))
+      changed()
+    },
+    () => asked.delete(profile),
+  )
+}
+
+/** The translated texts of a drive's profile; null in English and until they are known. */
+export function useTexts(drive: string): Texts {
+  const language = useLanguage()
+  const { open } = useLink()
+  const profile = useDrive(drive)?.profile ?? null
+  const wanted = language === 'zh' ? profile : null
+  useEffect(() => {
+    if (wanted !== null && open) load(wanted)
+  }, [wanted, open])
+  const texts = useSyncExternalStore(subscribe, () =>
+    profile === null ? null : (loaded.get(profile) ?? null),
+  )
+  return wanted === null ? null : texts
+}
+
+/** Whether the English original stands beside each translated text. */
+export function useOriginal(): boolean {
+  return useSyncExternalStore(subscribe, () => original)
+}
+
+export function setOriginal(shown: boolean): void {
+  original = shown
+  globalThis.localStorage?.setItem(ORIGINAL, shown ? 'yes' : 'no')
+  changed()
+}
