@@ -26,6 +26,9 @@ class AdapterGone(can.CanOperationError):
 
 """Said where its own buffer is full: it is there, but what it has cannot be sent."""
 
+#: TypeError: pyserial writes to a descriptor that another thread has closed.
+_GONE: tuple[type[Exception], ...] = (OSError, TypeError, *TERMINAL_ERRORS)
+
 _ASK_AGAIN_S = 0.5
 _BUS_ERROR = 0x80
 _ERROR_PASSIVE = 0x20
@@ -63,7 +66,7 @@ class SlcanBus(slcanBus):
                 pass
         except serial.SerialTimeoutException as error:
             raise AdapterBlocked("the adapter takes no more frames") from error
-        except (OSError, serial.SerialException, TypeError, *TERMINAL_ERRORS) as error:
+        except _GONE as error:
             raise AdapterGone(f"the adapter is gone: {error}") from error
 
     def _ask_for_flags(self) -> None:
