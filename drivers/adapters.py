@@ -22,11 +22,11 @@ import re
 import stat
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from serial.tools import list_ports
 
+from drivers.computer.terminals import own_terminals
 from drivers.errors import LinkLost, OutOfRange
 
 _COM = re.compile(r"(?:\\\\\.\\)?COM[1-9]\d{0,2}", re.IGNORECASE)
@@ -89,7 +89,7 @@ def serial_device(place: str) -> str:
             limit=SERIAL_LIMIT,
             remedy="give the device of the adapter, as /dev/ttyUSB0",
         )
-    if device in _own_terminals():
+    if device in own_terminals():
         raise LinkLost(
             f"{place} is the terminal that servodeck itself runs in",
             value=place,
@@ -109,14 +109,6 @@ def _is_serial(device: str) -> bool:
     except OSError:
         return False
     return _DEVICE.fullmatch(device) is not None and stat.S_ISCHR(mode)
-
-
-def _own_terminals() -> set[str]:
-    found = set()
-    for descriptor in (0, 1, 2):
-        with suppress(OSError):
-            found.add(os.ttyname(descriptor))
-    return found
 
 
 def require_interface(name: str) -> None:

@@ -43,6 +43,8 @@ def real_time(priority: int) -> bool:
 
     A thread that has it may never spin: the kernel throttles it for 50 ms a second.
     """
+    if sys.platform != "linux":
+        return False
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except OSError:
@@ -57,8 +59,10 @@ def short_slice() -> bool:
     waiting for the end of that one's turn, which is up to 3 ms. Its share of the processor stays
     the same. False where the kernel does not know of it, or this task is not an ordinary one.
     """
+    if sys.platform != "linux":
+        return False
     number = _SYS_SCHED_SETATTR.get(platform.machine())
-    if number is None or sys.platform != "linux":
+    if number is None:
         return False
     if os.sched_getscheduler(0) != os.SCHED_OTHER:
         return False

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import sys
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -173,9 +174,18 @@ def _cache_path(drive: str, files: list[Path]) -> Path:
     return folder / f"profile-{drive}-{digest.hexdigest()[:20]}.pickle"
 
 
+def _is_foreign(path: Path) -> bool:
+    """Whether somebody else may have written it. Windows says it by the place alone: the user's
+    own cache folder is theirs, any other one is not known to be.
+    """
+    if sys.platform == "win32":
+        return not path.is_relative_to(platformdirs.user_cache_dir("servodeck"))
+    return path.stat().st_uid != os.getuid()
+
+
 def _read_cache(path: Path) -> Profile | None:
     try:
-        if path.stat().st_uid != os.getuid():  # a pickle from another user is not to be trusted
+        if _is_foreign(path):  # a pickle from another user is not to be trusted
             return None
         loaded = pickle.loads(path.read_bytes())  # noqa: S301 - our own file, owner checked
     except (OSError, AttributeError, EOFError, ImportError, pickle.UnpicklingError):

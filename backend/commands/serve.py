@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import socket
 import ssl
-import sys
 import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +22,7 @@ from backend.station.bench import Bench
 from backend.store.database import FILE
 from backend.work.journal import Entry
 from drivers import scheduling
+from drivers.computer.processes import raise_descriptors
 from drivers.errors import NotAllowed
 from profiles import load_all
 from profiles.loader import ProfileError
@@ -83,7 +83,7 @@ async def _serve_claimed(bench: Bench, serving: Serving) -> None:
     listening = _listen(serving.host, serving.port)
     config = _config(bench, people, serving, certificate)
     config.accepting = [listening]
-    _raise_descriptors()
+    raise_descriptors(DESCRIPTORS)
     server = uvicorn.Server(config)
     running = asyncio.create_task(server.serve(sockets=[listening]))
     while not server.started and not running.done():
@@ -218,17 +218,6 @@ def _tell_problems(bench: Bench) -> None:
     for entry in reversed(bench.journal.entries()):
         tell(entry)
     bench.journal.listen(tell)
-
-
-def _raise_descriptors() -> None:
-    if sys.platform != "win32":
-        import resource
-
-        now, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-        wanted = DESCRIPTORS if most == resource.RLIM_INFINITY else min(DESCRIPTORS, most)
-        if now != resource.RLIM_INFINITY and now < wanted:
-            with contextlib.suppress(OSError, ValueError):
-                resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
 
 
 def _listen(host: str, port: int) -> AcceptingSocket:

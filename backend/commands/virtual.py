@@ -73,5 +73,9 @@ async def _told_to_end() -> None:
     """Wait for Ctrl+C or for the end that a service is given (SIGTERM)."""
     over, loop = asyncio.Event(), asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, over.set)
+        # Windows' event loop takes no handlers: there a signal is passed on to it.
+        if sys.platform == "win32":
+            signal.signal(number, lambda *_: loop.call_soon_threadsafe(over.set))
+        else:
+            loop.add_signal_handler(number, over.set)
     await over.wait()

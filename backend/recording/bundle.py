@@ -22,6 +22,7 @@ from backend.recording.export import NICE, to_csv
 from backend.recording.reader import RecordingReader
 from backend.store.files import StorageFailed
 from backend.store.spreadsheet import as_text
+from drivers.computer.processes import yield_processor
 
 
 async def build_apart(evidence: Evidence, target: Path) -> None:
@@ -146,7 +147,7 @@ def _history(values: Sequence[Value]) -> str:
 
 def main() -> int:
     """The process of `build_apart`: the evidence comes by standard input."""
-    os.nice(NICE)
+    yield_processor(NICE)
     evidence = pickle.load(sys.stdin.buffer)  # noqa: S301 - from the server that started us
     try:
         _build(evidence, Path(sys.argv[1]))

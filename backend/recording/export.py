@@ -12,7 +12,6 @@ from __future__ import annotations
 import csv
 import json
 import math
-import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ import numpy as np
 from backend.recording.reader import Channel, RecordingReader
 from backend.recording.table import merged
 from backend.store.spreadsheet import as_text
+from drivers.computer.processes import yield_processor
 
 #: The process writes text for seconds; the bus and the pages go first.
 NICE = 10
@@ -195,7 +195,7 @@ def to_rrd(reader: RecordingReader, path: Path, progress: Progress) -> None:
 
 def main() -> int:
     """The process."""
-    os.nice(NICE)
+    yield_processor(NICE)
     source, target, kind = sys.argv[1:4]
     last = -1.0
 

@@ -18,6 +18,7 @@ from typing import BinaryIO
 
 from backend.recording import chunks
 from backend.store.files import StorageFailed
+from drivers.computer.files import write_parts
 from drivers.link import ScopeBlock
 
 #: Blocks that may wait for the disk. At 16 channels × 4 kHz it holds two minutes.
@@ -206,7 +207,7 @@ class RecordingWriter:
             ends.append(size)
         done = 0
         try:
-            if parts and (done := os.writev(self._file.fileno(), parts)) < size:
+            if parts and (done := write_parts(self._file.fileno(), parts)) < size:
                 rest = memoryview(b"".join(parts))
                 while done < size:
                     done += self._file.write(rest[done:])

@@ -22,6 +22,7 @@ from backend.response_import.errors import BadRecording
 from backend.response_import.evaluation import ImportSettings, evaluate_signals, prepared
 from backend.response_import.preview import preview
 from backend.response_import.stored import pack_import
+from drivers.computer.processes import limit_memory
 
 #: An evaluation that takes longer is ended: the largest file takes a fraction of it.
 LIMIT_S = 120.0
@@ -85,18 +86,10 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
     return result
 
 
-def _limit_memory() -> None:
-    """Where the system can: a file made to exhaust the memory ends this process alone."""
-    if sys.platform == "win32":
-        return
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
-
-
 def main() -> None:
     """Carry out the one task of this process."""
-    _limit_memory()
+    # Where the system can: a file made to exhaust the memory ends this process alone.
+    limit_memory(_MEMORY_BYTES)
     task: ImportTask = pickle.load(sys.stdin.buffer)  # noqa: S301 - from our own parent
     answer: dict[str, object]
     try:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from pathlib import Path
 from types import TracebackType
+
+from drivers.computer.locks import open_lock_file, try_lock
 
 
 class FolderLock:
@@ -26,13 +27,11 @@ class FolderLock:
         if self.held:
             return True
         try:
-            self._file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            self._file = open_lock_file(self._path)
         except OSError:
             self.held = True
             return True
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        if not try_lock(self._file):
             self.give()
             return False
         self.held = True

@@ -7,13 +7,13 @@ Source of the commands: Lawicel CAN232 manual V3, "F" status flags and "t" retur
 
 from __future__ import annotations
 
-import errno
-import termios
 import time
 
 import can
 import serial
 from can.interfaces.slcan import slcanBus
+
+from drivers.computer.terminals import TERMINAL_ERRORS, flush
 
 
 class AdapterBlocked(can.CanOperationError):
@@ -25,6 +25,9 @@ class AdapterGone(can.CanOperationError):
 
 
 """Said where its own buffer is full: it is there, but what it has cannot be sent."""
+
+#: TypeError: pyserial writes to a descriptor that another thread has closed.
+_GONE: tuple[type[Exception], ...] = (OSError, TypeError, *TERMINAL_ERRORS)
 
 _ASK_AGAIN_S = 0.5
 _BUS_ERROR = 0x80
@@ -59,25 +62,12 @@ class SlcanBus(slcanBus):
     def _write(self, string: str) -> None:
         try:
             self.serialPortOrig.write(string.encode("ascii") + self.LINE_TERMINATOR)
-            while not self._drained():
+            while not flush(self.serialPortOrig):
                 pass
         except serial.SerialTimeoutException as error:
             raise AdapterBlocked("the adapter takes no more frames") from error
-        except (OSError, serial.SerialException, termios.error, TypeError) as error:
+        except _GONE as error:
             raise AdapterGone(f"the adapter is gone: {error}") from error
-
-    def _drained(self) -> bool:
-        """Wait until everything is on the line; False where a signal of this process broke it off.
-
-        Python does not repeat tcdrain(3) by itself, as it does with most calls (PEP 475).
-        """
-        try:
-            self.serialPortOrig.flush()
-        except termios.error as error:
-            if error.args[0] == errno.EINTR:
-                return False
-            raise
-        return True
 
     def _ask_for_flags(self) -> None:
         """At most twice a second: an adapter that does not know F answers it with BEL again."""

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from drivers import cia402
+from drivers.computer.sockets import require_ethercat
 from drivers.errors import DriveError, NotAllowed
 from drivers.ethercat.exchange.segmentcyclic import EthercatCyclic
 from drivers.ethercat.process import firmware, permissions
@@ -72,7 +73,9 @@ class EthercatLink:
         Raises:
             LinkLost: no such interface, switched off, or a permission is missing; with commands.
             Busy: another servodeck has it.
+            NotAllowed: this system has no EtherCAT (Windows, macOS).
         """
+        require_ethercat(self.interface)
         await self._host.start()
 
     async def close(self) -> None:

@@ -10,7 +10,6 @@ import errno
 import os
 import select
 import sys
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
@@ -18,15 +17,8 @@ from typing import Literal, Protocol
 import serial
 
 from drivers.adapters import ports_found, serial_device
+from drivers.computer.terminals import TERMINAL_ERRORS, deliver_soon
 from drivers.errors import DriveError, LinkLost, OutOfRange
-
-if sys.platform != "win32":
-    import termios
-
-    #: No OSError: pyserial lets it through where it sets up a terminal that has just gone.
-    _TERMINAL_ERRORS: tuple[type[Exception], ...] = (termios.error,)
-else:
-    _TERMINAL_ERRORS = ()
 
 Parity = Literal["N", "E", "O"]
 
@@ -101,22 +93,19 @@ def open_port(settings: LineSettings) -> Port:
             stopbits=settings.stopbits,
             timeout=0,
             write_timeout=1.0,
-            exclusive=True if os.name == "posix" else None,
+            exclusive=None if sys.platform == "win32" else True,
         )
     except ValueError as error:
         raise _unsuitable(settings, str(error)) from error
     except OSError as error:  # SerialException is one
         raise _explain(settings, error) from error
-    except _TERMINAL_ERRORS as error:
+    except TERMINAL_ERRORS as error:
         # An adapter that goes while it is being set up.
         raise _gone(settings.device, error) from error
-    if sys.platform == "linux":
-        # USB chips hold answers back for up to 16 ms unless asked not to; ptys cannot be asked.
-        with suppress(OSError, ValueError):
-            port.set_low_latency_mode(True)
-    if os.name == "posix":
-        return _PosixPort(port, settings.device)
-    return SerialPort(port, settings.device)
+    deliver_soon(port)
+    if sys.platform == "win32":
+        return SerialPort(port, settings.device)
+    return _PosixPort(port, settings.device)
 
 
 def is_pseudo_terminal(device: str) -> bool:

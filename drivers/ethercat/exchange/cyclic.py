@@ -7,13 +7,13 @@ is asked with `select`, because SOEM's own time-outs round up to a jiffy of 4 ms
 
 from __future__ import annotations
 
-import os
 import select
 import struct
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from drivers.computer.sockets import set_blocking
 from drivers.ethercat.exchange.gridphase import GridPhase
 from drivers.ethercat.exchange.mapping import Entry
 from drivers.ethercat.exchange.ring import RESYNCED, VALID, Ring, lost_flag
@@ -117,7 +117,7 @@ class CyclicLoop:
     def start(self) -> None:
         """Begin the grid now; frames no longer block."""
         if self._fd is not None:
-            os.set_blocking(self._fd, False)
+            set_blocking(self._fd, False)
         for image in self.images:
             image.outputs = image.pack(*image.axis.outputs)
             self._segment.set_output(image.station, image.outputs)
@@ -126,7 +126,7 @@ class CyclicLoop:
     def stop(self) -> None:
         """Frames block again, for everything that is not cyclic."""
         if self._fd is not None:
-            os.set_blocking(self._fd, True)
+            set_blocking(self._fd, True)
 
     def cycle(self) -> None:
         """Wait for the grid, exchange process data, let every axis decide, keep the sample."""

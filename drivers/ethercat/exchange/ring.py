@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from drivers.computer.sockets import shared_memory_file
+
 RING_BYTES = 16 << 20
 _PAGE = 4096
 _U64 = struct.Struct("<Q")
@@ -59,7 +61,7 @@ class Ring:
     @staticmethod
     def create() -> int:
         """A new memory file; it vanishes with the last process that holds it."""
-        descriptor = os.memfd_create("servodeck-ethercat")
+        descriptor = shared_memory_file("servodeck-ethercat")
         try:
             os.ftruncate(descriptor, RING_BYTES)
         except OSError:

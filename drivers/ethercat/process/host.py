@@ -21,6 +21,7 @@ import sys
 import time
 from types import FrameType
 
+from drivers.computer.processes import end_within
 from drivers.errors import DriveError, LinkLost, ProtocolError
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.process import protocol, realtime
@@ -145,7 +146,7 @@ class Host:
 
     def orphan(self, _signal: int, _frame: FrameType | None) -> None:
         """SIGTERM: end in good order."""
-        signal.alarm(_LAST_WORDS_S)
+        end_within(_LAST_WORDS_S)
         self._orphaned = True
 
 
@@ -170,7 +171,7 @@ def main(argv: list[str] | None = None) -> int:
     granted = realtime.claim(wanted=not options.no_realtime)
     with contextlib.suppress(LinkLost):
         host.run(granted)
-    signal.alarm(_LAST_WORDS_S)
+    end_within(_LAST_WORDS_S)
     return 0
 
 

@@ -11,8 +11,11 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-_NEEDED = {"CAP_NET_RAW": 13, "CAP_NET_ADMIN": 12}
-_USEFUL = {"CAP_SYS_NICE": 23, "CAP_IPC_LOCK": 14}
+from drivers.computer.sockets import interface_flags, require_ethercat
+
+NEEDED = {"CAP_NET_RAW": 13, "CAP_NET_ADMIN": 12}
+USEFUL = {"CAP_SYS_NICE": 23, "CAP_IPC_LOCK": 14}
+_IFF_UP = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,19 +53,24 @@ def check(interface: str, *, status: str | None = None, python: str | None = Non
 
     ``status`` is the text of /proc/self/status and ``python`` the interpreter's path, given only
     by tests.
+
+    Raises:
+        NotAllowed: this system has no EtherCAT (Windows, macOS).
     """
+    if status is None and sys.platform != "linux":
+        require_ethercat(interface)
     text = Path("/proc/self/status").read_text("ascii") if status is None else status
     held = _effective(text)
-    missing = tuple(name for name, bit in _NEEDED.items() if not held >> bit & 1)
-    advised = tuple(name for name, bit in _USEFUL.items() if not held >> bit & 1)
+    missing = tuple(name for name, bit in NEEDED.items() if not held >> bit & 1)
+    advised = tuple(name for name, bit in USEFUL.items() if not held >> bit & 1)
     exists = interface in {name for _, name in socket.if_nameindex()}
     up = exists and _is_up(interface)
     commands = []
     if missing:
-        names = ",".join(name.lower() for name in (*_NEEDED, *_USEFUL))
+        names = ",".join(name.lower() for name in (*NEEDED, *USEFUL))
         path = str(Path(sys.executable if python is None else python).resolve())
         commands.append(f"sudo setcap {names}+ep {path}")
-        caps = ",".join(f"+{name.removeprefix('CAP_').lower()}" for name in (*_NEEDED, *_USEFUL))
+        caps = ",".join(f"+{name.removeprefix('CAP_').lower()}" for name in (*NEEDED, *USEFUL))
         commands.append(
             f"sudo setpriv --reuid $USER --init-groups --inh-caps {caps} --ambient-caps {caps}"
             " servodeck serve"
@@ -81,13 +89,7 @@ def _effective(status: str) -> int:
 
 def _is_up(interface: str) -> bool:
     """IFF_UP by ioctl: /sys shows another network namespace's interfaces."""
-    import fcntl
-    import struct
-
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-        request = struct.pack("16sH14x", interface.encode(), 0)
-        try:
-            answer = fcntl.ioctl(sock, 0x8913, request)  # SIOCGIFFLAGS
-        except OSError:
-            return False
-    return bool(struct.unpack("16sH14x", answer)[1] & 1)
+    try:
+        return bool(interface_flags(interface) & _IFF_UP)
+    except OSError:
+        return False

@@ -8,11 +8,11 @@ the socket (PACKET_MR_PROMISC, packet(7)) does the same, and the kernel takes it
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import socket
 import struct
 
-_SIOCGIFFLAGS, _SIOCSIFFLAGS = 0x8913, 0x8914
+from drivers.computer.sockets import interface_flags, set_interface_flags
+
 _IFF_PROMISC = 0x100
 _SOL_PACKET, _ADD_MEMBERSHIP, _MR_PROMISC = 263, 1, 1
 
@@ -20,7 +20,7 @@ _SOL_PACKET, _ADD_MEMBERSHIP, _MR_PROMISC = 263, 1, 1
 def is_set(interface: str) -> bool:
     """Whether somebody has switched the interface to promiscuous mode for good."""
     try:
-        return bool(_flags(interface) & _IFF_PROMISC)
+        return bool(interface_flags(interface) & _IFF_PROMISC)
     except OSError:
         return False
 
@@ -33,15 +33,6 @@ def bind_to(packets: socket.socket, interface: str, index: int) -> None:
     with contextlib.suppress(OSError):
         membership = struct.pack("iHH8s", index, _MR_PROMISC, 0, b"")
         packets.setsockopt(_SOL_PACKET, _ADD_MEMBERSHIP, membership)
-        flags = _flags(interface)
+        flags = interface_flags(interface)
         if flags & _IFF_PROMISC:
-            request = struct.pack("16sH14x", interface.encode(), flags & ~_IFF_PROMISC)
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
-                fcntl.ioctl(control, _SIOCSIFFLAGS, request)
-
-
-def _flags(interface: str) -> int:
-    request = struct.pack("16sH14x", interface.encode(), 0)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
-        answer = fcntl.ioctl(control, _SIOCGIFFLAGS, request)
-    return int(struct.unpack("16sH14x", answer)[1])
+            set_interface_flags(interface, flags & ~_IFF_PROMISC)

@@ -26,6 +26,7 @@ from pathlib import Path
 import pysoem
 
 from drivers.adapters import require_interface
+from drivers.computer.sockets import AF_UNIX, MSG_DONTWAIT, blocks, set_blocking
 from drivers.errors import Busy, LinkLost, NotAllowed, ProtocolError
 from drivers.ethercat.process import permissions, promiscuous
 from drivers.ethercat.wire import frames
@@ -175,7 +176,7 @@ class Segment:
         if self._ear is None:
             return
         try:
-            while self._ear.recv_into(self._scrap, 0, socket.MSG_DONTWAIT):
+            while self._ear.recv_into(self._scrap, 0, MSG_DONTWAIT):
                 self.late_frames += 1
         except BlockingIOError:
             return
@@ -201,18 +202,18 @@ class Segment:
         if ear is None or self.socket_fd is None:
             return None
         # Process data must not wait long for each of many frames that do not come back.
-        hurried = self.silent and not os.get_blocking(self.socket_fd)
+        hurried = self.silent and not blocks(self.socket_fd)
         patience_us = _FRAME_TIMEOUT_US if hurried else self.frame_timeout_us
         deadline = time.monotonic() + patience_us * 1e-6
         scrap = memoryview(self._scrap)
         try:
-            ear.send(sent, socket.MSG_DONTWAIT)
+            ear.send(sent, MSG_DONTWAIT)
             # What has come is taken however late it is: this process may have stood still itself.
             for _ in range(_MOST_STRAY):
                 left_s = max(deadline - time.monotonic(), 0.0)
                 if not select.select((ear,), (), (), left_s)[0]:
                     return None
-                size = ear.recv_into(scrap, 0, socket.MSG_DONTWAIT)
+                size = ear.recv_into(scrap, 0, MSG_DONTWAIT)
                 told = frames.answers(requests, sent, scrap[:size])
                 if told is not None:
                     return told
@@ -284,15 +285,15 @@ class Segment:
     def recover(self, station: int) -> bool:
         """Give a slave that was switched off its address back; False when it is another one."""
         # SOEM sends some of these frames without waiting, and needs the socket to block then.
-        waits = self.socket_fd is None or os.get_blocking(self.socket_fd)
+        waits = self.socket_fd is None or blocks(self.socket_fd)
         if self.socket_fd is not None:
-            os.set_blocking(self.socket_fd, True)
+            set_blocking(self.socket_fd, True)
         self.discard_late_frames()
         try:
             back = bool(self.slaves[station - 1].recover(2000) > 0)
         finally:
             if self.socket_fd is not None:
-                os.set_blocking(self.socket_fd, waits)
+                set_blocking(self.socket_fd, waits)
         self.forget_errors()
         return back
 
@@ -326,7 +327,7 @@ class Segment:
 
 def _lock(interface: str) -> socket.socket:
     """An abstract socket: per network namespace like the interface, and gone with its holder."""
-    lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    lock = socket.socket(AF_UNIX, socket.SOCK_DGRAM)
     try:
         lock.bind(f"\0servodeck-ethercat-{interface}")
     except OSError as error:

@@ -22,6 +22,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
+from drivers.computer.sockets import AF_NETLINK, NETLINK_ROUTE
+
 _CLONE_NEWUSER = 0x10000000
 _CLONE_NEWNET = 0x40000000
 
@@ -193,7 +195,7 @@ def _request(flags: int, body: bytes, what: str) -> None:
         OSError: the kernel's refusal, naming ``what``.
     """
     header = struct.pack("<IHHII", 16 + len(body), _RTM_NEWLINK, _REQUEST | _ACK | flags, 1, 0)
-    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as netlink:
+    with socket.socket(AF_NETLINK, socket.SOCK_RAW, NETLINK_ROUTE) as netlink:
         netlink.send(header + body)
         answer = netlink.recv(65536)
     code = -struct.unpack_from("<i", answer, 16)[0]

@@ -9,22 +9,30 @@ from __future__ import annotations
 
 import os
 import select
-import termios
+import sys
 import threading
 import time
-import tty
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.errors import LinkLost
+from drivers.computer.sockets import set_blocking
+from drivers.errors import LinkLost, NotAllowed
 from drivers.modbus.timing import sleep_precisely
 
+if sys.platform != "win32":
+    import termios
+    import tty
+
+    _NAMED = {
+        getattr(termios, name): int(name[1:])
+        for name in dir(termios)
+        if name[0] == "B" and name[1:].isdigit()
+    }
+else:
+    _NAMED = {}
+
 #: termios speed codes of this system, for asking which rate the client has set.
-_SPEEDS: dict[int, int] = {
-    getattr(termios, name): int(name[1:])
-    for name in dir(termios)
-    if name[0] == "B" and name[1:].isdigit()
-} | {
+_SPEEDS: dict[int, int] = _NAMED | {
     # Linux has these rates (asm-generic/termbits.h) and Python's termios names none of them.
     0o010005: 500_000, 0o010006: 576_000, 0o010007: 921_600, 0o010010: 1_000_000,
     0o010011: 1_152_000, 0o010012: 1_500_000, 0o010013: 2_000_000, 0o010014: 2_500_000,
@@ -53,7 +61,14 @@ def open_pty(path: Path) -> tuple[int, int]:
 
     Raises:
         LinkLost: something that is not a wire of ours is already at the path.
+        NotAllowed: the system has no pseudo-terminals (Windows).
     """
+    if sys.platform == "win32":
+        raise NotAllowed(
+            "virtual serial drives need pseudo-terminals, which Windows does not have",
+            limit="Linux, macOS",
+            remedy="run the demo on Linux or macOS; real drives on COM ports work here",
+        )
     ours = path.is_symlink() and str(path.readlink()).startswith("/dev/pts/")
     if (path.exists() or path.is_symlink()) and not ours:
         raise LinkLost(
@@ -62,7 +77,7 @@ def open_pty(path: Path) -> tuple[int, int]:
         )
     master, slave = os.openpty()
     tty.setraw(slave)
-    os.set_blocking(master, False)
+    set_blocking(master, False)
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_name(f".{path.name}.{os.getpid()}")
     fresh.unlink(missing_ok=True)
@@ -76,7 +91,7 @@ def close_pty(path: Path, master: int, slave: int) -> None:
 
     A wire that was made later at the same path is not ours to remove.
     """
-    if path.is_symlink() and str(path.readlink()) == os.ttyname(slave):
+    if sys.platform != "win32" and path.is_symlink() and str(path.readlink()) == os.ttyname(slave):
         path.unlink()
     os.close(slave)
     os.close(master)
@@ -134,6 +149,8 @@ class PtyWire:
 
     def client_baudrate(self) -> int | None:
         """Baud rate that the client has set, or None if this system has no name for it."""
+        if sys.platform == "win32":
+            return None
         try:
             return _SPEEDS.get(termios.tcgetattr(self._master)[5])
         except termios.error:

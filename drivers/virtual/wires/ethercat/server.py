@@ -11,6 +11,7 @@ import struct
 import time
 from typing import IO
 
+from drivers.computer.sockets import AF_PACKET, AF_UNIX, receive_with_notes
 from drivers.errors import LinkLost
 from drivers.virtual.wires import netns
 from drivers.virtual.wires.ethercat.control import Control
@@ -32,7 +33,7 @@ class InterfaceLock:
     """
 
     def __init__(self, interface: str) -> None:
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket = socket.socket(AF_UNIX, socket.SOCK_DGRAM)
         try:
             self._socket.bind(f"\0servodeck-virtual-segment-{interface}")
         except OSError as error:
@@ -56,7 +57,7 @@ def open_socket(interface: str) -> socket.socket:
     if len(interface.encode()) > 15:
         raise LinkLost(f"interface name {interface!r} is longer than 15 bytes")
     try:
-        raw = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0)
+        raw = socket.socket(AF_PACKET, socket.SOCK_RAW, 0)
     except PermissionError as error:
         raise LinkLost(
             "no permission for raw sockets",
@@ -151,7 +152,7 @@ class SegmentServer:
     def _answer(self) -> bool:
         """The next frame that waits; False if there is none."""
         try:
-            frame, ancillary, _, _ = self._socket.recvmsg(_LONGEST, 64)
+            frame, ancillary, _, _ = receive_with_notes(self._socket, _LONGEST, 64)
         except OSError:
             return False  # none, or the interface was switched off; it may come back
         reply = self._segment.process_frame(frame, _age_ns(ancillary))

@@ -1,0 +1,18 @@
+"""Writing to files."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+
+def write_parts(descriptor: int, parts: Sequence[bytes | memoryview]) -> int:
+    """Write these one after the other, by one system call where there is one; bytes written.
+
+    Raises:
+        OSError: nothing was written.
+    """
+    if sys.platform == "win32":
+        return os.write(descriptor, b"".join(parts))
+    return os.writev(descriptor, parts)

@@ -1,0 +1,45 @@
+"""Locks on files that go with the process that holds them, however it ends."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+#: Locked on Windows, which knows no lock of a file as a whole: far behind any content, as a locked
+#: byte cannot be read by others.
+_LOCKED_BYTE = 1 << 30
+
+
+def open_lock_file(path: Path) -> int:
+    """The descriptor of a file to lock, made where it is not there; no child process inherits it.
+
+    Raises:
+        OSError: it cannot be opened for writing.
+    """
+    # Descriptors are not inherited on any system (PEP 446).
+    return os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+
+
+def try_lock(descriptor: int) -> bool:
+    """Lock an open file for this process alone; False while another one has it.
+
+    It ends with the descriptor: flock(2), and `msvcrt.locking` on Windows.
+    """
+    if sys.platform == "win32":
+        os.lseek(descriptor, _LOCKED_BYTE, os.SEEK_SET)
+        try:
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        except OSError:  # EACCES or EDEADLOCK, by the C runtime
+            return False
+        return True
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True

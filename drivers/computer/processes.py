@@ -1,0 +1,104 @@
+"""Processes: telling one from another, their turn on the processor, how they end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+
+_BOOT = Path("/proc/sys/kernel/random/boot_id")
+#: Fields of /proc/PID/stat behind the command's name: the 20th of these is the start time (proc(5),
+#: field 22).
+_START_AFTER_NAME = 19
+
+
+def process_mark(pid: int) -> str:
+    """A mark that no other process has, before or after a restart of the computer.
+
+    Empty where no such process runs. On Linux number, start in ticks and boot; elsewhere number
+    and moment of start as the system noted it, which setting the clock later does not change.
+    """
+    if sys.platform == "linux":
+        return _mark_from_proc(pid)
+    elif sys.platform == "darwin":  # noqa: RET505 - type checkers follow the branches of a system
+        return _mark_from_ps(pid)
+    else:
+        return _mark_by_psutil(pid)
+
+
+def _mark_by_psutil(pid: int) -> str:
+    """On Windows psutil asks GetProcessTimes, which keeps what it noted at the start."""
+    try:
+        return f"{pid} {psutil.Process(pid).create_time():.6f}"
+    except psutil.Error:
+        return ""
+
+
+def _mark_from_ps(pid: int) -> str:
+    """By ps(1): what psutil says on macOS follows the clock when that is set."""
+    fixed = {**os.environ, "LC_ALL": "C", "TZ": "UTC"}
+    listed = subprocess.run(
+        ["/bin/ps", "-o", "lstart=", "-p", str(pid)],
+        capture_output=True, text=True, env=fixed, check=False,
+    )  # fmt: skip
+    started = " ".join(listed.stdout.split())
+    return f"{pid} {started}" if started else ""
+
+
+def _mark_from_proc(pid: int) -> str:
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text("ascii", "replace").rpartition(")")[2].split()
+        return f"{pid} {fields[_START_AFTER_NAME]} {_BOOT.read_text('ascii').strip()}"
+    except (OSError, IndexError):
+        return ""
+
+
+def yield_processor(nice: int) -> None:
+    """Have this process go after others: by ``nice`` steps, on Windows by one priority class."""
+    if sys.platform == "win32":
+        psutil.Process().nice(psutil.BELOW_NORMAL_PRIORITY_CLASS)
+        return
+    os.nice(nice)
+
+
+def limit_memory(most_bytes: int) -> bool:
+    """Bound the address space of this process; False where the system cannot (Windows)."""
+    if sys.platform == "win32":
+        return False
+    import resource
+
+    try:
+        resource.setrlimit(resource.RLIMIT_AS, (most_bytes, most_bytes))
+    except (OSError, ValueError):
+        # macOS refuses less than what is mapped already.
+        return False
+    return True
+
+
+def raise_descriptors(wanted: int) -> None:
+    """Allow this process ``wanted`` open files, or as many as it may; Windows has no such limit."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    now, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = wanted if most == resource.RLIM_INFINITY else min(wanted, most)
+    if now == resource.RLIM_INFINITY or now >= wanted:
+        return
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
+    except (OSError, ValueError):
+        return  # fewer connections, which is said where one is refused
+
+
+def end_within(seconds: int) -> None:
+    """Have the system end this process after this time, whatever it waits for (SIGALRM).
+
+    Windows has no such alarm: whoever started the process ends it there.
+    """
+    if sys.platform != "win32":
+        signal.alarm(seconds)

@@ -1,0 +1,109 @@
+"""Sockets and descriptors that one system has and another has not."""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+import sys
+
+from drivers.errors import NotAllowed
+
+if sys.platform == "linux":
+    from socket import AF_NETLINK, AF_PACKET, AF_UNIX, MSG_DONTWAIT, NETLINK_ROUTE
+else:
+    # By Linux' numbers (bits/socket.h). Nothing opens them elsewhere: see `require_ethercat`.
+    AF_UNIX, AF_NETLINK, AF_PACKET, MSG_DONTWAIT, NETLINK_ROUTE = 1, 16, 17, 0x40, 0
+
+_SIOCGIFFLAGS, _SIOCSIFFLAGS = 0x8913, 0x8914
+
+__all__ = [
+    "AF_NETLINK", "AF_PACKET", "AF_UNIX", "MSG_DONTWAIT", "NETLINK_ROUTE",
+    "blocks", "interface_flags", "receive_with_notes", "require_ethercat",
+    "set_blocking", "set_interface_flags", "shared_memory_file",
+]  # fmt: skip
+
+
+def require_ethercat(interface: str) -> None:
+    """EtherCAT needs raw sockets and shared memory as Linux has them.
+
+    Raises:
+        NotAllowed: another system; with what helps.
+    """
+    if sys.platform != "linux":
+        raise NotAllowed(
+            f"EtherCAT on {interface} is not available: servodeck runs EtherCAT on Linux only",
+            value=interface,
+            limit="Linux",
+            remedy="run servodeck on a computer with Linux at the machine and open its page from"
+            " here; Modbus, MLink and CANopen by slcan work on this one",
+        )
+
+
+def blocks(descriptor: int) -> bool:
+    """Whether reading this descriptor waits; True on Windows, where it always does."""
+    return True if sys.platform == "win32" else os.get_blocking(descriptor)
+
+
+def set_blocking(descriptor: int, wanted: bool) -> None:
+    """Have reading this descriptor wait or not; without effect on Windows."""
+    if sys.platform != "win32":
+        os.set_blocking(descriptor, wanted)
+
+
+def shared_memory_file(name: str) -> int:
+    """A file in memory that vanishes with the last process that holds it (memfd_create(2)).
+
+    Raises:
+        NotAllowed: the system has none.
+    """
+    if sys.platform == "linux":
+        return os.memfd_create(name)
+    raise NotAllowed(
+        f"shared memory for {name} is not available: servodeck runs EtherCAT on Linux only",
+        value=name,
+        limit="Linux",
+        remedy="run servodeck on a computer with Linux at the machine",
+    )
+
+
+def receive_with_notes(
+    source: socket.socket, most: int, notes: int
+) -> tuple[bytes, list[tuple[int, int, bytes]], int, object]:
+    """A message with its ancillary data (recvmsg(2)).
+
+    Raises:
+        OSError: nothing there, or the system has no such call (Windows).
+    """
+    if sys.platform == "win32":
+        raise OSError("recvmsg is not available on Windows")
+    return source.recvmsg(most, notes)
+
+
+def interface_flags(interface: str) -> int:
+    """The IFF_ flags of a network interface (netdevice(7)).
+
+    Raises:
+        OSError: there is none of this name, or the system does not say (not Linux).
+    """
+    return _flags_by(_SIOCGIFFLAGS, interface, 0)
+
+
+def set_interface_flags(interface: str, flags: int) -> None:
+    """Set the IFF_ flags of a network interface (netdevice(7)).
+
+    Raises:
+        OSError: not permitted, none of this name, or another system than Linux.
+    """
+    _flags_by(_SIOCSIFFLAGS, interface, flags)
+
+
+def _flags_by(request: int, interface: str, flags: int) -> int:
+    if sys.platform != "linux":
+        raise OSError(f"the flags of {interface} are known on Linux only")
+    import fcntl
+
+    wanted = struct.pack("16sH14x", interface.encode(), flags)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
+        answer = fcntl.ioctl(control, request, wanted)
+    return int(struct.unpack("16sH14x", answer)[1])
