@@ -221,7 +221,8 @@ def hand_over(
 
 def write_of(parameter: Parameter, raw: Raw, transition: Transition = "PS") -> StartupWrite:
     """The write of a value; ``parameter`` has an object."""
-    assert parameter.index is not None and parameter.subindex is not None
+    assert parameter.index is not None
+    assert parameter.subindex is not None
     return StartupWrite(
         parameter.index, parameter.subindex, parameter.type, raw, parameter.key,
         " ".join(parameter.name.split()), transition,

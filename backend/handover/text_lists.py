@@ -239,7 +239,8 @@ def main() -> int:
             now = answer.json().get("raw") if answer.is_success else None
             if now != raw:
                 wrong += 1
-                print(f"{{key}}: wanted {{raw}}, drive has {{now}}: {{answer.text}}", file=sys.stderr)
+                why = f"wanted {{raw}}, drive has {{now}}: {{answer.text}}"
+                print(f"{{key}}: {{why}}", file=sys.stderr)
     print(f"{{len(WRITES) - wrong}} of {{len(WRITES)}} values written and read back")
     return 1 if wrong else 0
 
