@@ -103,6 +103,22 @@ def compare(
     return Verdict(tuple(conflicts), diagnose(profile, listed), missing, same)
 
 
+def changed_since(
+    profile: Profile, ours: Mapping[str, Raw], drive: Mapping[str, Raw | None]
+) -> tuple[Conflict, ...]:
+    """Values of a set that the drive no longer holds; what could not be read is not told."""
+    found = []
+    for key, raw in ours.items():
+        parameter, now = profile.by_key.get(key), drive.get(key)
+        if parameter is None or now is None or _equal(parameter, raw, now):
+            continue
+        name = " ".join(parameter.name.split())
+        sentence = f"{name} ({key}) was handed over as {raw} and is {now} now (raw)"
+        kind = consequence(profile, parameter)
+        found.append(Conflict(key, name, now, raw, now, kind, sentence))
+    return tuple(found)
+
+
 def _equal(parameter: Parameter, one: Raw, other: Raw) -> bool:
     """Equal on the wire: a REAL32 that was typed has more digits than it carries."""
     try:

@@ -27,6 +27,10 @@ from profiles.schema import INTEGER_RANGE, DataType, Profile
 
 MAX_BYTES = 8_000_000
 _MAX_WRITES = 20_000
+#: What the parsers raise; LookupError is an encoding that nobody knows.
+_DAMAGED = (
+    ParseError, ImportFailed, ValueError, LookupError, yaml.YAMLError, csv.Error, RecursionError,
+)  # fmt: skip
 _DOWNLOAD = re.compile(r"^\s*ethercat\s+.*\bdownload\b(?P<rest>.*)$")
 _SIZE = {"bool": 1, "int8": 1, "uint8": 1, "sm8": 1, "int16": 2, "uint16": 2, "sm16": 2,
          "int32": 4, "uint32": 4, "sm32": 4, "float": 4, "int64": 8, "uint64": 8,
@@ -77,7 +81,7 @@ def read_list(data: bytes, profile: Profile, name: str = "the file") -> Controll
             f"{name} defines XML entities, which no start-up list needs and an attack does",
             remedy="export the list again",
         ) from error
-    except (ParseError, ImportFailed, ValueError, yaml.YAMLError, csv.Error, RecursionError) as e:
+    except _DAMAGED as e:
         told = " ".join(str(e).split())[:200]
         raise BadSet(f"{name} is damaged: {told}", remedy="export the list again") from e
     if not found.writes:
