@@ -70,6 +70,10 @@ COMMANDS = {
         "report:report",
         "Write the commissioning report of an axis, from measurement files or a running server.",
     ),
+    "handover": (
+        "handover:app",
+        "Start-up lists for a machine's controller: write, compare, watch. Writes to no drive.",
+    ),
     "profile": ("profile:app", "Drive profiles: show, check, import."),
     "audit": ("keep:audit", "Check and export the audit trail."),
     "library": ("keep:library", "Search, export and import the library."),

@@ -1,0 +1,48 @@
+"""Raw values that a drive holds now, read here or by a running server."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+from backend.api.drive.models_parameters import ParameterRow
+from backend.commands.options import Place
+from backend.commands.remote_params import remote_drive
+from backend.commands.session import drive_at, show_progress
+from profiles import load_profile
+from profiles.schema import Profile, Raw
+
+
+class Now(NamedTuple):
+    """A drive's name, its profile, and raw values by key, None where one could not be read."""
+
+    name: str
+    profile: Profile
+    raws: dict[str, Raw | None]
+
+
+async def values_now(place: Place, keys: Collection[str] = ()) -> Now:
+    """Read these parameters; keys that the drive does not have are left out."""
+    if place.server is None:
+        async with drive_at(place.url, place.station, place.profile) as drive:
+            known = [
+                key
+                for key in keys
+                if (parameter := drive.profile.by_key.get(key)) is not None
+                and parameter.access != "wo"
+                and not drive.unreachable_why(parameter)
+            ]
+            read = await drive.read_many(known, show_progress) if known else {}
+            return Now(drive.name, drive.profile, {key: r.raw for key, r in read.items()})
+    async with remote_drive(place) as (at, summary):
+        profile = load_profile(summary.profile)
+        raws: dict[str, Raw | None] = {}
+        readable = [
+            key for key in keys if key in profile.by_key and profile.by_key[key].access != "wo"
+        ]
+        if readable:
+            await at.result(f"/drives/{summary.id}/jobs/read_all", {"keys": readable})
+            rows = await at.ask("GET", f"/drives/{summary.id}/parameters", list[ParameterRow])
+            wanted = set(readable)
+            raws = {row.key: row.reading.raw for row in rows if row.key in wanted and row.reading}
+        return Now(summary.name, profile, raws)

@@ -1,0 +1,185 @@
+"""``servodeck handover``: lists for the machine's controller, and what its lists overwrite."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, get_args
+
+import typer
+
+from backend.commands.drive_values import Now, values_now
+from backend.commands.options import Json, Profile, Server, Station, Url, place
+from backend.commands.session import run
+from backend.commands.values import bytes_of
+from backend.handover.conflicts import Verdict, changed_since
+from backend.handover.conflicts import compare as compared
+from backend.handover.files import FORMATS, Format, files_of
+from backend.handover.model import Choice, hand_over
+from backend.handover.read import read_list
+from backend.parameters.set_file import ParameterSet, parse
+from backend.store.files import write_atomically
+from drivers.errors import NotAllowed
+from profiles import load_profile
+from profiles.schema import Raw
+
+app = typer.Typer(help="Hand values over to a machine's controller. Nothing is written to a drive.")
+
+
+def _raws(content: ParameterSet) -> dict[str, Raw]:
+    return {row.key: row.raw for row in content.rows if row.raw is not None}
+
+
+def set_of(file: Path) -> ParameterSet:
+    """The parameter set of a file."""
+    return parse(bytes_of(file), file.name)
+
+
+@app.command("export")
+def export(
+    file: Annotated[Path, typer.Argument(metavar="SET", help="parameter set")],
+    form: Annotated[str, typer.Option("--format", help="|".join(get_args(Format)))],
+    out: Annotated[Path, typer.Option(help="file to write; what belongs to it lies beside it")],
+    only: Annotated[str, typer.Option(help="keys, separated by commas")] = "",
+    tuned: Annotated[bool, typer.Option("--tuned", help="gains, filters and notches")] = False,
+    not_default: Annotated[
+        bool, typer.Option("--not-default", help="values that differ from the manual's default")
+    ] = False,
+    motor_individual: Annotated[
+        bool, typer.Option(help="include values that belong to one motor")
+    ] = False,
+) -> None:
+    """Write a start-up list, with a sheet of the scaling beside it."""
+
+    async def work() -> None:
+        if form not in FORMATS:
+            raise NotAllowed(
+                f"{form!r} is no format", value=form, remedy=f"choose one of {', '.join(FORMATS)}"
+            )
+        if bool(only) + tuned + not_default > 1:
+            raise NotAllowed(
+                "--only, --tuned and --not-default exclude each other", remedy="give one of them"
+            )
+        content = set_of(file)
+        choice: Choice = "tuned" if tuned else "not_default" if not_default else "all"
+        keys = [key.strip().upper() for key in only.split(",") if key.strip()]
+        axis = hand_over(
+            content, load_profile(content.profile), choice=choice, only=keys,
+            motor_individual=motor_individual,
+        )  # fmt: skip
+        chosen: Format = next(each for each in get_args(Format) if each == form)
+        files = files_of(axis, chosen, out.name, content.saved)
+        for name, data in files.items():
+            write_atomically(out.with_name(name), data)
+        print(f"{out}: {len(axis.writes)} writes, {len(axis.left_out)} rows left out")
+        for name in list(files)[1:]:
+            print(f"beside it: {name}")
+        for each in axis.left_out:
+            print(f"left out: {each.key}: {each.reason}")
+        for note in axis.notes:
+            print(f"note: {note}")
+
+    run(work)
+
+
+@app.command("compare")
+def compare(
+    file: Annotated[Path, typer.Argument(help="the controller's list")],
+    url: Annotated[str | None, typer.Argument(metavar="[BUS_URL]")] = None,
+    set_file: Annotated[Path | None, typer.Option("--set", help="our parameter set")] = None,
+    station: Station = 1,
+    profile: Profile = None,
+    server: Server = None,
+    as_json: Json = False,
+) -> None:
+    """Say what the controller will overwrite; exit code 0 where it could be compared."""
+
+    async def work() -> None:
+        if url is None and set_file is None:
+            raise NotAllowed(
+                f"{file.name} is compared with a set or with a drive",
+                remedy="add --set SET, or a BUS_URL with --station",
+            )
+        content = None if set_file is None else set_of(set_file)
+        now: Now | None = None
+        data = bytes_of(file)
+        if url is None:
+            assert content is not None
+            known = load_profile(content.profile)
+            listed = read_list(data, known, file.name)
+        else:
+            where = place(url, station, profile or (content and content.profile), server)
+            now = await values_now(where)
+            known = now.profile
+            _same_family(content, now)
+            listed = read_list(data, known, file.name)
+            now = await values_now(where, {write.key for write in listed.writes})
+        verdict = compared(
+            known, listed, None if content is None else _raws(content), now and now.raws
+        )
+        _show(verdict, listed.format, as_json=as_json)
+
+    run(work)
+
+
+def _same_family(content: ParameterSet | None, now: Now) -> None:
+    if content is not None and content.profile != now.profile.drive:
+        raise NotAllowed(
+            f"the set is of a {content.profile} drive, {now.name} is a {now.profile.drive}",
+            drive=now.name,
+            remedy="choose a set of the same drive family",
+        )
+
+
+def _show(verdict: Verdict, form: str, *, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps({"format": form, **asdict(verdict)}, indent=1))
+        return
+    for conflict in verdict.conflicts:
+        both = f" (drive now {conflict.drive})" if conflict.drive is not None else ""
+        print(f"{conflict.consequence}: {conflict.sentence}{both}")
+    for finding in verdict.findings:
+        print(f"{finding.kind}: {finding.text}")
+    print(
+        f"{form}: {len(verdict.conflicts)} conflicts, {verdict.same} equal, "
+        f"{len(verdict.findings)} defects of the list, {len(verdict.not_written)} values of the "
+        "set that the controller does not write"
+    )
+
+
+@app.command("watch")
+def watch(
+    file: Annotated[Path, typer.Argument(metavar="SET", help="set that was handed over")],
+    url: Url,
+    station: Station = 1,
+    profile: Profile = None,
+    server: Server = None,
+    as_json: Json = False,
+) -> None:
+    """Read again after a controller ran: which values have changed since the hand-over."""
+
+    async def work() -> None:
+        content = set_of(file)
+        ours = _raws(content)
+        now = await values_now(place(url, station, profile or content.profile, server), ours)
+        _same_family(content, now)
+        changes = changed_since(now.profile, ours, now.raws)
+        unread = sorted(key for key in ours if now.raws.get(key) is None)
+        if as_json:
+            found = {"changed": [asdict(each) for each in changes], "not_read": unread}
+            print(json.dumps(found, indent=1))
+            return
+        for each in changes:
+            print(f"{each.consequence}: {each.sentence}")
+        _tell_unread(unread)
+        print(f"{now.name}: {len(changes)} of {len(ours)} values changed since the hand-over")
+
+    run(work)
+
+
+def _tell_unread(keys: Iterable[str]) -> None:
+    for key in keys:
+        print(f"{key}: not read", file=sys.stderr)

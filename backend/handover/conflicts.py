@@ -1,0 +1,200 @@
+"""What a controller's list would overwrite, and what is wrong with the list itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from backend.handover.model import Consequence, StartupWrite, consequence, rank, write_of
+from backend.handover.read import ControllerList, Listed
+from backend.motion.classes import motion_of
+from drivers.codec import decode, encode, size_of
+from drivers.errors import DriveError
+from profiles.schema import Parameter, Profile, Raw
+
+Defect = Literal["unknown", "read_only", "size", "range", "twice", "order", "state", "energises"]
+#: On the way up, with the mailbox working (ETG.1000.6); empty where the format states none.
+_STATES = ("IP", "PS", "SO", "")
+
+
+@dataclass(frozen=True, slots=True)
+class Conflict:
+    """A value that the controller writes and that is another one in the set or in the drive.
+
+    ``ours`` and ``drive`` are None where they are not known or have no such value.
+    """
+
+    key: str
+    name: str
+    controller: Raw
+    ours: Raw | None
+    drive: Raw | None
+    consequence: Consequence
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A defect of the list, which the machine would find at start-up or later."""
+
+    kind: Defect
+    key: str
+    place: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A comparison: conflicts in the order of the list, and defects."""
+
+    conflicts: tuple[Conflict, ...]
+    findings: tuple[Finding, ...]
+    not_written: tuple[str, ...]
+    """Keys of our set that the controller does not write: these stay as the drive keeps them."""
+    same: int
+
+
+def value_of(profile: Profile, write: Listed) -> Raw | None:
+    """The raw value of a write, None where the object is unknown or its size another."""
+    parameter = profile.by_key.get(write.key)
+    if parameter is None or size_of(parameter.type) not in (None, len(write.data)):
+        return None
+    return decode(parameter.type, write.data)
+
+
+def resolved(profile: Profile, listed: ControllerList) -> tuple[StartupWrite, ...]:
+    """The list as writes of ours, which can be exported again; unknown objects are not in it."""
+    found = []
+    for write in listed.writes:
+        raw = value_of(profile, write)
+        if raw is not None:
+            transition = "SO" if write.transition == "SO" else "PS"
+            found.append(write_of(profile.by_key[write.key], raw, transition))
+    return tuple(found)
+
+
+def compare(
+    profile: Profile,
+    listed: ControllerList,
+    ours: Mapping[str, Raw] | None,
+    drive: Mapping[str, Raw | None] | None,
+) -> Verdict:
+    """Set against the controller's list against the drive, each where it is given.
+
+    The last write of an object counts, as it does in the drive.
+    """
+    conflicts: list[Conflict] = []
+    same = 0
+    last = {write.key: write for write in listed.writes}
+    for key, write in last.items():
+        raw = value_of(profile, write)
+        if raw is None:
+            continue
+        parameter = profile.by_key[key]
+        set_raw = ours.get(key) if ours else None
+        drive_raw = drive.get(key) if drive else None
+        known = [value for value in (set_raw, drive_raw) if value is not None]
+        if all(_equal(parameter, raw, value) for value in known):
+            same += bool(known)
+            continue
+        conflicts.append(_conflict(profile, parameter, raw, set_raw, drive_raw))
+    missing = tuple(key for key in ours or () if key not in last)
+    return Verdict(tuple(conflicts), diagnose(profile, listed), missing, same)
+
+
+def changed_since(
+    profile: Profile, ours: Mapping[str, Raw], drive: Mapping[str, Raw | None]
+) -> tuple[Conflict, ...]:
+    """Values of a set that the drive no longer holds; what could not be read is not told."""
+    found = []
+    for key, raw in ours.items():
+        parameter, now = profile.by_key.get(key), drive.get(key)
+        if parameter is None or now is None or _equal(parameter, raw, now):
+            continue
+        name = " ".join(parameter.name.split())
+        sentence = f"{name} ({key}) was handed over as {raw} and is {now} now (raw)"
+        kind = consequence(profile, parameter)
+        found.append(Conflict(key, name, now, raw, now, kind, sentence))
+    return tuple(found)
+
+
+def _equal(parameter: Parameter, one: Raw, other: Raw) -> bool:
+    """Equal on the wire: a REAL32 that was typed has more digits than it carries."""
+    try:
+        return encode(parameter.type, one) == encode(parameter.type, other)
+    except DriveError:
+        return one == other
+
+
+def _conflict(
+    profile: Profile, parameter: Parameter, raw: Raw, ours: Raw | None, drive: Raw | None
+) -> Conflict:
+    kind = consequence(profile, parameter)
+    before = ours if ours is not None else drive
+    name = " ".join(parameter.name.split())
+    change = f"{before} becomes {raw} (raw)"
+    sentences: dict[Consequence, str] = {
+        "gain": f"the controller will undo your tuning of {name} ({parameter.key}): {change}",
+        "limit": f"the controller will change the limit {name} ({parameter.key}): {change}",
+        "unit": f"the controller will change units or gearing, {name} ({parameter.key}): {change}; "
+        "every position and speed then means something else",
+        "motion": f"the controller will write {name} ({parameter.key}), which can move the motor: "
+        f"{change}",
+        "other": f"the controller will overwrite {name} ({parameter.key}): {change}",
+    }
+    return Conflict(parameter.key, name, raw, ours, drive, kind, sentences[kind])
+
+
+def diagnose(profile: Profile, listed: ControllerList) -> tuple[Finding, ...]:
+    """Defects of a list by the family's profile."""
+    found: list[Finding] = []
+    seen: dict[str, str] = {}
+    highest, before = -1, ""
+    for write in listed.writes:
+        parameter = profile.by_key.get(write.key)
+
+        def tell(kind: Defect, text: str, at: Listed = write) -> None:
+            found.append(Finding(kind, at.key, at.place, f"{at.place}: {at.key}: {text}"))
+
+        if write.key in seen:
+            tell("twice", f"written before at {seen[write.key]}; the last value counts")
+        seen.setdefault(write.key, write.place)
+        if write.transition not in _STATES:
+            tell("state", f"written at {write.transition[:10]}, which is not on the way up")
+        if parameter is None:
+            tell("unknown", f"{profile.title} has no such object")
+            continue
+        _check(parameter, write, tell)
+        place = rank(profile, parameter)
+        if listed.ordered and place == 0 < highest:
+            tell("order", f"units or gearing are written after {before}, which depends on them")
+        if place > highest:
+            highest, before = place, write.key
+    return tuple(found)
+
+
+class _Tell(Protocol):
+    """The function that notes a finding."""
+
+    def __call__(self, kind: Defect, text: str) -> None: ...
+
+
+def _check(parameter: Parameter, write: Listed, tell: _Tell) -> None:
+    if parameter.access == "ro":
+        tell("read_only", "it is read only; the drive refuses and the controller stays in Pre-Op")
+        return
+    if motion_of(parameter) == "energises":
+        tell("energises", "writing it can move the motor; it has no place in a start-up list")
+    size = size_of(parameter.type)
+    if size is None:
+        return
+    if size != len(write.data):
+        tell("size", f"{len(write.data)} bytes for a {parameter.type} of {size}")
+        return
+    raw = decode(parameter.type, write.data)
+    low, high = parameter.raw_limits
+    if not isinstance(raw, str) and (
+        (low is not None and raw < low) or (high is not None and raw > high)
+    ):
+        tell("range", f"{raw} is outside {low} to {high}")

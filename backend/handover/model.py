@@ -1,0 +1,315 @@
+"""What is handed over: start-up writes of one axis, with its process data and cycle.
+
+Pure: a parameter set and the family's profile in, writes out. Nothing here reaches a bus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Literal
+
+from backend.motion.classes import motion_of
+from backend.parameters.set_file import ParameterSet
+from drivers.codec import encode, size_of
+from drivers.errors import DriveError, NotAllowed
+from profiles.schema import DataType, Parameter, Profile, Raw
+
+Transition = Literal["PS", "SO"]
+Consequence = Literal["motion", "unit", "limit", "gain", "other"]
+Choice = Literal["all", "tuned", "not_default"]
+
+#: CoE start-up values are written from Pre-Operational to Safe-Operational (ETG.1000.6: SDO works
+#: from Pre-Operational on), before process data flow. No profile names an object that needs later.
+DEFAULT_TRANSITION: Transition = "PS"
+#: Cycle that is proposed where the profile prints no longer minimum.
+PROPOSED_CYCLE_US = 1000
+#: SYNC0 without SYNC1 (ETG.1020 AssignActivate); the drive's ESI file has the last word.
+ASSIGN_ACTIVATE = 0x0300
+
+_UNITS = {"607E", "608F", "6091", "6092", "6093", "6096", "6097", "60A8", "60A9", "60AA", "60AB"}
+_LIMITS = {
+    "6065", "6066", "6067", "6068", "6072", "6073", "607B", "607D", "607F", "6080", "60C5", "60C6",
+    "60E0", "60E1",
+}  # fmt: skip
+_RANK: dict[Consequence, int] = {"unit": 0, "limit": 1, "motion": 2, "other": 2, "gain": 3}
+
+
+@dataclass(frozen=True, slots=True)
+class StartupWrite:
+    """One SDO download of a start-up list. ``raw`` travels little endian in the type's size."""
+
+    index: int
+    subindex: int
+    type: DataType
+    raw: Raw
+    key: str
+    name: str
+    transition: Transition = DEFAULT_TRANSITION
+    comment: str = ""
+
+    @property
+    def data(self) -> bytes:
+        """Bytes as they travel (CiA 301 clause 7.1.4)."""
+        return encode(self.type, self.raw)
+
+    @property
+    def number(self) -> int:
+        """The bytes as one unsigned number."""
+        return int.from_bytes(self.data, "little")
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """A row of the set that is not handed over, and why."""
+
+    key: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class MappedEntry:
+    """An object of a PDO; ``index`` 0 is padding."""
+
+    index: int
+    subindex: int
+    bits: int
+    name: str
+    type: DataType | None
+
+
+@dataclass(frozen=True, slots=True)
+class MappedPdo:
+    """One PDO that the controller assigns."""
+
+    index: int
+    direction: Literal["rx", "tx"]
+    fixed: bool
+    entries: tuple[MappedEntry, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AxisHandover:
+    """Everything that a format writes down about one axis."""
+
+    name: str
+    profile: Profile
+    vendor_id: int | None
+    product_code: int | None
+    revision: int | None
+    writes: tuple[StartupWrite, ...]
+    left_out: tuple[LeftOut, ...]
+    pdos: tuple[MappedPdo, ...]
+    cycle_us: int
+    distributed_clock: bool
+    notes: tuple[str, ...] = ()
+
+    def identity(self) -> tuple[int, int]:
+        """Vendor and product, which a controller compares with the drive.
+
+        Raises:
+            NotAllowed: the set does not state them, nor does the profile.
+        """
+        if self.vendor_id is None or self.product_code is None:
+            raise NotAllowed(
+                f"{self.name}: the set states neither vendor ID nor product code (1018h), and this "
+                "format needs both",
+                drive=self.name,
+                remedy="save the set from the drive itself, or export twincat, codesys, igh or csv",
+            )
+        return self.vendor_id, self.product_code
+
+
+def gain_keys(profile: Profile) -> frozenset[str]:
+    """Keys that tuning changes: loop gains, filters, notches and the stiffness level."""
+    found: set[str] = set()
+    if (gains := profile.gains) is not None:
+        found |= {
+            key
+            for key in (
+                gains.position, gains.speed, gains.integral, gains.torque_filter,
+                gains.current_bandwidth, gains.speed_filter, gains.inertia,
+            )
+            if key
+        }  # fmt: skip
+    if (notch := profile.notch) is not None:
+        for slot in notch.slots:
+            found |= {
+                value for field, value in slot if field.endswith("_key") and isinstance(value, str)
+            }
+    for table in profile.stiffness:
+        found |= {table.level_key, *table.columns}
+        found |= {table.mode_key} if table.mode_key else set()
+    return frozenset(found)
+
+
+def consequence(profile: Profile, parameter: Parameter) -> Consequence:
+    """What a wrong value of this parameter spoils, by the profile's data."""
+    if motion_of(parameter) == "energises":
+        return "motion"
+    units = profile.units
+    gearing = {units.gear_numerator, units.gear_denominator, units.feed, units.feed_revolutions}
+    if parameter.key in gearing or parameter.key[:4] in _UNITS:
+        return "unit"
+    if parameter.key in gain_keys(profile):
+        return "gain"
+    limits = {s.key for s in profile.signals if "limit" in s.role or s.role.startswith("max_")}
+    limits |= {s.key for s in profile.signals if s.role.startswith("following_error_")}
+    if parameter.key in limits or parameter.key[:4] in _LIMITS:
+        return "limit"
+    return "other"
+
+
+def rank(profile: Profile, parameter: Parameter) -> int:
+    """Place in the order of writing: units, limits, what else, gains."""
+    return _RANK[consequence(profile, parameter)]
+
+
+def hand_over(
+    content: ParameterSet,
+    profile: Profile,
+    *,
+    choice: Choice = "all",
+    only: Collection[str] = (),
+    motor_individual: bool = False,
+) -> AxisHandover:
+    """The start-up writes of a set.
+
+    Raises:
+        NotAllowed: the set is of another family, a key of ``only`` is not in it, or nothing is
+            left to write.
+    """
+    if content.profile != profile.drive:
+        raise NotAllowed(
+            f"the set is of a {content.profile} drive, not of {profile.drive}",
+            remedy="use the profile that the set names",
+        )
+    missing = sorted(set(only) - {row.key for row in content.rows})
+    if missing:
+        raise NotAllowed(
+            f"the set has no value of {', '.join(missing)}", remedy="name keys that are in the set"
+        )
+    tuned = gain_keys(profile)
+    writes: list[StartupWrite] = []
+    left: list[LeftOut] = []
+    seen: set[str] = set()
+    for row in content.rows:
+        parameter = profile.by_key.get(row.key)
+        if only and row.key not in only:
+            continue
+        if choice == "tuned" and row.key not in tuned:
+            continue
+        if choice == "not_default" and parameter and row.raw == parameter.default_raw:
+            continue
+        why = _why_not(parameter, row.raw, motor_individual=motor_individual)
+        if row.key in seen:
+            why = "given twice in the set; the first one counts"
+        seen.add(row.key)
+        if why or parameter is None or row.raw is None:
+            left.append(LeftOut(row.key, row.problem or why))
+            continue
+        writes.append(write_of(parameter, row.raw))
+    if not writes:
+        raise NotAllowed(
+            "nothing of the set can be handed over"
+            + (f" ({left[0].key}: {left[0].reason})" if left else ""),
+            remedy="choose other rows",
+        )
+    writes.sort(key=lambda w: (rank(profile, profile.by_key[w.key]), w.index, w.subindex))
+    return _axis(content, profile, writes, left)
+
+
+def write_of(parameter: Parameter, raw: Raw, transition: Transition = "PS") -> StartupWrite:
+    """The write of a value; ``parameter`` has an object."""
+    assert parameter.index is not None
+    assert parameter.subindex is not None
+    return StartupWrite(
+        parameter.index, parameter.subindex, parameter.type, raw, parameter.key,
+        " ".join(parameter.name.split()), transition,
+    )  # fmt: skip
+
+
+def _why_not(parameter: Parameter | None, raw: Raw | None, *, motor_individual: bool) -> str:
+    """Why a row has no place in a start-up list; empty where it has."""
+    if parameter is None:
+        return "the family has no such parameter"
+    if raw is None:
+        return "the row of the set is bad"
+    if parameter.index is None:
+        return "only Modbus reaches it: a start-up list of objects cannot write it"
+    if parameter.access == "ro":
+        return "read only"
+    if motion_of(parameter) == "energises":
+        return "writing it can move the motor: it has no place in a start-up list"
+    if parameter.motor_individual and not motor_individual:
+        return "belongs to one motor; --motor-individual includes it"
+    if size_of(parameter.type) is None:
+        return "text and octets have no fixed size"
+    low, high = parameter.raw_limits
+    try:
+        encode(parameter.type, raw)
+    except DriveError as error:
+        return error.message
+    if not isinstance(raw, str) and (
+        (low is not None and raw < low) or (high is not None and raw > high)
+    ):
+        return f"{raw} is outside {low} to {high}"
+    return ""
+
+
+def _axis(
+    content: ParameterSet, profile: Profile, writes: list[StartupWrite], left: list[LeftOut]
+) -> AxisHandover:
+    notes: list[str] = []
+    quirk = profile.quirk("write_settings")
+    if quirk is not None:
+        notes.append(f"{quirk.key}: {' '.join(quirk.help.split())}")
+    late: dict[str, list[str]] = {}
+    for write in writes:
+        effective = profile.by_key[write.key].effective
+        if effective in ("power_cycle", "write_settings"):
+            late.setdefault(effective, []).append(write.key)
+    for effective, keys in late.items():
+        notes.append(f"act only after {effective.replace('_', ' ')}: {', '.join(keys)}")
+    ident = profile.identity
+    pdo = profile.pdo
+    return AxisHandover(
+        name=content.drive_name or profile.title,
+        profile=profile,
+        vendor_id=content.vendor_id if content.vendor_id is not None else ident.vendor_id,
+        product_code=(
+            content.product_code if content.product_code is not None else ident.product_code
+        ),
+        revision=content.revision,
+        writes=tuple(writes),
+        left_out=tuple(left),
+        pdos=_pdos(profile),
+        cycle_us=max(PROPOSED_CYCLE_US, (pdo.cycle_min_us or 0) if pdo else 0),
+        distributed_clock=bool(pdo and "DC-synchronous" in pdo.sync_modes),
+        notes=tuple(notes),
+    )
+
+
+def _pdos(profile: Profile) -> tuple[MappedPdo, ...]:
+    """The two PDOs that are assigned by default, as the profile prints them."""
+    if profile.pdo is None:
+        return ()
+    found = []
+    for pdo in profile.pdo.sets:
+        if pdo.index not in (profile.pdo.default_rx, profile.pdo.default_tx):
+            continue
+        entries = []
+        for part in pdo.layout:
+            entries.append(_entry(profile, part.key, part.bits))
+        for key in () if pdo.layout else pdo.entries:
+            entries.append(_entry(profile, key, 8 * (size_of(profile.by_key[key].type) or 0)))
+        found.append(MappedPdo(pdo.index, pdo.direction, pdo.fixed, tuple(entries)))
+    return tuple(found)
+
+
+def _entry(profile: Profile, key: str | None, bits: int) -> MappedEntry:
+    if key is None:
+        return MappedEntry(0, 0, bits, "padding", None)
+    parameter = profile.by_key[key]
+    name = " ".join(parameter.name.split())
+    return MappedEntry(parameter.index or 0, parameter.subindex or 0, bits, name, parameter.type)

@@ -1,0 +1,304 @@
+"""Start-up lists of a controller, read back: what it will write, in its order.
+
+A file is taken by its contents, not by its name. What is broken as a whole is refused with one
+error; a bad row is refused with its place, for a list that is read in part compares wrongly.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+from xml.etree.ElementTree import Element, ParseError
+
+import yaml
+from defusedxml.common import DefusedXmlException
+from defusedxml.ElementTree import fromstring
+
+from backend.parameters.set_file import BadSet
+from drivers.codec import encode
+from drivers.errors import DriveError
+from profiles.importer import ImportFailed, ImportReport, is_dcf, read_dcf_values
+from profiles.importer.values import default_value
+from profiles.schema import INTEGER_RANGE, DataType, Profile
+
+MAX_BYTES = 8_000_000
+_MAX_WRITES = 20_000
+#: What the parsers raise; LookupError is an encoding that nobody knows.
+_DAMAGED = (
+    ParseError, ImportFailed, ValueError, LookupError, yaml.YAMLError, csv.Error, RecursionError,
+)  # fmt: skip
+_DOWNLOAD = re.compile(r"^\s*ethercat\s+.*\bdownload\b(?P<rest>.*)$")
+_SIZE = {"bool": 1, "int8": 1, "uint8": 1, "sm8": 1, "int16": 2, "uint16": 2, "sm16": 2,
+         "int32": 4, "uint32": 4, "sm32": 4, "float": 4, "int64": 8, "uint64": 8,
+         "sm64": 8, "double": 8}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """One write of a controller's list. ``transition`` is empty where the format states none."""
+
+    index: int
+    subindex: int
+    data: bytes
+    transition: str
+    place: str
+
+    @property
+    def key(self) -> str:
+        """As a profile's key, 6081:00."""
+        return f"{self.index:04X}:{self.subindex:02X}"
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerList:
+    """A list: its format and writes in their order; ``ordered`` tells whether order counts."""
+
+    format: str
+    writes: tuple[Listed, ...]
+    ordered: bool = True
+
+
+class _Bad(ValueError):
+    """A row that cannot be read; the message has its place."""
+
+
+def read_list(data: bytes, profile: Profile, name: str = "the file") -> ControllerList:
+    """A controller's list in any of the formats that are exported, but the Python script.
+
+    Raises:
+        BadSet: too large, of no such format, damaged, or without a single write.
+    """
+    if len(data) > MAX_BYTES:
+        raise BadSet(f"{name} is larger than {MAX_BYTES} bytes", remedy="choose another file")
+    try:
+        found = _by_contents(data, profile, name)
+    except DefusedXmlException as error:
+        raise BadSet(
+            f"{name} defines XML entities, which no start-up list needs and an attack does",
+            remedy="export the list again",
+        ) from error
+    except _DAMAGED as e:
+        told = " ".join(str(e).split())[:200]
+        raise BadSet(f"{name} is damaged: {told}", remedy="export the list again") from e
+    if not found.writes:
+        raise BadSet(f"{name} writes nothing at start-up", remedy="choose a list with writes")
+    if len(found.writes) > _MAX_WRITES:
+        raise BadSet(f"{name} has more than {_MAX_WRITES} writes", remedy="choose another file")
+    return found
+
+
+def _by_contents(data: bytes, profile: Profile, name: str) -> ControllerList:
+    head = data[:4096].lstrip(b"\xef\xbb\xbf \t\r\n")
+    if head.startswith((b"<", b"\xff\xfe", b"\xfe\xff")):
+        return _xml(data, name)
+    if is_dcf(data):
+        return _dcf(data, profile, name)
+    text = data.decode("utf-8-sig")
+    if head.startswith(b"Line;"):
+        return ControllerList("codesys", tuple(_codesys(text)))
+    if head.startswith(b"key,"):
+        return ControllerList("csv", tuple(_csv(text)))
+    if any(_DOWNLOAD.match(line) for line in text.splitlines()):
+        return ControllerList("igh", tuple(_igh(text)))
+    if re.search(r"^\s*(sdo|vendor_id)\s*:", text, re.M):
+        return ControllerList("ros2", tuple(_ros2(text, profile)))
+    raise BadSet(
+        f"{name} is no start-up list that is known here",
+        remedy="give TwinCAT, CODESYS or ENI, lcec XML, ROS 2 YAML, an ethercat script, DCF or CSV",
+    )
+
+
+def _number(text: str | None, place: str, *, base: int = 0) -> int:
+    """A number; with base 0 also #x, 16# and 0x."""
+    word = (text or "").strip()
+    for prefix in ("#x", "16#", "0x", "0X"):
+        if word.lower().startswith(prefix):
+            word, base = word[len(prefix) :], 16
+    try:
+        # A decimal with leading zeros is none of Python's, but of everybody else's.
+        return int(word, base or 10)
+    except ValueError as error:
+        raise _Bad(f"{place}: {word[:40]!r} is no number") from error
+
+
+def _listed(index: int, subindex: int, data: bytes, transition: str, place: str) -> Listed:
+    if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
+        raise _Bad(f"{place}: {index:X}h:{subindex} is no object")
+    if not data:
+        raise _Bad(f"{place}: {index:04X}h:{subindex} has no data")
+    return Listed(index, subindex, data, transition, place)
+
+
+def _hex(text: str | None, place: str) -> bytes:
+    try:
+        return bytes.fromhex((text or "").strip())
+    except ValueError as error:
+        raise _Bad(f"{place}: {(text or '')[:40]!r} is no row of bytes") from error
+
+
+def _sized(value: int, size: int, place: str) -> bytes:
+    if not -(1 << (8 * size - 1)) <= value < 1 << (8 * size):
+        raise _Bad(f"{place}: {value} does not fit {size} bytes")
+    return (value % (1 << (8 * size))).to_bytes(size, "little")
+
+
+def _xml(data: bytes, name: str) -> ControllerList:
+    root = fromstring(data, forbid_dtd=True)
+    if root.tag == "masters":
+        return ControllerList("lcec", tuple(_lcec(root, name)))
+    if root.tag in ("EtherCATMailbox", "EtherCATConfig", "TreeItem"):
+        form = "eni" if root.tag == "EtherCATConfig" else "twincat"
+        return ControllerList(form, tuple(_init_commands(root, name)))
+    raise BadSet(
+        f"{name} is XML of another kind: its root is {str(root.tag)[:60]}",
+        remedy="give an EtherCATMailbox, EtherCATConfig or lcec masters file",
+    )
+
+
+def _one(elements: list[Element], what: str, name: str) -> Element:
+    if len(elements) != 1:
+        raise BadSet(
+            f"{name} has {len(elements)} {what}; one drive is compared at a time",
+            remedy="give a file with one slave",
+        )
+    return elements[0]
+
+
+def _init_commands(root: Element, name: str) -> Iterator[Listed]:
+    slave = root
+    if root.tag == "EtherCATConfig":
+        slave = _one(root.findall("./Config/Slave"), "slaves", name)
+    for number, command in enumerate(slave.iterfind(".//CoE/InitCmds/InitCmd"), 1):
+        place = f"InitCmd {number}"
+        if command.get("CompleteAccess", "0").lower() in ("1", "true"):
+            raise _Bad(f"{place}: complete access is not read: write its subindexes singly")
+        ccs = command.findtext("Ccs")
+        if ccs is not None and _number(ccs, place) != 1:
+            continue  # an upload reads
+        transitions = [each.text or "" for each in command.findall("Transition")]
+        yield _listed(
+            _number(command.findtext("Index"), place), _number(command.findtext("SubIndex"), place),
+            _hex(command.findtext("Data"), place), transitions[0] if transitions else "", place,
+        )  # fmt: skip
+
+
+def _lcec(root: Element, name: str) -> Iterator[Listed]:
+    slave = _one(root.findall("./master/slave"), "slaves", name)
+    for number, config in enumerate(slave.findall("sdoConfig"), 1):
+        place = f"sdoConfig {number}"
+        if config.get("subIdx") == "complete":
+            raise _Bad(f"{place}: complete access is not read: write its subindexes singly")
+        index = _number(config.get("idx"), place, base=16)
+        subindex = _number(config.get("subIdx"), place, base=16)
+        raw = config.findall("sdoDataRaw")
+        data = b"".join(_hex(each.get("data"), place) for each in raw)
+        yield _listed(index, subindex, data, "PS", place)
+
+
+def _codesys(text: str) -> Iterator[Listed]:
+    for number, row in enumerate(csv.DictReader(io.StringIO(text), delimiter=";"), 2):
+        place = f"line {number}"
+        index, _, subindex = (row.get("Index:Subindex") or "").partition(":")
+        bits = _number(row.get("Bit length"), place)
+        if bits % 8 or not 8 <= bits <= 64:
+            raise _Bad(f"{place}: a bit length of {bits} is no whole number of bytes")
+        value = _sized(_number(row.get("Value"), place), bits // 8, place)
+        yield _listed(_number(index, place), _number(subindex, place), value, "PS", place)
+
+
+def _csv(text: str) -> Iterator[Listed]:
+    for number, row in enumerate(csv.DictReader(io.StringIO(text)), 2):
+        place = f"line {number}"
+        yield _listed(
+            _number(row.get("index"), place), _number(row.get("subindex"), place),
+            _hex(row.get("data"), place), row.get("transition") or "", place,
+        )  # fmt: skip
+
+
+def _igh(text: str) -> Iterator[Listed]:
+    for number, line in enumerate(text.splitlines(), 1):
+        match = _DOWNLOAD.match(line)
+        if match is None:
+            continue
+        place = f"line {number}"
+        kind, plain = _download_words(match["rest"].split())
+        if len(plain) != 3 or kind not in _SIZE or kind in ("float", "double"):
+            raise _Bad(f"{place}: a download of type, index, subindex and whole number is read")
+        data = _sized(_number(plain[2], place), _SIZE[kind], place)
+        yield _listed(_number(plain[0], place), _number(plain[1], place), data, "PS", place)
+
+
+def _download_words(words: list[str]) -> tuple[str, list[str]]:
+    """Type and the words that are no option."""
+    kind, plain, rest = "", [], iter(words)
+    for word in rest:
+        if word in ("-t", "--type"):
+            kind = next(rest, "")
+        elif word.startswith("--type="):
+            kind = word.removeprefix("--type=")
+        elif word in ("-p", "-a", "-m", "--position", "--alias", "--master"):
+            next(rest, "")
+        elif word != "--":
+            plain.append(word)
+    return kind, plain
+
+
+def _ros2(text: str, profile: Profile) -> Iterator[Listed]:
+    # Aliases make a small file as large as a bomb, and no slave file has them.
+    for event in yaml.parse(text, yaml.SafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            raise _Bad("YAML aliases are not read")
+    content = yaml.safe_load(text)
+    rows = content.get("sdo") if isinstance(content, dict) else None
+    if rows is None and isinstance(content, dict):
+        nodes = [n for n in content.values() if isinstance(n, dict) and "sdo" in n]
+        rows = nodes[0]["sdo"] if len(nodes) == 1 else None
+    for number, row in enumerate(rows if isinstance(rows, list) else [], 1):
+        place = f"sdo {number}"
+        if not isinstance(row, dict):
+            raise _Bad(f"{place}: is no row of index, sub_index and value")
+        index, subindex, value = (_whole(row, f, place) for f in ("index", "sub_index", "value"))
+        kind = row.get("type") or _profile_type(profile, index, subindex)
+        if kind not in _SIZE:
+            raise _Bad(f"{place}: type {str(kind)[:40]!r} is not known")
+        data = _sized(value, _SIZE[kind], place)
+        yield _listed(index, subindex, data, "PS", place)
+
+
+def _profile_type(profile: Profile, index: int, subindex: int) -> str:
+    """bus.yml gives no type: that of the object counts."""
+    parameter = profile.by_key.get(f"{index:04X}:{subindex:02X}")
+    if parameter is None:
+        return "int32"
+    return {"REAL32": "uint32"}.get(parameter.type, parameter.type.lower())
+
+
+def _whole(row: dict[Any, Any], field: str, place: str) -> int:
+    value = row.get(field)
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise _Bad(f"{place}: {field} {str(value)[:40]!r} is no whole number")
+    return value
+
+
+def _dcf(data: bytes, profile: Profile, name: str) -> ControllerList:
+    """Values of a DCF, whose order is that of the objects and says nothing of the writing."""
+    report = ImportReport()
+    writes = []
+    for value in read_dcf_values(data, name, report):
+        place = f"line {value.line}"
+        parameter = profile.by_key.get(f"{value.index:04X}:{value.subindex:02X}")
+        kind: DataType = parameter.type if parameter else "UINT32"
+        if parameter is not None and kind not in INTEGER_RANGE and kind != "REAL32":
+            continue
+        raw, _ = default_value(value.text, kind, place, report)
+        if raw is None:
+            raise _Bad(f"{place}: {value.text[:40]!r} is no {kind}")
+        try:
+            writes.append(_listed(value.index, value.subindex, encode(kind, raw), "", place))
+        except DriveError as error:
+            raise _Bad(f"{place}: {error.message}") from error
+    return ControllerList("dcf", tuple(writes), ordered=False)
