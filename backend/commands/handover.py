@@ -26,7 +26,9 @@ from drivers.errors import NotAllowed
 from profiles import load_profile
 from profiles.schema import Raw
 
-app = typer.Typer(help="Hand values over to a machine's controller. Nothing is written to a drive.")
+app = typer.Typer(
+    help="Start-up lists for a machine's controller: write, compare, watch. Writes to no drive."
+)
 
 
 def _raws(content: ParameterSet) -> dict[str, Raw]:

@@ -23,7 +23,7 @@ from backend.people.login.turns import HashTurns
 from backend.people.passwords import Passwords, require_good
 from backend.people.records import Account, LoginSession, Token, read
 from backend.people.rights import ACCOUNT_ROLES, RIGHTS, Right, Role
-from backend.store import Store
+from backend.store.database import Store
 from drivers.errors import NotAllowed
 
 LONGEST_TOKEN = timedelta(days=366)

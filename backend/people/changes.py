@@ -14,7 +14,7 @@ from backend.people.credentials import name_key
 from backend.people.records import Account, LoginSession, Token
 from backend.people.rights import Role
 from backend.people.tables import AccountRow, SessionRow, TokenRow
-from backend.store import Store
+from backend.store.database import Store
 
 
 def add_account(store: Store, name: str, role: Role, password: str, created: datetime) -> Account:

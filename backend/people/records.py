@@ -9,7 +9,7 @@ from sqlalchemy import select
 
 from backend.people.rights import Right, Role
 from backend.people.tables import AccountRow, SessionRow, TokenRow
-from backend.store import Store
+from backend.store.database import Store
 
 #: A session ends this long after its last use, and at the latest this long after the log-in.
 IDLE = timedelta(hours=2)

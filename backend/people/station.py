@@ -19,7 +19,7 @@ from backend.people.passwords import Passwords
 from backend.people.records import Account, LoginSession
 from backend.people.rights import RIGHTS
 from backend.people.support import Support
-from backend.store import Store
+from backend.store.database import Store
 from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed
 

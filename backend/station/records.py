@@ -12,8 +12,8 @@ from backend.audit.trail import Trail
 from backend.library import Library, LibrarySets
 from backend.library.described import folders
 from backend.library.index import Index
-from backend.store import DatabaseFailed, Store
 from backend.store.blobs import Blobs
+from backend.store.database import DatabaseFailed, Store
 from backend.store.files import StorageFailed
 from backend.store.lock import FolderLock
 from backend.work.journal import Journal

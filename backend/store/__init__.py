@@ -1,6 +1,1 @@
-"""The station's database: accounts, library and audit, on SQLite or PostgreSQL."""
-
-from backend.store.base import Base, UtcDateTime
-from backend.store.database import DatabaseFailed, Store
-
-__all__ = ["Base", "DatabaseFailed", "Store", "UtcDateTime"]
+"""Database and files of a station: tables, migrations, blobs, backup."""

@@ -21,9 +21,9 @@ from backend.cli import app
 from backend.library import Library
 from backend.library.catalogue import INLINE
 from backend.library.entries import Addition, AxisIdentity, Query
-from backend.store import Store
 from backend.store.backup import BackupFailed, make_backup
 from backend.store.blobs import Blobs
+from backend.store.database import Store
 from backend.store.lock import FolderLock
 from backend.store.restore import restore
 from drivers.errors import NotAllowed

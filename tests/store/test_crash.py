@@ -25,7 +25,7 @@ from backend.audit.trail import Filter, Trail
 from backend.library.entries import Addition
 from backend.recording.reader import RecordingReader
 from backend.station.records import Records
-from backend.store import DatabaseFailed, Store
+from backend.store.database import DatabaseFailed, Store
 from backend.store.library_tables import Version
 from backend.work.journal import Journal
 from tests.support.postgres import Postgres

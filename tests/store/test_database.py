@@ -16,7 +16,8 @@ from sqlalchemy.exc import DBAPIError
 import backend.people.tables
 import backend.store.audit_tables
 import backend.store.library_tables  # noqa: F401 - registers its tables
-from backend.store import Base, DatabaseFailed, Store
+from backend.store.base import Base
+from backend.store.database import DatabaseFailed, Store
 from backend.store.library_tables import Item
 
 

@@ -15,8 +15,8 @@ from backend.audit import Fact
 from backend.library import Library, LibrarySets, NotInLibrary
 from backend.library.catalogue import INLINE
 from backend.library.entries import Addition, AxisIdentity, Query
-from backend.store import Store
 from backend.store.blobs import BlobFailed, Blobs
+from backend.store.database import Store
 from drivers.errors import NotAllowed
 
 X = AxisIdentity("mms7", "X", vendor_id=0x4000_0001, serial=4_000_000_000, firmware="1.2")

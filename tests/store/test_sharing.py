@@ -16,8 +16,8 @@ from backend.library.entries import Addition, Entry, Query
 from backend.library.index import Index
 from backend.library.measurements import MeasurementStore
 from backend.library.sharing import fetch, share
-from backend.store import Store
 from backend.store.blobs import BlobFailed, Blobs
+from backend.store.database import Store
 from drivers.errors import NotAllowed
 
 NAME = "20261121-101500-sweep-X.sdmeas"

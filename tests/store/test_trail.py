@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 from backend.audit import AuditLog, Fact
 from backend.audit.trail import Filter, Trail
-from backend.store import Store
+from backend.store.database import Store
 
 
 def test_search(store: Store) -> None:

@@ -20,7 +20,7 @@ from backend.audit.chain import Anchor
 from backend.audit.facts import body_of
 from backend.audit.pending import PendingFile
 from backend.audit.trail import Filter, Trail
-from backend.store import DatabaseFailed, Store
+from backend.store.database import DatabaseFailed, Store
 from tests.support.station import until
 
 
