@@ -242,7 +242,7 @@ class Bench:
         if member is None:
             return True
         moved = self.jobs.moving(drive_id) is not None or self.motion.stopping(drive_id)
-        return moved or member.axis.left_enabled
+        return moved or self.authority.grant_of(drive_id) is not None
 
     async def remove(self, drive_id: str) -> None:
         """Take a drive off the bench.

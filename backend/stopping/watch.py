@@ -13,6 +13,7 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable
 
+from backend.axis import loop
 from backend.axis.axis import Axis
 from backend.axis.restoring import shielded
 from backend.stopping.facts import AxisStop, StepCode, Verdict
@@ -216,9 +217,9 @@ class StopWatch:
 
     async def _power_off(self) -> None:
         axis = self._axis
-        power, session = axis.cyclic_power(), axis.session
-        if power is not None and session is not None:
-            await power.drive_to(session.station(axis.drive), State.SWITCH_ON_DISABLED)
+        session = axis.session
+        if axis.cyclic_power() is not None and session is not None:
+            await loop.lower(session, axis.drive, State.SWITCH_ON_DISABLED)
         else:
             await axis.control(cia402.DISABLE_VOLTAGE)
 

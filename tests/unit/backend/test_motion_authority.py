@@ -159,6 +159,17 @@ async def test_an_axis_left_enabled_by_a_script_loses_its_power(
     assert bench.authority.grant_of("x") is None
 
 
+async def test_only_a_live_grant_permits_an_axis_left_enabled_to_turn(
+    x: Member, bench: Bench
+) -> None:
+    assert not bench._may_turn("x")
+    await x.axis.transition(State.OPERATION_ENABLED, Mode.PV)
+    assert bench._may_turn("x")
+    bench.authority.revoke("x", "its time is over")
+    assert x.axis.left_enabled
+    assert not bench._may_turn("x")
+
+
 # --- classes ----------------------------------------------------------------------------
 
 
@@ -240,8 +251,8 @@ async def test_commands_are_no_settings() -> None:
 ROOT = Path(__file__).resolve().parents[3] / "backend"
 #: Who may call the loop or write to a link past `Drive`, and why.
 ALLOWED = {
-    "drive_to": {"motion/loop.py"},
-    "play": {"motion/loop.py"},
+    "drive_to": {"axis/loop.py"},
+    "play": {"axis/loop.py"},
 }
 
 
@@ -271,4 +282,17 @@ def test_nothing_writes_to_a_link_past_the_drive() -> None:
             of_link = isinstance(owner, ast.Attribute) and owner.attr == "link"
             if node.func.attr == "write" and of_link:
                 found.add(path.relative_to(ROOT).as_posix())
-    assert found == {"drive.py", "power.py"}
+    assert found == {"drive/drive.py", "axis/power.py"}
+
+
+def test_only_stop_brakes_without_a_grant() -> None:
+    """`Drive.stop_by` writes what could move an axis at another time."""
+    found = set()
+    house = ROOT.parent
+    for room in ("backend", "drivers", "profiles", "benchmarks"):
+        for path in (house / room).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+                # Also a mention that is no call: a bound method can be handed on.
+                if isinstance(node, ast.Attribute) and node.attr == "stop_by":
+                    found.add(path.relative_to(house).parent.as_posix())
+    assert found == {"backend/stopping"}
