@@ -34,7 +34,7 @@ SAVED = datetime(2026, 3, 4, 5, 6, tzinfo=UTC)
 def profile_of(family: str) -> Profile:
     if family != "imported":
         return load_profile(family)
-    # Standard objects alone and an identity of its own, as of a drive that a maker's file describes.
+    # Standard objects alone and a name of its own, as of a drive that a file describes.
     base = load_profile("generic402")
     return base.model_copy(update={"drive": "maker_x", "title": "Maker X"})
 
