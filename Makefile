@@ -10,7 +10,7 @@ PAGE := webui/dist/index.html
 PAGE_SOURCES := $(shell find webui/src webui/public -type f 2>/dev/null) webui/index.html \
 	webui/package.json webui/package-lock.json webui/vite.config.ts
 
-.PHONY: install run test bench fmt docs page clean check-python supply-chain audit
+.PHONY: install run test bench fmt docs page clean check-python supply-chain wheels audit
 
 install: $(VENV)/.installed $(PAGE) ## the virtual environment with the product in it
 
@@ -37,6 +37,9 @@ check-python:
 
 supply-chain: $(VENV)/.dev webui/node_modules/.package-lock.json ## locks, bill of materials (CycloneDX) and NOTICE, made anew
 	$(BIN)/python -m supply
+
+wheels: $(VENV)/.dev ## whether every package comes as a wheel for every system; asks the package index
+	$(BIN)/python -m supply.wheels
 
 audit: $(VENV)/.dev ## known weaknesses of the locked packages; asks their registries
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-audit
