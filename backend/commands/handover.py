@@ -113,7 +113,8 @@ def compare(
             known = load_profile(content.profile)
             listed = read_list(data, known, file.name)
         else:
-            where = place(url, station, profile or (content and content.profile), server)
+            family = profile or (content.profile if content is not None else None)
+            where = place(url, station, family, server)
             now = await values_now(where)
             known = now.profile
             _same_family(content, now)

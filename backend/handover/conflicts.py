@@ -6,7 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from backend.handover.model import Consequence, StartupWrite, consequence, rank, write_of
+from backend.handover.model import (
+    Consequence,
+    StartupWrite,
+    Transition,
+    consequence,
+    rank,
+    write_of,
+)
 from backend.handover.read import ControllerList, Listed
 from backend.motion.classes import motion_of
 from drivers.codec import decode, encode, size_of
@@ -69,7 +76,7 @@ def resolved(profile: Profile, listed: ControllerList) -> tuple[StartupWrite, ..
     for write in listed.writes:
         raw = value_of(profile, write)
         if raw is not None:
-            transition = "SO" if write.transition == "SO" else "PS"
+            transition: Transition = "SO" if write.transition == "SO" else "PS"
             found.append(write_of(profile.by_key[write.key], raw, transition))
     return tuple(found)
 

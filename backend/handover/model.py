@@ -269,8 +269,8 @@ def _axis(
         effective = profile.by_key[write.key].effective
         if effective in ("power_cycle", "write_settings"):
             late.setdefault(effective, []).append(write.key)
-    for effective, keys in late.items():
-        notes.append(f"act only after {effective.replace('_', ' ')}: {', '.join(keys)}")
+    for when, keys in late.items():
+        notes.append(f"act only after {when.replace('_', ' ')}: {', '.join(keys)}")
     ident = profile.identity
     pdo = profile.pdo
     return AxisHandover(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from typing import Any
 from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
 from backend.handover.model import ASSIGN_ACTIVATE, AxisHandover, MappedEntry, StartupWrite
@@ -19,13 +20,13 @@ def _child(parent: Element, tag: str, text: object = None, **attributes: str) ->
     return element
 
 
-def _file(root: Element) -> bytes:
+def _file(root: Element[str]) -> bytes:
     indent(root)
     text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
     return text + b"\n"
 
 
-def _note(text: str) -> Element:
+def _note(text: str) -> Element[Any]:
     """A comment; two hyphens would end it."""
     return Comment(f" {text.replace('--', '- -')} ")
 
