@@ -3,6 +3,7 @@ import type { Texts } from '../types'
 /** Words of the server and its profiles: the key ends with the English text that it sends. */
 export const drive = {
   'profileText.untranslated': ['not translated yet', '尚未翻译，显示手册原文'],
+  'profileText.mark': ['EN', '英文'],
   'profileText.original': ['Show the English original', '同时显示英文原文'],
   'procedure.Clear the alarm': ['Clear the alarm', '清除报警'],
   'procedure.Reset fault': ['Reset fault', '复位故障'],

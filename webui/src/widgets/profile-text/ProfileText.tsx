@@ -26,7 +26,7 @@ export function ProfileText({
       <span lang="en">
         {show(text)}{' '}
         <small className="untranslated" title={t('profileText.untranslated')}>
-          EN
+          {t('profileText.mark')}
         </small>
       </span>
     )
