@@ -112,7 +112,7 @@ def ros2(axis: AxisHandover) -> bytes:
     """
     vendor, product = axis.identity()
     lines = [
-        f"# {_line(axis.name)}; factors are increments per radian where the resolution is known",
+        f"# {_line(axis.name)}; position factors stand only where the list sets the gearing",
         f"vendor_id: 0x{vendor:08x}",
         f"product_id: 0x{product:08x}",
     ]
@@ -150,11 +150,17 @@ def _channel(axis: AxisHandover, entry: MappedEntry) -> str:
 
 
 def increments_per_radian(axis: AxisHandover) -> float | None:
-    """Position increments per radian of the motor, None where gearing makes it unsure."""
+    """Position increments per radian of the motor, None where it is not certain.
+
+    Certain only where the list itself sets the whole gearing to its defaults: a wrong factor
+    scales every motion of the controller.
+    """
     units = axis.profile.units
     gearing = {units.gear_numerator, units.gear_denominator, units.feed, units.feed_revolutions}
-    for write in axis.writes:
-        if write.key in gearing and write.raw != axis.profile.by_key[write.key].default_raw:
+    written = {write.key: write.raw for write in axis.writes}
+    for key in gearing - {None}:
+        parameter = axis.profile.by_key[key] if key is not None else None
+        if parameter is None or written.get(parameter.key) != parameter.default_raw:
             return None
     return units.counts_per_rev / (2 * math.pi) if units.counts_per_rev else None
 
