@@ -50,6 +50,7 @@ from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.loader import load_profile
 from profiles.schema import Profile
+from tests.support.granted import set_up
 
 STATION = 1
 _MODE = 0x6060
@@ -408,8 +409,7 @@ async def direct(
     link = DirectLink(make_device(drive, spec), profile)
     await link.open()
     axis = Axis(Drive("x", "X", profile, [Port(link, STATION, profile.link("ethercat"))]))
-    for key, raw in (settings or {}).items():
-        await axis.drive.write(key, raw)
+    await set_up(axis, settings or {})
     if settings:
         from backend.tools.measuring.temporary import make_effective
 

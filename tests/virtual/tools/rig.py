@@ -22,6 +22,7 @@ from drivers.virtual.mechanics import MechanicsSpec, analytic_response
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace
 from profiles.loader import load_profile
+from tests.support.granted import set_up
 
 URL = "ethercat://virtual0"
 WIDE = Envelope(travel_rev=4.0, speed_rpm=1500.0, torque_percent=100.0, time_s=60.0)
@@ -125,8 +126,7 @@ async def bench(
                 await link.scan(lambda _share, _text: None)
                 link.know(1, profile)
                 axis = Axis(Drive("x", "X", profile, [Port(link, 1, profile.link("ethercat"))]))
-                for key, raw in (settings or {}).items():
-                    await axis.drive.write(key, raw)
+                await set_up(axis, settings or {})
                 if settings:
                     from backend.tools.measuring.temporary import make_effective
 

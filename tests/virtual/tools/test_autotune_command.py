@@ -137,7 +137,7 @@ def test_by_a_server_a_design_is_taken_back_or_kept(
         asked.append(settings)
         before = await write_settings(axis, {"2005:03": 2200, "2001:06": 1500})
         seen["meanwhile"] = {key: await axis.drive.raw(key) for key in GAINS}
-        return SimpleNamespace(before=before)
+        return SimpleNamespace(before=before, written=None)
 
     def as_json(found: SimpleNamespace) -> dict[str, object]:
         return {"candidates": [DESIGN], "applied": DESIGN, "verified": VERIFIED,

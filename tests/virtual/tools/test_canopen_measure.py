@@ -14,11 +14,12 @@ from backend.tools.inertia.run import inertia
 from backend.tools.sweep import profile_speed
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
-from drivers.cia402 import State
+from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
 from drivers.halt import HaltCause, Halted
 from drivers.link import Address, Trajectory
 from drivers.link import Envelope as Limits
+from tests.support.granted import set_up
 from tests.virtual.tools.can_rig import CanBench, can_bench, incremental
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent
 
@@ -50,7 +51,7 @@ async def test_consent_and_travel_limits_come_before_any_motion(ds_c: CanBench) 
     with pytest.raises(NotAllowed, match="no watchdog"):
         async with profile_speed.prepared(ds_c.axis, ds_c.session, WIDE, False):
             pytest.fail("nobody agreed")
-    await ds_c.axis.drive.write(POSITIVE_LIMIT_INPUT, 0)
+    await set_up(ds_c.axis, {POSITIVE_LIMIT_INPUT: 0})
     with pytest.raises(NotAllowed, match="none of its own travel limits"):
         async with profile_speed.prepared(ds_c.axis, ds_c.session, WIDE, True):
             pytest.fail("nothing would stop the axis")
@@ -59,7 +60,7 @@ async def test_consent_and_travel_limits_come_before_any_motion(ds_c: CanBench) 
 
 
 async def test_software_limits_do_for_limit_switches_once_the_axis_is_homed(ds_c: CanBench) -> None:
-    await ds_c.axis.drive.write(POSITIVE_LIMIT_INPUT, 0)
+    await set_up(ds_c.axis, {POSITIVE_LIMIT_INPUT: 0})
     await ds_c.axis.drive.write("2405:00", 1)
     with pytest.raises(NotAllowed, match="none of its own travel limits"):
         await profile_speed.require_travel_limits(ds_c.axis)
@@ -132,7 +133,8 @@ async def test_a_drive_that_takes_a_negative_speed_for_the_highest_is_found_out_
 
 async def test_without_renewal_the_speed_ends_by_itself() -> None:
     async with can_bench(incremental(ONE_RESONANCE), pace=1.0, patient=False) as bench:
-        await bench.axis.go_to_cyclic(bench.session, State.OPERATION_ENABLED, 9, 3.0)  # type: ignore[arg-type]
+        with bench.axis.granted("a speed of the test"):
+            await bench.axis.go_to_cyclic(bench.session, State.OPERATION_ENABLED, Mode.CSV, 3.0)
         speeds = np.full(2000, 60, dtype=np.int64)
         target = Address(0x60FF, 0, "INT32")
         await bench.session.cyclic.play([Trajectory(3, target, speeds, Limits())])

@@ -16,6 +16,7 @@ from backend.tools.measuring.restore import settle
 from backend.tools.sweep import profile_speed
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
+from tests.support.granted import set_mode
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, mechanics
 
@@ -58,7 +59,7 @@ TOLD = {
 @pytest.mark.parametrize("how", TOLD)
 async def test_the_mode_is_as_before(drive: str, how: str) -> None:
     async with direct(ONE, drive=drive) as b:
-        await b.axis.set_mode(Mode.HM)
+        await set_mode(b.axis, Mode.HM)
         with TOLD[how]:
             await measured(b, how)
         assert await b.axis.state() is (
@@ -71,7 +72,7 @@ async def test_the_mode_is_as_before(drive: str, how: str) -> None:
 @drives
 async def test_the_mode_of_a_lost_drive_is_owed_to_it(drive: str) -> None:
     async with direct(ONE, drive=drive) as b:
-        await b.axis.set_mode(Mode.HM)
+        await set_mode(b.axis, Mode.HM)
         with pytest.raises(RestoreFailed, match=r"6060:00 \(was 6\)"):
             await measured(b, "lost")
         b.link.cut = False
