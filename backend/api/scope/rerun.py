@@ -14,7 +14,7 @@ from backend.recording.rerun_assets import FILES, ViewerAssets
 from backend.recording.rerun_feed import RerunFeed
 from drivers.errors import NotAllowed
 
-_FOLDER = Path(__file__).resolve().parents[1] / "recording" / "viewer"
+_FOLDER = Path(__file__).resolve().parents[2] / "recording" / "viewer"
 #: The viewer is WebAssembly; only here may the browser compile it.
 _POLICY = (
     "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'; "

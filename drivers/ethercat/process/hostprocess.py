@@ -333,6 +333,6 @@ def _noticed(sending: asyncio.Task[None]) -> None:
 
 
 def _environment() -> dict[str, str]:
-    root = str(Path(__file__).resolve().parents[2])
+    root = str(Path(__file__).resolve().parents[3])
     path = os.environ.get("PYTHONPATH")
     return {**os.environ, "PYTHONPATH": f"{root}:{path}" if path else root}
