@@ -62,6 +62,8 @@ class Store:
         self.url = _url(folder, database)
         self._engine: Engine | None = None
         self._identity: tuple[int, int] | None = None
+        #: Whether the folder has ever been seen. A database elsewhere works before it is made.
+        self._had_folder = False
         self._opening = threading.Lock()
         self._pool = ThreadPoolExecutor(max_workers=4, thread_name_prefix="store")
 
@@ -96,6 +98,7 @@ class Store:
                     raise
                 self._engine = engine
                 self._identity = self._identify()
+                self._had_folder |= self.folder.is_dir()
             return self._engine
 
     def close(self) -> None:
@@ -113,7 +116,9 @@ class Store:
         """
         if self._engine is None:
             return ""
-        if not self.folder.is_dir():
+        if self.folder.is_dir():
+            self._had_folder = True
+        elif self._had_folder:
             return f"the state folder {self.folder} is gone"
         if self._identity is not None and self._identify() != self._identity:
             return f"the database {self.shown} was removed or replaced while servodeck runs"

@@ -116,10 +116,9 @@ def test_from_one_kind_of_database_to_the_other(
 ) -> None:
     url = postgres.new_database()
     source, target = (None, url) if kind.startswith("sqlite") else (url, None)
-    old = Station(tmp_path / "old", source)
-    old.fill()
-    make_backup(old.store, tmp_path / "b.zip")
-    old.store.close()
+    for old in reopened(tmp_path / "old", source):
+        old.fill()
+        make_backup(old.store, tmp_path / "b.zip")
     into = target or f"sqlite:///{tmp_path / 'other.db'}"
     assert restore(tmp_path / "b.zip", tmp_path / "new", database=into).copied_rows > 20
     for again in reopened(tmp_path / "new", into):

@@ -123,3 +123,23 @@ def test_sqlite_keeps_what_was_committed(tmp_path: Path) -> None:
     store.close()
     assert pragma == {"journal_mode": "wal", "synchronous": 2, "foreign_keys": 1}
     assert (tmp_path / "servodeck.db").is_file()
+
+
+def test_a_state_folder_is_gone_only_after_it_was_there(database: str, tmp_path: Path) -> None:
+    folder = tmp_path / "state"
+    store = Store(folder, database)
+    try:
+        with store.writing() as session:  # the database lies elsewhere: the folder is made later
+            session.execute(text("SELECT 1"))
+        assert store.missing() == ""
+        folder.mkdir()
+        assert store.missing() == ""
+        folder.rmdir()
+        for _ in range(2):  # as well after it was opened again
+            assert "is gone" in store.missing()
+            with pytest.raises(DatabaseFailed, match="is gone"), store.writing():
+                pass
+            store.close()
+            store.open()
+    finally:
+        store.close()
