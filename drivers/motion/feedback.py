@@ -85,12 +85,16 @@ class FeedbackWatch:
         self._last: tuple[int, float, float] | None = None
         self._newest: deque[tuple[int, float, float]] = deque(maxlen=_INSTANT)
         self._samples = 0
+        self._undated = 0
         self._votes = 0
         self._finest = 0.0
         """Smallest step of 606Ch: its rounding cannot be coarser."""
 
     def take(self, position: int, velocity: float, at_s: float) -> Contradiction | None:
         """One sample: raw 6064h and 606Ch at a time [s]; what contradicts, once it is certain."""
+        if self._undated:
+            self._undated -= 1
+            return None
         last, self._last = self._last, (position, velocity, at_s)
         self._newest.append(self._last)
         if last is None or at_s <= last[2]:
@@ -111,11 +115,21 @@ class FeedbackWatch:
         self._open, self._samples = _Part(), 0
         return self._judge() if len(self._parts) == _PARTS else None
 
+    def gap(self) -> None:
+        """Cycles were skipped: what lies across them is not compared, what came before stays.
+
+        Nor is the first sample after them: some drives latch it at the last frame before the gap,
+        others just before it is fetched, so its time is not certain.
+        """
+        self._last, self._undated = None, 1
+        self._newest.clear()
+
     def interrupt(self) -> None:
         """The position was set anew (homing), or samples are missing: begin a new window."""
         self._parts.clear()
         self._newest.clear()
         self._open, self._samples, self._votes, self._last = _Part(), 0, 0, None
+        self._undated = 0
 
     def too_fast(self, limit: float) -> float | None:
         """The speed by position [raw 606Ch] where it is certainly beyond this limit."""
@@ -130,6 +144,8 @@ class FeedbackWatch:
     def denied(self) -> Contradiction | None:
         """Whether the position denies the speed that 606Ch has told over the newest samples."""
         newest = list(self._newest)
+        if len(newest) < 2:
+            return None
         time_s = newest[-1][2] - newest[0][2]
         if time_s <= 0:
             return None

@@ -46,6 +46,11 @@ class SpeedGuard:
         denied = watch.unnoticed(seen)
         return Halted.beyond("speed", seen, limit) if denied is None else _of(denied)
 
+    def gap(self) -> None:
+        """Cycles were skipped: the two are not compared across them."""
+        if self._watch is not None:
+            self._watch.gap()
+
     def interrupt(self) -> None:
         """The position was set anew, or samples are missing: nothing is compared across that."""
         if self._watch is not None:

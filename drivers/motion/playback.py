@@ -270,6 +270,7 @@ class AxisLoop:
     def skip(self, cycles: int) -> None:
         """Cycles that the computer was too late for: time passed, and nothing was exchanged."""
         self._cycles += cycles
+        self._speed_guard.gap()
 
     def _fell_out(self) -> None:
         if self.goal is State.OPERATION_ENABLED:

@@ -291,6 +291,9 @@ class DirectLink:
                 if late := self.late():
                     self._deliver(rows, missed)
                     rows, missed = [], late
+                    # As the real loops tell it.
+                    assert self._loop is not None
+                    self._loop.skip(late)
                     self.now_ns += late * self.cycle_ns
                     self.device.advance(self.now_ns)
                 rows.append(self._cycle())
