@@ -161,7 +161,7 @@ def test_jog_plays_one_position_per_cycle(station: Station, cyclic: tuple[str, s
             if at_speed(page.binary) > 300:
                 break
             # As in `tests.support.jogging`: a stall of 200 ms ends a jog, rightly.
-            assert "200 ms" in ended["reason"], ended
+            assert "500 ms" in ended["reason"], ended
         page.send(type="scope_stop", subscription=1)
     steps = steps_of(page.binary)
     assert steps.max() <= 329, "nothing is faster"
@@ -195,7 +195,7 @@ def test_silence_of_the_page_brakes(station: Station, cyclic: tuple[str, str]) -
             return page.wait("jog_ended", drive=a, timeout_s=20)
 
         ended = undisturbed(jog)
-    assert "200 ms" in ended["reason"]
+    assert "500 ms" in ended["reason"]
     within(5, lambda: abs(station.state(a)["velocity"]) < 2, "it stands")
 
 

@@ -11,7 +11,7 @@ from tests.wire.ethercat_host.conftest import Rig
 #: In the namespace: the flag that somebody set for good, and who wants the mode at all.
 _LOOK = """
 import sys
-from drivers.ethercat import promiscuous
+from drivers.ethercat.process import promiscuous
 print(int(promiscuous.is_set(sys.argv[1])))
 """
 _SWITCH = """
