@@ -86,7 +86,7 @@ COMMANDS = {
         "Put a backup in place, after checking it as a whole. End the server first.",
     ),
     "people": ("people:app", "Accounts of this station."),
-    "station": ("station:app", "The systemd unit of a station."),
+    "station": ("station:app", "A station as a service."),
 }
 """Name of a command to where it is, below `backend.commands`, and what the list says of it."""
 

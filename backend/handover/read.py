@@ -82,8 +82,7 @@ def read_list(data: bytes, profile: Profile, name: str = "the file") -> Controll
             remedy="export the list again",
         ) from error
     except _DAMAGED as e:
-        told = " ".join(str(e).split())[:200]
-        raise BadSet(f"{name} is damaged: {told}", remedy="export the list again") from e
+        raise BadSet(f"{name} is damaged: {e}", remedy="export the list again") from e
     if not found.writes:
         raise BadSet(f"{name} writes nothing at start-up", remedy="choose a list with writes")
     if len(found.writes) > _MAX_WRITES:

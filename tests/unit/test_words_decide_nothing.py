@@ -36,6 +36,10 @@ _PYSERIAL = "pyserial gives some errors of the system as nothing but its own tex
 #: nothing but its text or number, or words that are shown and nothing else.
 ALLOWED: dict[tuple[str, str], str] = {
     (
+        "drivers/computer/terminals.py",
+        "if error.args[0] == errno.EINTR:",
+    ): "termios.error carries its number as its first argument only",
+    (
         "drivers/modbus/port.py",
         'number = error.errno or next((n for n in _ERRNOS if f"Errno {n}]" in text), 0)',
     ): _PYSERIAL,
