@@ -158,3 +158,38 @@ def test_cycles_that_the_computer_missed_are_no_leap() -> None:
         if cycle % 50 < 20:
             continue
         assert guard.look(round(COUNTS * turns(t)), round(speed(turns, t)), t) is None
+
+
+def late_run(*, stale: bool, scale: float) -> Halted | None:
+    """A computer 3 cycles late every 10; ``stale``: inputs are those of the last frame."""
+    turns = ramp_to(300.0)
+    guard = SpeedGuard(SCALE, None)
+    cycle = frame = 0
+    for sample in range(1000):
+        if sample % 10 == 9:
+            cycle += 3
+            guard.gap()
+        at = (frame + 1 if stale else cycle) * CYCLE_S
+        halt = guard.look(
+            round(COUNTS * turns(at)), round(scale * speed(turns, at)), cycle * CYCLE_S
+        )
+        if halt is not None:
+            return halt
+        frame, cycle = cycle, cycle + 1
+    return None
+
+
+@pytest.mark.parametrize("stale", [False, True])
+def test_skipped_cycles_are_no_contradiction_and_hide_none(stale: bool) -> None:
+    assert late_run(stale=stale, scale=1.0) is None
+    wrong = late_run(stale=stale, scale=2.0)
+    assert wrong is not None
+    assert wrong.cause is HaltCause.CONTRADICTION
+
+
+def test_a_speed_beyond_its_limit_right_after_a_gap_ends_the_motion() -> None:
+    guard = SpeedGuard(SCALE, 100.0 * RPM)
+    guard.gap()
+    halt = guard.look(0, 101.0 * RPM, 0.0)
+    assert halt is not None
+    assert halt.cause is not HaltCause.CONTRADICTION
