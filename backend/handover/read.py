@@ -11,6 +11,7 @@ import io
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from textwrap import shorten
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError
 
@@ -82,7 +83,9 @@ def read_list(data: bytes, profile: Profile, name: str = "the file") -> Controll
             remedy="export the list again",
         ) from error
     except _DAMAGED as e:
-        raise BadSet(f"{name} is damaged: {e}", remedy="export the list again") from e
+        raise BadSet(
+            f"{name} is damaged: {shorten(str(e), 200)}", remedy="export the list again"
+        ) from e
     if not found.writes:
         raise BadSet(f"{name} writes nothing at start-up", remedy="choose a list with writes")
     if len(found.writes) > _MAX_WRITES:

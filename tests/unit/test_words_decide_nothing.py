@@ -53,10 +53,6 @@ ALLOWED: dict[tuple[str, str], str] = {
         'elif code == errno.EAFNOSUPPORT or "AF_CAN" in text:',
     ): "Python without SocketCAN raises AttributeError or OSError without a number",
     (
-        "drivers/canopen/slcan.py",
-        "if error.args[0] == errno.EINTR:",
-    ): "termios.error is no OSError: its number is its first argument",
-    (
         "drivers/ethercat/exchange/recovery.py",
         "if error.message != last:",
     ): "the log does not repeat a line; the attempts go on in any case",
