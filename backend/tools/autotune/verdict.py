@@ -30,10 +30,10 @@ COHERENT, BLURRED_DEG, LINES = 0.9, 4.0, 12
 _GAP = 1.5
 #: A loop is seen where its lines begin within its bandwidth: its crossover may else be missed.
 WITHIN = 10 ** (-3.0103 / 20.0)
-_UNITS: dict[str, tuple[str, str, int]] = {
-    "phase_margin": ("phase margin", "°", 0),
-    "gain_margin": ("gain margin", " dB", 1),
-    "peak_sensitivity": ("sensitivity", "", 2),
+_UNITS: dict[str, tuple[str, int]] = {
+    "phase_margin": ("°", 0),
+    "gain_margin": (" dB", 1),
+    "peak_sensitivity": ("", 2),
 }
 
 
@@ -118,13 +118,40 @@ def in_words(missed: tuple[Missed, ...]) -> list[str]:
                 "that were measured"
             )
         else:
-            name, unit, digits = _UNITS[each.what]
-            worst = "" if each.end == "stated" else f" at worst ({each.end})"
-            words.append(
-                f"{name} {each.value:.{digits}f}{unit}{worst} instead of "
-                f"{each.limit:.{digits}f}{unit}"
-            )
+            words.append(_figure(each))
     return words
+
+
+def _figure(each: Missed) -> str:
+    """One margin that is missed, spelled out as the page's list of translations has it."""
+    unit, digits = _UNITS[each.what]
+    have, wanted = f"{each.value:.{digits}f}", f"{each.limit:.{digits}f}"
+    words = {
+        ("phase_margin", "measured"): (
+            f"phase margin {have}° at worst (measured) instead of {wanted}°"
+        ),
+        ("phase_margin", "predicted"): (
+            f"phase margin {have}° at worst (predicted) instead of {wanted}°"
+        ),
+        ("gain_margin", "measured"): (
+            f"gain margin {have} dB at worst (measured) instead of {wanted} dB"
+        ),
+        ("gain_margin", "predicted"): (
+            f"gain margin {have} dB at worst (predicted) instead of {wanted} dB"
+        ),
+        ("peak_sensitivity", "measured"): (
+            f"sensitivity {have} at worst (measured) instead of {wanted}"
+        ),
+        ("peak_sensitivity", "predicted"): (
+            f"sensitivity {have} at worst (predicted) instead of {wanted}"
+        ),
+    }
+    names = {
+        "phase_margin": "phase margin", "gain_margin": "gain margin",
+        "peak_sensitivity": "sensitivity",
+    }  # fmt: skip
+    stated = f"{names[each.what]} {have}{unit} instead of {wanted}{unit}"
+    return words.get((each.what, each.end), stated)
 
 
 def misses(verdict: LoopVerdict, promised: Goals) -> tuple[Missed, ...]:
