@@ -53,12 +53,7 @@ def require_serial_form(place: str) -> None:
         return
     parts = place.split("/")
     if not _PATH.fullmatch(place) or ".." in parts or place.startswith("//"):
-        raise OutOfRange(
-            f"{place!r} is no serial port",
-            value=place,
-            limit=SERIAL_LIMIT,
-            remedy="give the device itself, as /dev/ttyUSB0, /dev/serial/by-id/… or COM3",
-        )
+        raise OutOfRange("link.no-serial-port", value=place, limit=SERIAL_LIMIT)
 
 
 def serial_device(place: str) -> str:
@@ -77,24 +72,15 @@ def serial_device(place: str) -> str:
     device = os.path.realpath(place)
     if not place.startswith("/dev/") and not _is_serial(device):
         raise LinkLost(
-            f"there is no serial port {place}",
+            "link.no-serial-port-plug-adapter",
             value=place,
             limit=SERIAL_LIMIT,
-            remedy=f"plug the adapter in; ports found now: {ports_found()}",
+            ports_found=ports_found(),
         )
     if Path(device).exists() and not _is_serial(device):
-        raise LinkLost(
-            f"{place} is no serial port",
-            value=place,
-            limit=SERIAL_LIMIT,
-            remedy="give the device of the adapter, as /dev/ttyUSB0",
-        )
+        raise LinkLost("link.no-serial-port-give-device", value=place, limit=SERIAL_LIMIT)
     if device in own_terminals():
-        raise LinkLost(
-            f"{place} is the terminal that servodeck itself runs in",
-            value=place,
-            remedy="give the device of the adapter, as /dev/ttyUSB0",
-        )
+        raise LinkLost("link.terminal-servodeck-itself-runs", value=place)
     return device
 
 
@@ -119,10 +105,9 @@ def require_interface(name: str) -> None:
     """
     if not _INTERFACE.fullmatch(name):
         raise OutOfRange(
-            f"{name!r} is no network interface",
+            "link.no-network-interface",
             value=name,
             limit="1 to 15 letters, digits and . _ - @ :, as eth0",
-            remedy="choose one of the interfaces that the page Connect lists",
         )
 
 
@@ -134,10 +119,9 @@ def _require_multicast(channel: str) -> None:
         address = None
     if address is None or not address.is_multicast or "%" in channel:
         raise OutOfRange(
-            f"{channel!r} is no multicast address",
+            "link.no-multicast-address",
             value=channel,
             limit="224.0.0.0 to 239.255.255.255, ff00::/8",
-            remedy="write canopen://udp_multicast/239.74.163.2",
         )
 
 
@@ -146,12 +130,7 @@ def _pattern(pattern: str, example: str) -> Callable[[str], None]:
 
     def require(channel: str) -> None:
         if not form.fullmatch(channel):
-            raise OutOfRange(
-                f"{channel!r} is no channel of this kind of CAN adapter",
-                value=channel,
-                limit=example,
-                remedy=f"write it like {example}",
-            )
+            raise OutOfRange("link.no-channel-kind-adapter", value=channel, limit=example)
 
     return require
 

@@ -34,17 +34,22 @@ def encode(data_type: DataType, raw: Raw) -> bytes:
     if data_type == "STRING":
         return raw.encode("utf-8") if isinstance(raw, str) else bytes([int(raw)])
     if isinstance(raw, str) or (isinstance(raw, bool) and data_type != "BOOL"):
-        raise OutOfRange(f"{raw!r} is not a {data_type} number", value=raw)
+        raise OutOfRange("link.not-number", value=raw, data_type=data_type)
     if not abs(raw) <= _LARGEST:  # not so for nan either
-        raise OutOfRange(f"{raw} is no number of {data_type}", value=raw)
+        raise OutOfRange("link.no-number", value=raw, data_type=data_type)
     if data_type == "REAL32":
         return struct.pack("<f", float(raw))
     if isinstance(raw, float) and not raw.is_integer():
-        raise OutOfRange(f"{raw} is not a whole number, {data_type} needs one", value=raw)
+        raise OutOfRange("link.not-whole-number-needs", value=raw, data_type=data_type)
     low, high = INTEGER_RANGE[data_type]
     if not low <= int(raw) <= high:
         raise OutOfRange(
-            f"{raw} does not fit {data_type} ({low} to {high})", value=raw, limit=f"{low}…{high}"
+            "link.not-fit",
+            value=raw,
+            limit=f"{low}…{high}",
+            data_type=data_type,
+            low=low,
+            high=high,
         )
     return struct.pack(_FORMAT[data_type], int(raw))
 
@@ -55,10 +60,7 @@ def _octets(raw: Raw) -> bytes:
         return bytes.fromhex(raw) if isinstance(raw, str) else bytes([int(raw)])
     except (ValueError, OverflowError) as error:
         raise OutOfRange(
-            f"{raw!r} is no row of bytes in hexadecimal",
-            value=raw,
-            limit="such as 0a ff 00",
-            remedy="write two hexadecimal digits for each byte",
+            "link.no-row-bytes-hexadecimal", value=raw, limit="such as 0a ff 00"
         ) from error
 
 
@@ -85,8 +87,10 @@ def decode(data_type: DataType, data: bytes) -> Raw:
     form = _FORMAT[data_type]
     if len(data) != struct.calcsize(form):
         raise ProtocolError(
-            f"{len(data)} bytes came for a {data_type} of {struct.calcsize(form)} bytes",
-            remedy="the drive's firmware may be of another version: compare with its dictionary",
+            "link.bytes-came-bytes",
+            bytes=len(data),
+            data_type=data_type,
+            calcsize_bytes=struct.calcsize(form),
         )
     value: int | float = struct.unpack(form, data)[0]
     return value

@@ -20,44 +20,81 @@ Third-party exceptions are translated to these once, at the driver's edge.
 
 from __future__ import annotations
 
+from enum import Enum
+
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
+from texts.message import Param, Text, as_text
 
 
 class DriveError(Exception):
     """Base of all errors about drives.
 
-    Attributes name what a user needs: which drive, which parameter, which value, which limit
-    and what to do next (``remedy``). All are optional and already part of the message.
+    ``text`` is what happened: a code of the catalogue with its facts, without words. ``drive``,
+    ``parameter``, ``value`` and ``limit`` are facts of it that a user needs in any language; what
+    to do next is `advice_text`. `message`, `remedy` and `advice` are these in English.
     """
 
     kind = "drive-error"
-    #: What helps against this kind of error where `remedy` says nothing nearer.
+    #: What helps against this kind of error where nothing nearer is known: a code.
     usual_remedy: str | None = None
 
     def __init__(
         self,
-        message: str,
+        code: str | Text,
+        /,
         *,
         drive: str | None = None,
         parameter: str | None = None,
         value: object = None,
         limit: str | None = None,
-        remedy: str | None = None,
+        remedy: str | Text | None = None,
+        **params: Param,
     ) -> None:
-        super().__init__(message)
-        self.message = message
+        super().__init__(code)
+        named = {"drive": drive, "parameter": parameter, "value": _fact(value), "limit": limit}
+        facts: dict[str, Param] = {name: fact for name, fact in named.items() if fact is not None}
+        self.text = as_text(code, facts | params)
         self.drive = drive
         self.parameter = parameter
         self.value = value
         self.limit = limit
-        self.remedy = remedy
+        #: What to do about it, where that is not what the catalogue says to the code.
+        self.own_remedy = as_text(remedy, self.text.params) if remedy else None
+
+    @property
+    def code(self) -> str:
+        """What happened, as a code of the catalogue; empty for words that others made."""
+        return self.text.code
+
+    @property
+    def message(self) -> str:
+        """What happened, in English."""
+        return self.text.words()
+
+    @property
+    def remedy_text(self) -> Text | None:
+        """What to do about it; None where nothing is known for this error alone."""
+        return self.own_remedy or self.text.remedy()
+
+    @property
+    def remedy(self) -> str | None:
+        """What to do about it, in English."""
+        known = self.remedy_text
+        return None if known is None else known.words()
+
+    @property
+    def advice_text(self) -> Text | None:
+        """What to do next: the nearest remedy that is known."""
+        if (known := self.remedy_text) is not None:
+            return known
+        usual = self.usual_remedy or ("error.within-limit" if self.limit else None)
+        return None if usual is None else as_text(usual, self.text.params)
 
     @property
     def advice(self) -> str | None:
-        """What to do next: the nearest remedy that is known."""
-        if self.remedy or self.usual_remedy:
-            return self.remedy or self.usual_remedy
-        return "choose a value within the limit" if self.limit else None
+        """What to do next, in English."""
+        known = self.advice_text
+        return None if known is None else known.words()
 
     def at(self, drive: str | None = None, parameter: str | None = None) -> DriveError:
         """The same error with the drive or parameter filled in where it was not known below."""
@@ -65,12 +102,22 @@ class DriveError(Exception):
         self.parameter = self.parameter or parameter
         return self
 
+    def __str__(self) -> str:
+        return self.message
+
+
+def _fact(value: object) -> Param:
+    """A value as a fact of a message."""
+    if value is None or isinstance(value, (str, int, float, Enum, Text)):
+        return value
+    return str(value)
+
 
 class LinkTimeout(DriveError):
     """No answer in time. A timed-out write has an unknown outcome and must be read back."""
 
     kind = "link-timeout"
-    usual_remedy = "check supply and cable, then try again; read back what was being written"
+    usual_remedy = "error.link-timeout"
 
 
 class NotAsked(LinkTimeout):
@@ -81,38 +128,39 @@ class LinkLost(DriveError):
     """The wire or the adapter is gone."""
 
     kind = "link-lost"
-    usual_remedy = (
-        "check the cable and the adapter or interface; the link is taken up again by itself"
-    )
+    usual_remedy = "error.link-lost"
 
 
 class ProtocolError(DriveError):
     """An answer that the protocol does not allow: bad CRC, wrong length, wrong toggle bit."""
 
     kind = "protocol-error"
-    usual_remedy = "try again; if it stays, check shield, termination and the line's settings"
+    usual_remedy = "error.protocol-error"
 
 
 class Rejected(DriveError):
-    """The drive refused. ``code`` is the SDO abort code or Modbus exception code."""
+    """The drive refused. ``abort_code`` is the SDO abort code or Modbus exception code."""
 
     kind = "rejected"
 
     def __init__(
         self,
-        message: str,
+        code: str | Text,
+        /,
         *,
-        code: int,
+        abort_code: int,
         drive: str | None = None,
         parameter: str | None = None,
         value: object = None,
         limit: str | None = None,
-        remedy: str | None = None,
+        remedy: str | Text | None = None,
+        **params: Param,
     ) -> None:
         super().__init__(
-            message, drive=drive, parameter=parameter, value=value, limit=limit, remedy=remedy
-        )
-        self.code = code
+            code, drive=drive, parameter=parameter, value=value, limit=limit, remedy=remedy,
+            abort_code=abort_code, **params,
+        )  # fmt: skip
+        self.abort_code = abort_code
 
 
 class OutOfRange(DriveError):
@@ -141,9 +189,16 @@ class MotionHalted(NotAllowed):
     """The cyclic loop ended a motion by force. ``halt`` is the cause, to decide by."""
 
     def __init__(
-        self, message: str, *, halt: Halted, drive: str | None = None, remedy: str | None = None
+        self,
+        code: str | Text,
+        /,
+        *,
+        halt: Halted,
+        drive: str | None = None,
+        remedy: str | Text | None = None,
+        **params: Param,
     ) -> None:
-        super().__init__(message, drive=drive, remedy=remedy)
+        super().__init__(code, drive=drive, remedy=remedy, **params)
         self.halt = halt
 
 
@@ -155,16 +210,19 @@ def motion_halted(
     where: str,
     halt: Halted,
     *,
-    words: str | None = None,
+    words: Text | str | None = None,
     drive: str | None = None,
-    remedy: str | None = None,
+    remedy: str | Text | None = None,
 ) -> MotionHalted:
     """The error for a halt of ``where``, a station or a drive by name.
 
     ``words`` are those in the units of the axis, where they are known.
     """
     kind = EnvelopeExceeded if halt.cause in ENVELOPE_CAUSES else MotionHalted
-    return kind(f"{where}: {words or halt.words}", halt=halt, drive=drive, remedy=remedy)
+    return kind(
+        "motion.halted", where=where, cause=words or halt.text, halt=halt, drive=drive,
+        remedy=remedy,
+    )  # fmt: skip
 
 
 def exceeded(error: DriveError) -> HaltCause | None:

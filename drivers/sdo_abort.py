@@ -108,9 +108,13 @@ def rejected(
     where = f" of {parameter}" if parameter else ""
     number = "" if code not in _TABLE else f" (abort {code:08X}h)"
     return Rejected(
-        f"the drive {action}{where}: {known.text}{number}",
+        "link.drive",
         code=code,
         drive=drive,
         parameter=parameter,
-        remedy=known.remedy,
+        remedy=known.remedy_text,
+        action=action,
+        where=where,
+        text=known.text,
+        number=number,
     )

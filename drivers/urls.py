@@ -79,17 +79,17 @@ def parse_url(text: str) -> BusUrl:
     scheme = next((known for known in SCHEMES if match and known == match[1]), None)
     if match is None or scheme is None or not text.strip().isprintable():
         raise OutOfRange(
-            f"{text!r} is no bus URL: it must start with "
-            + ", ".join(f"{known}://" for known in SCHEMES),
+            "link.no-bus-url-must",
             value=text,
             remedy=_like(*SCHEMES),
+            schemes=", ".join(f"{known}://" for known in SCHEMES),
         )
     place = match[2]
     if not place.strip("/"):
-        raise OutOfRange(f"{text!r} names no adapter", value=text, remedy=_like(scheme))
+        raise OutOfRange("link.names-no-adapter", value=text, remedy=_like(scheme))
     options = parse_qsl(match[3] or "", keep_blank_values=True)
     if len(dict(options)) != len(options):
-        raise OutOfRange(f"{text!r} gives an option twice", value=text, remedy=_like(scheme))
+        raise OutOfRange("link.gives-option-twice", value=text, remedy=_like(scheme))
     bus = BusUrl(scheme, place, tuple(options))
     if not bus.is_virtual:
         _require_adapter(bus)
@@ -139,10 +139,11 @@ def line_settings(url: BusUrl) -> LineSettings:
             silence_s = _number(url.scheme, name, text, 0, 1_000_000) / 1e6
         else:
             raise OutOfRange(
-                f"{url.scheme} URLs have no option {name!r}",
+                "link.urls-no-option",
                 value=name,
                 limit="baudrate, parity, stopbits, timeout_ms, silence_us, retries",
                 remedy=_like(url.scheme),
+                scheme=url.scheme,
             )
     if silence_s is None and url.scheme == "modbus" and settings.baudrate > 19_200:
         silence_s = STANDARD_SILENCE_S
@@ -158,10 +159,7 @@ def link_for(url: str | BusUrl) -> Link:
     """
     bus = parse_url(url) if isinstance(url, str) else url
     if bus.is_virtual:
-        raise NotAllowed(
-            f"{bus} is a wire that only a running demo has",
-            remedy="start 'servodeck demo', or give the path of a real or virtual port",
-        )
+        raise NotAllowed("link.wire-running-demo", bus=bus)
     text = str(bus)
     if bus.scheme == "mlink":
         from drivers.mlink.link import mlink_link
@@ -188,10 +186,13 @@ def _like(*schemes: str) -> str:
 def _number(scheme: str, name: str, text: str, low: int, high: int) -> int:
     if not re.fullmatch(r"\d{1,9}", text) or not low <= int(text) <= high:
         raise OutOfRange(
-            f"{name}={text} must be a whole number from {low} to {high}",
+            "link.must-whole-number",
             value=text,
             limit=f"{low}…{high}",
             remedy=_like(scheme),
+            name=name,
+            low=low,
+            high=high,
         )
     return int(text)
 
@@ -201,6 +202,5 @@ def _parity(scheme: str, text: str) -> Parity:
         if text.upper() == parity:
             return parity
     raise OutOfRange(
-        f"parity={text} must be N (none), E (even) or O (odd)",
-        value=text, limit="N, E, O", remedy=_like(scheme),
-    )  # fmt: skip
+        "link.parity-must-none-even", value=text, limit="N, E, O", remedy=_like(scheme)
+    )

@@ -198,7 +198,7 @@ def _add_page(app: FastAPI) -> None:
     @app.get("/{path:path}", include_in_schema=False)
     async def page(path: str, request: Request) -> Response:
         if path.startswith("api/"):
-            raise NotFound(f"there is nothing at /{path}", remedy=f"see {PREFIX}/openapi.json")
+            raise NotFound("api.nothing", path=path)
         if folder is None:
             return Response(
                 "The web page is not built. Run `make install` and start again.",
@@ -218,5 +218,5 @@ def _add_page(app: FastAPI) -> None:
                 return FileResponse(packed, headers=headers, media_type=kind)
             return FileResponse(wanted, headers=headers)
         if path.startswith("assets/"):
-            raise NotFound(f"there is no {path}")
+            raise NotFound("api.no", path=path)
         return FileResponse(folder / "index.html", headers={"Cache-Control": "no-cache"})

@@ -51,7 +51,7 @@ async def identity_now() -> Identity:
     """
     actor = acting.get()
     if actor is None:
-        raise NotLoggedIn("nobody is logged in", remedy="log in")
+        raise NotLoggedIn("api.nobody-logged")
     return actor.identity
 
 
@@ -68,7 +68,7 @@ async def member_of(drive_id: str, bench: TheBench) -> Member:
     try:
         return bench.member(drive_id)
     except NotAllowed as error:
-        raise NotFound(error.message, drive=drive_id, remedy=error.remedy) from error
+        raise NotFound(error.text, drive=drive_id, remedy=error.remedy_text) from error
 
 
 TheMember = Annotated[Member, Depends(member_of)]

@@ -20,6 +20,4 @@ def in_utc(moment: datetime | None) -> datetime | None:
     try:
         return moment.astimezone(UTC)
     except OverflowError as error:
-        raise OutOfRange(
-            f"{moment} is no time in UTC", value=str(moment), remedy="choose a later or earlier day"
-        ) from error
+        raise OutOfRange("api.no-time-utc", value=str(moment), moment=moment) from error

@@ -34,8 +34,4 @@ def _entries(lines: Iterable[str]) -> Iterator[AuditEntry]:
                 **columns(str(content["body"])),
             )
         except (ValueError, KeyError, TypeError) as error:
-            raise NotAllowed(
-                f"line {number} is no entry of an audit",
-                value=line[:80],
-                remedy="export it with --format jsonl, without a filter",
-            ) from error
+            raise NotAllowed("audit.line-no-entry-audit", value=line[:80], number=number) from error

@@ -137,9 +137,7 @@ class Axis(ScaledAxis):
         """Raises LinkTimeout when the axis still moves after a quick stop."""
         if not await self.standstill(timeout_s):
             raise LinkTimeout(
-                f"{self.drive.name} still moves {timeout_s:g} s after quick stop",
-                drive=self.drive.name,
-                remedy="use the machine's emergency stop",
+                "axis.still-moves-after-quick", drive=self.drive.name, timeout_s=timeout_s
             )
 
     async def standstill(self, timeout_s: float) -> bool:
@@ -179,12 +177,7 @@ class Axis(ScaledAxis):
         """
         drive = self.drive
         if self.cyclic_power() is not None:
-            raise NotAllowed(
-                f"{drive.name}: profile and homing modes are not possible while the cyclic "
-                "exchange runs",
-                drive=drive.name,
-                remedy="end the cyclic exchange, or use CSP, CSV or CST",
-            )
+            raise NotAllowed("axis.profile-homing-modes-not", drive=drive.name)
         await self.require_certain_scales()
         with self.granted(cia402.MODE_NAMES[mode], envelope):
             async with self._enabled(mode, envelope):
@@ -196,11 +189,7 @@ class Axis(ScaledAxis):
         await self.require_stop_delivered()
         before = await self.state()
         if before is State.OPERATION_ENABLED and not await self.standstill(0.5):
-            raise NotAllowed(
-                f"{drive.name} is moving already",
-                drive=drive.name,
-                remedy="stop it first",
-            )
+            raise NotAllowed("axis.moving-already", drive=drive.name)
         limits = await torque_limits(drive)
         mode_keys = await self.restorable_mode()
         stop_keys = await existing(drive, quick_stop_keys(drive))
@@ -261,10 +250,7 @@ class Axis(ScaledAxis):
     async def _require_sound(self) -> None:
         """A fault after the last look at the motion must not pass for a motion that went well."""
         if await self.state() in (State.FAULT, State.FAULT_REACTION):
-            error = NotAllowed(
-                f"{self.drive.name} has a fault at the end of its motion", drive=self.drive.name,
-                remedy="remove the cause, reset the fault, and try again",
-            )  # fmt: skip
+            error = NotAllowed("axis.fault-end-motion", drive=self.drive.name)
             await self._name_fault(error)
             raise error
 

@@ -58,9 +58,7 @@ class CyclicSession:
 
     def __init__(self, link: Link, drives: Sequence[Drive], by_speed: Collection[str] = ()) -> None:
         if link.cyclic is None:
-            raise NotAllowed(
-                f"{link.url} has no cyclic process data", remedy="use an EtherCAT or CANopen bus"
-            )
+            raise NotAllowed("axis.no-cyclic-process-data", url=link.url)
         self.link = link
         self.cyclic: Cyclic = link.cyclic
         self.drives = tuple(drives)
@@ -75,10 +73,7 @@ class CyclicSession:
             Busy: it runs already.
         """
         if self.state is not None:
-            raise Busy(
-                f"{self.link.url}: the cyclic exchange runs already",
-                remedy="stop the exchange first to choose another cycle",
-            )
+            raise Busy("axis.cyclic-exchange-runs-already", url=self.link.url)
         inputs, outputs = [], []
         for drive in self.drives:
             port = self._port(drive)

@@ -66,9 +66,7 @@ async def _give_back(axis: Axis, session: CyclicSession, key: str, before: int) 
         left.clear()
     except DriveError as error:
         raise RestoreFailed(
-            f"{drive.name}: not restored: {key} (was {before}): {error.message}",
-            drive=drive.name,
-            remedy=PUT_BACK_LATER,
+            "axis.not-restored", drive=drive.name, key=key, before=before, cause=error.text
         ) from error
     finally:
         drive.owed.add(left)
@@ -83,11 +81,7 @@ async def _choose(axis: Axis, session: CyclicSession, key: str, mode: int) -> No
     drive, power = axis.drive, session.power()
     # An EP3E may trip over a mode that changes while its motor turns (001:487).
     if await axis.state() is State.OPERATION_ENABLED or not await axis.standstill(_STANDS_S):
-        raise NotAllowed(
-            f"{drive.name} is enabled or turns",
-            drive=drive.name,
-            remedy="disable the axis and wait until it stands",
-        )
+        raise NotAllowed("axis.enabled-turns", drive=drive.name)
     if power is None or not session.running:
         # The link may have been lost meanwhile, and another drive be there now.
         await confirm_identity(drive)
@@ -97,9 +91,5 @@ async def _choose(axis: Axis, session: CyclicSession, key: str, mode: int) -> No
     deadline = time.monotonic() + _TAKEN_S
     while await drive.raw(key) != mode:
         if time.monotonic() > deadline:
-            raise LinkTimeout(
-                f"{drive.name} does not take its mode back",
-                drive=drive.name,
-                remedy="set its mode of operation by hand before the axis is enabled again",
-            )
+            raise LinkTimeout("axis.not-take-mode-back", drive=drive.name)
         await asyncio.sleep(_POLL_S)

@@ -45,9 +45,7 @@ async def read_history(axis: Axis) -> list[PastFault]:
     history = history_of(drive)
     if history is None or history.kind == "unreadable":
         raise NotAllowed(
-            f"{drive.name}: {drive.profile.title} has no fault history that can be read",
-            drive=drive.name,
-            remedy="the tool's own log has what it saw itself",
+            "axis.no-fault-history-read", drive=drive.name, profile_title=drive.profile.title
         )
     if history.kind == "slots":
         return await _slots(drive, history)
@@ -71,11 +69,7 @@ async def _selected(axis: Axis, history: FaultHistory) -> list[PastFault]:
         for number in range(history.size):
             if (await drive.write(select, number)).raw != number:
                 raise NotAllowed(
-                    f"{drive.name}: record {number} cannot be selected",
-                    drive=drive.name,
-                    parameter=select,
-                    value=number,
-                    remedy="write the selector by hand on the Parameters page",
+                    "axis.record-cannot-selected", drive=drive.name, parameter=select, value=number
                 )
             readings = await drive.read_many((code, *history.fields))
             slot = HistorySlot(name=f"record {number}", code_key=code, fields=history.fields)

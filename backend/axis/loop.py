@@ -63,9 +63,5 @@ async def play(session: CyclicSession, drive: Drive, trajectory: Trajectory, gra
 def _owner(session: CyclicSession, drive: Drive) -> OwnsPowerState:
     power = session.power()
     if power is None:
-        raise NotAllowed(
-            f"{drive.name}: this exchange does not own the power states",
-            drive=drive.name,
-            remedy="end the exchange",
-        )
+        raise NotAllowed("axis.exchange-not-power-states", drive=drive.name)
     return power

@@ -29,6 +29,7 @@ from drivers.dialect import dialect_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError
 from drivers.link import OwnsPowerState
 from profiles.schema import Fault
+from texts.message import text
 
 #: Longest time that one change of the power state may take (brake and bus included).
 STATE_TIMEOUT_S = 3.0
@@ -85,11 +86,7 @@ class PowerState:
             NotAllowed: STOP was pressed and the word would enable the axis again.
         """
         if self.cyclic_power() is not None:
-            raise NotAllowed(
-                f"{self.drive.name}: the cyclic exchange writes the control word",
-                drive=self.drive.name,
-                remedy="end the cyclic exchange, or use a cyclic mode",
-            )
+            raise NotAllowed("axis.cyclic-exchange-writes-control", drive=self.drive.name)
         if word == cia402.QUICK_STOP:
             word = self._stop_word
         key = self.drive.require("control_word")
@@ -102,11 +99,7 @@ class PowerState:
     async def _control_with_grant(self, key: str, word: int) -> None:
         """A word by which the drive may go to, or move in, Operation enabled."""
         if self.stopped:
-            raise NotAllowed(
-                f"{self.drive.name}: STOP was pressed",
-                drive=self.drive.name,
-                remedy="start a new motion when it is safe",
-            )
+            raise NotAllowed("axis.stop-pressed", drive=self.drive.name)
         self.drive.require_identity()
         await self.drive.command(key, word, self.grant(key))
         self.control_word = word
@@ -165,11 +158,7 @@ class PowerState:
             await self.require_stop_delivered()
             await self.know_stop()
         if self.stopped and goal is State.OPERATION_ENABLED:
-            raise NotAllowed(
-                f"{self.drive.name}: STOP was pressed",
-                drive=self.drive.name,
-                remedy="start a new motion when it is safe",
-            )
+            raise NotAllowed("axis.stop-pressed", drive=self.drive.name)
         if goal is State.OPERATION_ENABLED and await self.state() is State.FAULT:
             raise await self._refused(State.FAULT, goal)
         try:
@@ -241,9 +230,16 @@ class PowerState:
             causes += await hints(self.drive)
         why = "; ".join(causes) or "the drive gives no reason"
         error = NotAllowed(
-            f"{self.drive.name} stays in “{state.value}” and does not go to “{goal.value}”: {why}",
+            "axis.stays-not-go",
             drive=self.drive.name,
-            remedy="remove the cause named and try again" if causes else "see the Alarms page",
+            remedy=(
+                text("axis.try-remove-cause-named-try")
+                if causes
+                else text("axis.try-see-alarms-page")
+            ),
+            state=state.value,
+            goal=goal.value,
+            why=why,
         )
         error.names_faults = state in (State.FAULT, State.FAULT_REACTION)
         return error
@@ -308,9 +304,10 @@ class PowerState:
         drive = self.drive
         if int(mode) not in drive.modes:
             raise NotAllowed(
-                f"{drive.name}: {drive.profile.title} has no {cia402.MODE_NAMES[mode]} mode",
+                "axis.no-mode",
                 drive=drive.name,
-                remedy="choose one of its modes",
+                profile_title=drive.profile.title,
+                mode_names=cia402.MODE_NAMES[mode],
             )
         key = drive.require("mode")
         await drive.command(key, int(mode), self.grant(key))
@@ -321,9 +318,7 @@ class PowerState:
         while await drive.raw(display) != int(mode):
             if time.monotonic() > deadline:
                 raise NotAllowed(
-                    f"{drive.name} does not change to {cia402.MODE_NAMES[mode]}",
-                    drive=drive.name,
-                    remedy="stop the axis and try again",
+                    "axis.not-change", drive=drive.name, mode_names=cia402.MODE_NAMES[mode]
                 )
             await asyncio.sleep(_POLL_S)
 

@@ -61,9 +61,7 @@ async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException
             was = {key: drive.owed.original(key, raw) for key, raw in before.items()}
             values = ", ".join(f"{key} (was {raw})" for key, raw in was.items())
             error = RestoreFailed(
-                f"{name}: perhaps not restored: {values}: {error.message}",
-                drive=name,
-                remedy="compare these values before the next motion",
+                "axis.perhaps-not-restored", drive=name, values=values, cause=error.text
             )
         _tell_first(earlier, error)
         raise error from earlier
@@ -89,9 +87,7 @@ async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
         drive.owed.add(left)
     if failed:
         raise RestoreFailed(
-            f"{drive.name}: not restored: {'; '.join(failed)}",
-            drive=drive.name,
-            remedy=PUT_BACK_LATER,
+            "axis.not-restored-running-server", drive=drive.name, failed="; ".join(failed)
         )
 
 
@@ -132,9 +128,7 @@ async def _to_its_end(cleanup: Callable[[], Awaitable[None]], timeout_s: float, 
                 await cleanup()
         except TimeoutError as error:
             raise LinkTimeout(
-                f"{drive}: restoring took longer than {timeout_s:g} s and was given up",
-                drive=drive,
-                remedy="check the axis: mode, torque limit and power state may not be restored",
+                "axis.restoring-took-longer-given", drive=drive, timeout_s=timeout_s
             ) from error
 
     task = asyncio.create_task(bounded())

@@ -25,22 +25,16 @@ async def confirmed(axis: Axis, turned_rev: float) -> Taught:
     """
     drive, last = axis.drive, axis.small_moves
     if last is None:
-        raise NotAllowed(
-            f"{drive.name}: no small move was made whose way could be confirmed",
-            drive=drive.name, remedy="make a small move by increments first",
-        )  # fmt: skip
+        raise NotAllowed("axis.no-small-move-made", drive=drive.name)
     if not _LEAST_REV <= abs(turned_rev) <= _MOST_REV:
         raise OutOfRange(
-            f"{drive.name}: {turned_rev:g} rev cannot be told by eye", drive=drive.name,
-            value=turned_rev, limit=f"at least {_LEAST_REV:g} rev",
-            remedy="make a longer small move, until the shaft turns visibly",
-        )  # fmt: skip
+            "axis.rev-cannot-told-eye",
+            drive=drive.name,
+            value=turned_rev,
+            limit=f"at least {_LEAST_REV:g} rev",
+        )
     if last.raw_per_inc_s is not None and last.raw_per_inc_s < 0:
-        raise NotAllowed(
-            f"{drive.name}: 606Ch and 6064h have opposite signs", drive=drive.name,
-            parameter="606C:00",
-            remedy="look at the polarity 607Eh: its bits 6 and 7 belong together; then move again",
-        )  # fmt: skip
+        raise NotAllowed("axis.606ch-6064h-opposite-signs", drive=drive.name, parameter="606C:00")
     counts = abs(last.moved / turned_rev)
     before = axis.taught
     per_rpm = before.raw_per_rpm if before is not None else None
@@ -74,9 +68,8 @@ async def stated(
     ):  # fmt: skip
         if value is not None and not 0 < value < 1e12:
             raise OutOfRange(
-                f"{axis.drive.name}: {name} is {value:g}", drive=axis.drive.name, value=value,
-                limit="above 0", remedy="give the number of the drive's data sheet",
-            )  # fmt: skip
+                "axis.detail", drive=axis.drive.name, value=value, limit="above 0", name=name
+            )
     return Taught(
         counts_per_rev=counts_per_rev or before.counts_per_rev,
         raw_per_rpm=raw_per_rpm or before.raw_per_rpm,

@@ -112,14 +112,16 @@ def gear_command(
     except ValidationError as error:
         first = error.errors()[0]
         raise OutOfRange(
-            f"{first['loc'][0]} is {first['input']}: {first['msg']}",
+            "command.detail",
             value=first["input"],
-            remedy="see servodeck gear --help",
+            first=first["loc"][0],
+            other_first=first["input"],
+            first3=first["msg"],
         ) from error
     if station is None:
         _show(of_plan(plan_gear(load_profile(drive), mechanics, None)))
         if write:
-            raise OutOfRange("--write needs a bus URL and --station", remedy="name the drive")
+            raise OutOfRange("command.write-needs-bus-url")
         return
 
     async def work() -> None:
@@ -160,10 +162,11 @@ def braking(
         models = {each.model: each for each in regen.models} if regen else {}
         if model not in models:
             raise OutOfRange(
-                f"{drive} has no model {model!r}; its table has {', '.join(models) or 'none'}",
+                "command.no-model-table",
                 value=model,
                 limit=", ".join(models) or "none",
-                remedy="choose one of the listed models",
+                drive_name=drive,
+                models=", ".join(models) or "none",
             )
         row = models[model]
         built_in = None
@@ -175,7 +178,6 @@ def braking(
     given = {"inertia": inertia, "speed": speed, "time": time, "cycle": cycle, "stops": stops}
     for name, number in (given | ({} if voltage is None else {"voltage": voltage})).items():
         if not 0 < number < math.inf:
-            raise OutOfRange(f"--{name} is {number:g}", value=number, limit="greater than 0",
-                             remedy="give a number greater than 0")  # fmt: skip
+            raise OutOfRange("command.give-number", value=number, limit="greater than 0", name=name)
     result = braking_of(BrakingCycle(inertia, speed, time, cycle, stops), limits)
     print(json.dumps(asdict(result), indent=1))

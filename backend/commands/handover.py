@@ -58,13 +58,9 @@ def export(
 
     async def work() -> None:
         if form not in FORMATS:
-            raise NotAllowed(
-                f"{form!r} is no format", value=form, remedy=f"choose one of {', '.join(FORMATS)}"
-            )
+            raise NotAllowed("command.no-format", value=form, formats=", ".join(FORMATS))
         if bool(only) + tuned + not_default > 1:
-            raise NotAllowed(
-                "--only, --tuned and --not-default exclude each other", remedy="give one of them"
-            )
+            raise NotAllowed("command.tuned-not-default-exclude")
         content = set_of(file)
         choice: Choice = "tuned" if tuned else "not_default" if not_default else "all"
         keys = [key.strip().upper() for key in only.split(",") if key.strip()]
@@ -101,10 +97,7 @@ def compare(
 
     async def work() -> None:
         if url is None and set_file is None:
-            raise NotAllowed(
-                f"{file.name} is compared with a set or with a drive",
-                remedy="add --set SET, or a BUS_URL with --station",
-            )
+            raise NotAllowed("command.compared-set-drive", file=file.name)
         content = None if set_file is None else set_of(set_file)
         now: Now | None = None
         data = bytes_of(file)
@@ -131,9 +124,10 @@ def compare(
 def _same_family(content: ParameterSet | None, now: Now) -> None:
     if content is not None and content.profile != now.profile.drive:
         raise NotAllowed(
-            f"the set is of a {content.profile} drive, {now.name} is a {now.profile.drive}",
+            "command.set-drive",
             drive=now.name,
-            remedy="choose a set of the same drive family",
+            profile=content.profile,
+            profile_drive=now.profile.drive,
         )
 
 

@@ -66,11 +66,7 @@ def _existing(config: Path | None, database: str | None, blobs: str | None = Non
     records = station_records(config, database, blobs)
     file = records.store.sqlite_file
     if file is not None and not file.exists():
-        raise NotAllowed(
-            f"there is no database {file}",
-            value=str(file),
-            remedy="name the station's state folder with --config, or its --database",
-        )
+        raise NotAllowed("command.no-database", value=str(file), file=file)
     return records
 
 
@@ -149,10 +145,7 @@ def _anchor(text: str) -> Anchor | None:
         return None
     number, _, digest = text.partition(":")
     if not number.isdigit() or len(digest) != 64:
-        raise NotAllowed(
-            f"{text!r} is no anchor", value=text, limit="NUMBER:HASH",
-            remedy="copy the line that `servodeck audit verify` printed",
-        )  # fmt: skip
+        raise NotAllowed("command.no-anchor", value=text, limit="NUMBER:HASH")
     return Anchor(int(number), digest.lower())
 
 
@@ -225,7 +218,7 @@ def list_(
 
 def _kinds(name: str) -> tuple[Kind, ...]:
     if name and name not in KINDS:
-        raise NotAllowed(f"{name!r} is no kind", value=name, limit=", ".join(KINDS))
+        raise NotAllowed("command.no-kind", value=name, limit=", ".join(KINDS))
     return tuple(kind for kind in KINDS if kind == name)
 
 

@@ -105,10 +105,7 @@ def scope(
 def _needed(url: str, server: str | None) -> str:
     at = server_for(url, server)
     if at is None:
-        raise NotAllowed(
-            "this needs a running server, whose watch over the axis it uses",
-            remedy="start `servodeck serve` and give its address with --server",
-        )
+        raise NotAllowed("command.needs-running-server-whose")
     return at
 
 
@@ -123,10 +120,7 @@ async def _page(server: str) -> AsyncIterator[ClientConnection]:
             await _next(page, Hello)
             yield page
     except (WebSocketException, TimeoutError, OSError) as error:
-        raise LinkLost(
-            f"the live connection to {server} failed: {error}",
-            remedy="is the server still running, and may you use it?",
-        ) from error
+        raise LinkLost("command.live-connection-failed", server=server, cause=str(error)) from error
 
 
 def _told(message: str) -> Hello | JogEnded | ScopeInfo | None:
@@ -145,7 +139,7 @@ async def _next(page: ClientConnection, kind: type[Hello | JogEnded]) -> Hello |
     async for message in page:
         if not isinstance(message, bytes) and isinstance(news := _told(message), kind):
             return news
-    raise LinkLost("the server ended the live connection", remedy="look at its log")
+    raise LinkLost("command.server-ended-live-connection")
 
 
 async def _hold(page: ClientConnection, request: dict[str, object], seconds: float) -> JogEnded:
@@ -247,4 +241,4 @@ async def _record(
                     clock.reschedule(asyncio.get_running_loop().time() + seconds)
     into.end()
     if not into.rows:
-        raise DriveError("no sample came", remedy="look at the drive's connection")
+        raise DriveError("command.no-sample-came")

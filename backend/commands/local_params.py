@@ -72,11 +72,7 @@ async def save(place: Place) -> None:
     async with drive_at(place.url, place.station, place.profile) as drive:
         known = drive.profile.procedure("save")
         if known is None:
-            raise NotAllowed(
-                f"{drive.name} has no procedure that saves: it keeps what is written",
-                drive=drive.name,
-                remedy="nothing needs to be done",
-            )
+            raise NotAllowed("command.no-procedure-saves-keeps", drive=drive.name)
         require_own_values(drive)
         await procedures.run_procedure(Axis(drive), known, True, progress())
         print(f"{drive.name}: saved in the drive's memory")

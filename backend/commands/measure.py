@@ -186,7 +186,7 @@ async def exchanging(
     from backend.tools.sweep import profile_speed
 
     if url is None:
-        raise NotAllowed("give a bus URL, or --server and --axis", remedy="see --help")
+        raise NotAllowed("command.give-bus-url-server")
     async with drive_and_pending(url, station, profile) as (drive, pending):
         axis = Axis(drive)
         await restore_first(axis, pending)
@@ -277,8 +277,7 @@ async def drive_of(at: Remote, name: str | None) -> DriveSummary:
     drive = next((d for d in drives if name in (d.name, d.id)), None)
     if drive is None:
         names = ", ".join(d.name for d in drives) or "none"
-        raise NotAllowed(f"{at.address} has no drive {name!r}", value=name, limit=names,
-                         remedy="give its name with --axis")  # fmt: skip
+        raise NotAllowed("command.no-drive", value=name, limit=names, address=at.address)
     return drive
 
 

@@ -183,9 +183,7 @@ def export(
 
     async def work() -> None:
         if out.suffix.lower() not in (".csv", ".dcf"):
-            raise NotAllowed(
-                f"{out.name} is neither CSV nor DCF", remedy="name the file .csv or .dcf"
-            )
+            raise NotAllowed("command.neither-csv-nor-dcf", out=out.name)
         content = parse(bytes_of(file), file.name)
         data = export_list(content, load_profile(content.profile), out.name, datetime.now())
         write_atomically(out, data)

@@ -51,7 +51,7 @@ def _find(accounts: Accounts, name: str) -> Account:
     found = accounts.directory.find(name)
     if found is None:
         known = ", ".join(a.name for a in accounts.directory.all())
-        raise NotAllowed(f"there is no account {name}", limit=known, remedy="see `people list`")
+        raise NotAllowed("command.no-account", limit=known, name=name)
     return found
 
 

@@ -72,9 +72,7 @@ def _number(option: str, text: str | None) -> int | None:
     try:
         return None if text is None else int(text, 0)
     except ValueError as error:
-        raise NotAllowed(
-            f"{option} {text!r} is no number", value=text, remedy="write it as 0x190 or 400"
-        ) from error
+        raise NotAllowed("command.no-number", value=text, option=option) from error
 
 
 def _check_name(name: str | None) -> None:
@@ -82,15 +80,12 @@ def _check_name(name: str | None) -> None:
         return
     if not re.fullmatch("[a-z][a-z0-9_]*", name):
         raise NotAllowed(
-            f"{name!r} cannot be the name of a profile",
+            "command.cannot-name-profile",
             value=name,
             limit="lower-case letters, digits and _, a letter first",
-            remedy="choose a name such as my_drive",
         )
     if name in drive_names():
-        raise NotAllowed(
-            f"there is a profile {name!r} already", value=name, remedy="choose another --name"
-        )
+        raise NotAllowed("command.profile-already", value=name)
 
 
 @app.command("import")
@@ -150,10 +145,7 @@ def import_from_drive(
             seen = await link.scan(show_progress, [station])
             found = next((f for f in seen if f.station == station), None)
             if found is None:
-                raise NotAllowed(
-                    f"nothing answers at station {station} of {url}",
-                    remedy="check power, cable and station",
-                )
+                raise NotAllowed("command.nothing-answers-station", station=station, url=url)
             return await profile_of_drive(link, found, name, show_progress)
 
     with _importing():
@@ -188,10 +180,7 @@ def classify_object(
     """
     if motion not in (*get_args(Motion), "forget"):
         raise NotAllowed(
-            f"{motion!r} is no motion class",
-            value=motion,
-            limit="none, at_enable, energises, forget",
-            remedy="choose one of these",
+            "command.no-motion-class", value=motion, limit="none, at_enable, energises, forget"
         )
     known = load_profile(drive).parameter(key)
     before = None if known is None else known.motion

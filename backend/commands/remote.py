@@ -48,8 +48,7 @@ class Remote:
             return TypeAdapter(kind).validate_json(answer.content or b"null")
         except ValidationError as error:
             raise ProtocolError(
-                f"{self.address} gives an answer of another form to {method} {path}",
-                remedy="use the command line of the server's version",
+                "command.gives-answer-another-form", address=self.address, method=method, path=path
             ) from error
 
     async def raw(
@@ -63,9 +62,7 @@ class Remote:
             )
         except httpx.HTTPError as error:
             raise LinkLost(
-                f"no server answers at {self.address}: {error}",
-                remedy="start it with `servodeck demo` or `servodeck serve`, or name another one"
-                " with --server",
+                "command.no-server-answers", address=self.address, cause=str(error)
             ) from error
         if not answer.is_success:
             raise _problem(answer)
@@ -117,14 +114,12 @@ class Remote:
         found = next((f for f in await self.scan(url, [station]) if f.station == station), None)
         if found is None:
             raise NotAllowed(
-                f"nothing answers at station {station} of {url}",
-                remedy="check power, cable, station address, baud rate and parity",
+                "command.nothing-answers-station-check-power", station=station, url=url
             )
         sure = [m for m in found.matches if m.confidence != "possible"] or found.matches
         if profile is None and len(sure) != 1:
             choices = ", ".join(match.profile for match in found.matches) or "none"
-            raise NotAllowed(f"the drive at station {station} could be: {choices}",
-                             remedy="say which with --profile")  # fmt: skip
+            raise NotAllowed("command.drive-station", station=station, choices=choices)
         body = {"url": url, "station": station, "profile": profile or sure[0].profile}
         return await self.ask("POST", "/drives", DriveSummary, body=body)
 
@@ -167,5 +162,5 @@ def _problem(answer: httpx.Response) -> DriveError:
     try:
         told = Problem.model_validate_json(answer.content)
     except ValidationError:
-        return DriveError(f"the server says {answer.status_code}")
+        return DriveError("command.server-says", status_code=answer.status_code)
     return DriveError(told.detail or told.title, remedy=told.remedy)

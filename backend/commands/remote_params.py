@@ -153,8 +153,7 @@ async def _rows(at: Remote, drive: DriveSummary) -> Callable[[str], ParameterRow
     def find(key: str) -> ParameterRow:
         row = known.get(key) or known.get(key.upper())
         if row is None:
-            raise NotAllowed(f"{drive.name} has no parameter {key}", parameter=key,
-                             remedy="keys look like 6040:00")  # fmt: skip
+            raise NotAllowed("command.no-parameter", parameter=key, drive_name=drive.name)
         return row
 
     return find

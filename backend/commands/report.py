@@ -48,8 +48,7 @@ def report(
     async def work() -> None:
         form = _format(out)
         if (server is None) == (not files):
-            raise NotAllowed("give either measurement files, or --server and --axis",
-                             remedy="see --help")  # fmt: skip
+            raise NotAllowed("command.give-either-measurement-files")
         if server is not None:
             data = await _from_server(server, axis, form, language.value, about)
         else:
@@ -64,16 +63,14 @@ def _format(out: Path) -> Format:
     for form in FORMATS:
         if out.suffix == f".{form}":
             return form
-    raise NotAllowed(f"{out.name} is neither HTML nor PDF", value=out.name, limit=".html, .pdf",
-                     remedy="end its name with .html or .pdf")  # fmt: skip
+    raise NotAllowed("command.neither-html-nor-pdf", value=out.name, limit=".html, .pdf")
 
 
 def _from_files(files: list[Path], form: Format, language: LanguageName, about: About) -> bytes:
     """Of several files of a kind, the newest with the one before it."""
     folders = {file.resolve().parent for file in files}
     if len(folders) != 1:
-        raise NotAllowed("the measurements lie in different folders",
-                         remedy="copy them into one folder")  # fmt: skip
+        raise NotAllowed("command.measurements-lie-different-folders")
     store = MeasurementStore(folders.pop())
     heads: dict[str, Head] = {file.name: store.head(file.name) for file in files}
     facts = facts_of_files(heads, about)
@@ -94,14 +91,15 @@ async def _from_server(
             drive = next((d for d in drives if axis in (d["name"], d["id"])), None)
             if drive is None:
                 names = ", ".join(str(d["name"]) for d in drives) or "none"
-                raise NotAllowed(f"{server} has no drive {axis!r}", value=axis, limit=names,
-                                 remedy="give its name with --axis")  # fmt: skip
+                raise NotAllowed(
+                    "command.no-drive-give-name", value=axis, limit=names, server=server
+                )
             body = {"format": form, "language": language, "person": about.person,
                     "machine": about.machine, "notes": about.notes}  # fmt: skip
             made = _ok(await http.post(f"/drives/{drive['id']}/reports", json=body)).json()
             return _ok(await http.get(f"/reports/{made['file']}")).content
     except httpx.HTTPError as error:
-        raise LinkLost(f"{server} cannot be reached: {error}", remedy="is it running?") from error
+        raise LinkLost("command.cannot-reached", server=server, cause=str(error)) from error
 
 
 def _ok(answer: httpx.Response) -> httpx.Response:
@@ -125,8 +123,9 @@ def recompute(
         try:
             data = file.read_bytes()
         except OSError as error:
-            raise BadMeasurement(f"{file} cannot be read: {error.strerror}", value=str(file),
-                                 remedy="check the name and the rights") from error  # fmt: skip
+            raise BadMeasurement(
+                "command.cannot-read", value=str(file), file=file, strerror=error.strerror
+            ) from error
         found = unpack(data, file.name)
         # The analysis takes seconds to import; no other command shall wait for it.
         from backend.station.evaluation import evaluate

@@ -135,9 +135,8 @@ def _bytes(file: Path) -> bytes:
     size = file.stat().st_size
     if size > MAX_FILE_BYTES:
         raise NotAllowed(
-            f"{file.name} has {size} bytes", value=size, limit=f"{MAX_FILE_BYTES} bytes",
-            remedy="export a shorter part",
-        )  # fmt: skip
+            "command.bytes", value=size, limit=f"{MAX_FILE_BYTES} bytes", file=file.name
+        )
     return file.read_bytes()
 
 

@@ -45,11 +45,7 @@ async def restore_first(axis: Axis, pending: Pending) -> None:
     """
     drive = axis.drive
     if pending.held_by:
-        raise Busy(
-            f"{drive.name}: {pending.held_by} moves it now",
-            drive=drive.name,
-            remedy="wait for its end, or stop it",
-        )
+        raise Busy("command.moves-now", drive=drive.name, held_by=pending.held_by)
     if not drive.owed:
         return
     await stop_what_was_moved(axis, pending)
@@ -70,11 +66,7 @@ def require_own_values(drive: Drive) -> None:
         NotAllowed: something is pending.
     """
     if drive.owed:
-        raise NotAllowed(
-            f"{drive.name}: values of a motion that was cut off would be stored: {_values(drive)}",
-            drive=drive.name,
-            remedy="restore them first with `servodeck params restore`, or keep them with --keep",
-        )
+        raise NotAllowed("command.values-motion-cut-off", drive=drive.name, values=_values(drive))
 
 
 def show_restored(name: str, found: Mapping[str, object]) -> None:

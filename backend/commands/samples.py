@@ -50,8 +50,6 @@ def _decode(frame: bytes, begin: int) -> tuple[Samples, int]:
             bases, at = np.frombuffer(frame, "<f8", columns, at), at + 8 * columns
         values = np.frombuffer(frame, "<f4", rows * columns, at).reshape(rows, columns)
     except (struct.error, ValueError) as error:
-        raise ProtocolError(
-            f"the server sent something that is no scope block ({error})"
-        ) from error
+        raise ProtocolError("command.server-sent-something-no", cause=str(error)) from error
     at += 4 * rows * columns
     return Samples(times, values.astype(np.float64) + bases, dropped), at

@@ -117,11 +117,9 @@ async def accounts_needed(folder: Path, serving: Serving) -> bool:
     reachable = not serving.on_loopback or bool(serving.behind)
     if reachable and serving.accounts is False:
         raise NotAllowed(
-            f"without accounts servodeck serves only this machine; {serving.host} would open it "
-            "to others",
+            "command.without-accounts-servodeck-serves",
             value=serving.host,
             limit="127.0.0.1, localhost, ::1",
-            remedy="leave out --single-user, or serve on 127.0.0.1",
         )
     if serving.accounts is False:
         return False
@@ -140,7 +138,7 @@ def _certificate(folder: Path, serving: Serving) -> Certificate | None:
     if serving.certificate is not None and serving.key is not None:
         return own_certificate(serving.certificate, serving.key)
     if serving.certificate is not None or serving.key is not None:
-        raise NotAllowed("--certificate and --key belong together", remedy="give both")
+        raise NotAllowed("command.certificate-key-belong-together")
     if serving.on_loopback:
         return None
     return station_certificate(folder / "tls", machine_names())
@@ -230,16 +228,12 @@ def _listen(host: str, port: int) -> AcceptingSocket:
     except socket.gaierror as error:
         listening.close()
         raise NotAllowed(
-            f"{host} is no address of this computer: {error.strerror}",
-            value=host,
-            remedy="give one with --host, as 127.0.0.1, or 0.0.0.0 for all",
+            "command.no-address-computer", value=host, strerror=error.strerror
         ) from error
     except OSError as error:
         listening.close()
         raise NotAllowed(
-            f"port {port} of {host} cannot be used: {error.strerror}",
-            value=port,
-            remedy="end the program that uses it, or choose another with --port",
+            "command.port-cannot-used", value=port, host=host, strerror=error.strerror
         ) from error
     listening.listen(BACKLOG)
     return listening

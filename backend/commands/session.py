@@ -153,8 +153,7 @@ async def drive_and_pending(
         found = next((f for f in seen if f.station == station), None)
         if found is None:
             raise NotAllowed(
-                f"nothing answers at station {station} of {url}",
-                remedy="check power, cable, station address, baud rate and parity",
+                "command.nothing-answers-station-check-power", station=station, url=url
             )
         facts, spec = profile_for(link.kind, profile or _recognise(link, found))
         if isinstance(link, NeedsProfile):
@@ -174,8 +173,5 @@ def _recognise(link: Link, found: Found) -> str:
     sure = [m for m in matches if m.confidence != "possible"] or matches
     if len(sure) != 1:
         choices = ", ".join(match.profile.drive for match in matches) or "none"
-        raise NotAllowed(
-            f"the drive at station {found.station} could be: {choices}",
-            remedy="say which with --profile",
-        )
+        raise NotAllowed("command.drive-station", station=found.station, choices=choices)
     return sure[0].profile.drive

@@ -123,7 +123,7 @@ def autotune(
 
     async def work() -> None:
         if server is None and url is None:
-            raise NotAllowed("give a bus URL, or --server and --axis", remedy="see --help")
+            raise NotAllowed("command.give-bus-url-server")
         answer = await (here() if server is None else there(server))
         if out is not None:
             write_atomically(out, json.dumps(answer, indent=1).encode())

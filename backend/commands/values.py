@@ -104,12 +104,7 @@ def finite(key: str, name: str, text: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise NotAllowed(
-            f"{key} {name}: {text!r} is not a number",
-            parameter=key,
-            value=text,
-            remedy="give a number; hexadecimal with 0x",
-        )
+        raise NotAllowed("command.not-number", parameter=key, value=text, name=name)
     return number
 
 
@@ -121,7 +116,7 @@ def assignment(find: Callable[[str], D], text: str) -> tuple[D, Raw]:
     """
     key, separator, value = text.partition("=")
     if not separator:
-        raise NotAllowed(f"{text!r} is no assignment", remedy="write KEY=VALUE, as 6081:00=1000")
+        raise NotAllowed("command.no-assignment", text=text)
     parameter = find(key)
     if parameter.type in ("STRING", "OCTETS"):
         return parameter, value
@@ -181,17 +176,13 @@ def bytes_of(file: Path) -> bytes:
         return file.read_bytes()
     except OSError as error:
         raise NotAllowed(
-            f"{file} cannot be read: {error.strerror}", remedy="name a file that can be read"
+            "command.cannot-read-name-file", file=file, strerror=error.strerror
         ) from error
 
 
 def other_family(file: str, theirs: str, drive: str, ours: str) -> NotAllowed:
     """The error of a set that belongs to another drive family."""
-    return NotAllowed(
-        f"{file} is of a {theirs} drive, this is a {ours}",
-        drive=drive,
-        remedy="choose a file of the same drive family",
-    )
+    return NotAllowed("command.drive", drive=drive, file=file, theirs=theirs, ours=ours)
 
 
 def show(rows: Iterable[Compared], *, as_json: bool = False) -> None:
@@ -221,7 +212,7 @@ def chosen(rows: Iterable[Compared], *, yes: bool) -> list[str]:
     if not keys:
         print("nothing to write")
     elif not yes and not typer.confirm(f"Write these {len(keys)} values?"):
-        raise NotAllowed("nothing was written", remedy="run it again to write")
+        raise NotAllowed("command.nothing-written")
     return keys
 
 

@@ -31,12 +31,7 @@ def virtual(
     async def work() -> None:
         bus = parse_url(on)
         if bus.scheme == "ethercat" and not bus.is_virtual:
-            raise NotAllowed(
-                f"a virtual drive does not go on {on} by itself: it would answer on your network",
-                value=on,
-                limit="ethercat://virtual0",
-                remedy="write ethercat://virtual0, or see docs/virtual-drives.md for an interface",
-            )
+            raise NotAllowed("command.virtual-drive-not-go", value=on, limit="ethercat://virtual0")
         try:
             spec = load_mechanics(mechanics) if mechanics else standard_mechanics()
         except (OSError, ValueError) as error:

@@ -85,10 +85,10 @@ class Drive:
         parameter = self.profile.parameter(key)
         if parameter is None:
             raise NotAllowed(
-                f"{self.name}: {self.profile.title} has no parameter {key}",
+                "drive.no-parameter",
                 drive=self.name,
                 parameter=key,
-                remedy="search the parameter list; keys look like 6040:00",
+                profile_title=self.profile.title,
             )
         return parameter
 
@@ -161,9 +161,10 @@ class Drive:
         key = self.key(role)
         if key is None:
             raise NotAllowed(
-                f"{self.name}: {self.profile.title} has no {role.replace('_', ' ')} here",
+                "drive.no",
                 drive=self.name,
-                remedy="use another mode or link",
+                profile_title=self.profile.title,
+                replace=role.replace("_", " "),
             )
         return key
 
@@ -216,10 +217,7 @@ class Drive:
         parameter = self.parameter(key)
         if parameter.access == "wo":
             raise NotAllowed(
-                f"{self.name}: {parameter.key} {parameter.name} can only be written",
-                drive=self.name,
-                parameter=parameter.key,
-                remedy="it has no value to read; writing to it runs what it is for",
+                "drive.written", drive=self.name, parameter=parameter.key, key=parameter.name
             )
         port = self.port_for(parameter)
         try:
@@ -235,12 +233,7 @@ class Drive:
         """Integer raw value of one parameter, read now."""
         value = (await self.read(key)).raw
         if isinstance(value, str) or value is None:
-            raise OutOfRange(
-                f"{self.name}: {key} is text",
-                drive=self.name,
-                parameter=key,
-                remedy="choose a parameter that is a number",
-            )
+            raise OutOfRange("drive.text", drive=self.name, parameter=key)
         return int(value)
 
     async def read_many(
@@ -383,7 +376,7 @@ class Drive:
             except OverflowError as error:
                 raise named(
                     self.name,
-                    OutOfRange(f"{value:g} is no number", remedy="give a number that is finite"),
+                    OutOfRange("drive.no-number", given=value),
                     parameter,
                 ) from error
         return parameter, self.check(parameter, value)
@@ -411,11 +404,12 @@ class Drive:
         if (mover := self.authority.mover_of(self.id)) is not None:
             by = f" by {mover.actor}" if mover.actor else ""
             raise NotAllowed(
-                f"{self.name}: {parameter.key} {parameter.name} is not changed during a motion "
-                f"({mover.purpose}{by})",
+                "drive.not-changed-during-motion",
                 drive=self.name,
                 parameter=parameter.key,
-                remedy="wait for its end, or stop it",
+                key=parameter.name,
+                purpose=mover.purpose,
+                by=by,
             )
         await self._require_no_power(parameter)
 
@@ -478,9 +472,7 @@ class Drive:
         """
         if self.identity_warning:
             raise NotAllowed(
-                f"{self.identity_warning}: nothing is written to it",
-                drive=self.name,
-                remedy="check the cables; if it was exchanged, accept it on the Connect page",
+                "drive.nothing-written", drive=self.name, identity_warning=self.identity_warning
             )
 
     async def command(self, key: str, raw: int, grant: Grant) -> None:
@@ -586,11 +578,10 @@ class Drive:
             raise
         if state in _POWERED:
             raise NotAllowed(
-                f"{self.name}: {parameter.key} {parameter.name} can be set only while the motor "
-                "is not enabled",
+                "drive.set-motor-not-enabled",
                 drive=self.name,
                 parameter=parameter.key,
-                remedy="disable the axis first",
+                key=parameter.name,
             )
 
     def decode_state(self, status_word: int) -> cia402.State:

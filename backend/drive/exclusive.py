@@ -95,9 +95,4 @@ class Rest:
         if self._alone is None:
             return
         left_s = max(self._until - time.monotonic(), 0.0)
-        raise Resting(
-            f"{self._drive} must not be asked for another {left_s:.0f} s: it stores, and a question"
-            " would spoil that",
-            drive=self._drive,
-            remedy="wait until it has stored; STOP works",
-        )
+        raise Resting("drive.must-not-asked-another", drive=self._drive, left_s=left_s)

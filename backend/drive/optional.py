@@ -54,12 +54,7 @@ async def torque_limits(drive: Drive) -> list[str]:
     missing = [drive.parameter(key) for key in named if key not in found]
     names = ", ".join(f"{parameter.key} {parameter.name}" for parameter in missing)
     raise NotAllowed(
-        f"{drive.name}: this drive does not have {names}, so its torque cannot be limited "
-        "for this motion",
-        drive=drive.name,
-        parameter=missing[0].key,
-        remedy="use CSP, CSV or CST in a cyclic exchange, which watches the torque itself; or "
-        "import the drive's own description if it has a torque limit elsewhere",
+        "drive.drive-not-torque-cannot", drive=drive.name, parameter=missing[0].key, names=names
     )
 
 
@@ -76,10 +71,9 @@ async def ramp_keys(drive: Drive) -> tuple[str, str]:
     found = await existing(drive, (up, down))
     if up not in found:
         raise NotAllowed(
-            f"{drive.name}: this drive does not have {up} {drive.parameter(up).name}, so it is "
-            "not known how far it goes on when it is to stop",
+            "drive.drive-not-not-known",
             drive=drive.name,
             parameter=up,
-            remedy="move it by CSP or CSV in a cyclic exchange",
+            key=drive.parameter(up).name,
         )
     return up, down if down in found else up

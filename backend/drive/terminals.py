@@ -130,25 +130,22 @@ async def set_probe(drive: Drive, number: int, settings: ProbeSettings) -> Readi
     probe = functions_of(drive.profile).probe
     if probe is None or not 1 <= number <= len(probe.probes):
         raise NotAllowed(
-            f"{drive.name}: {drive.profile.title} has no touch probe {number}",
+            "drive.no-touch-probe",
             drive=drive.name,
-            remedy="choose a touch probe that the drive has",
+            profile_title=drive.profile.title,
+            number=number,
         )
     sources = probe.probes[number - 1].sources
     if settings.source not in sources:
         raise OutOfRange(
-            f"{drive.name}: touch probe {number} has no source {settings.source}",
+            "drive.touch-probe-no-source",
             drive=drive.name,
             value=settings.source,
             limit=", ".join(f"{code} ({text})" for code, text in sources.items()),
-            remedy="choose one of the sources within the limit",
+            number=number,
         )
     if settings.on and not (settings.rising or settings.falling):
-        raise OutOfRange(
-            f"{drive.name}: touch probe {number} has no edge to latch",
-            drive=drive.name,
-            remedy="choose the rising or the falling edge",
-        )
+        raise OutOfRange("drive.touch-probe-no-edge", drive=drive.name, number=number)
     shift = 8 * (number - 1)
     now = await drive.raw(probe.function_key) & 0xFFFF
     others = now & ~(0xFF << shift)
@@ -158,12 +155,11 @@ async def set_probe(drive: Drive, number: int, settings: ProbeSettings) -> Readi
     reading = await drive.write(probe.function_key, raw)
     if reading.raw != raw:
         raise Rejected(
-            f"{drive.name}: {probe.function_key} does not keep the setting of the probe",
+            "drive.not-keep-setting-probe",
             code=0,
             drive=drive.name,
             parameter=probe.function_key,
             value=reading.raw,
-            remedy="perhaps process data of the running exchange hold this object; end it",
         )
     return reading
 

@@ -16,21 +16,15 @@ def checked(drive: str, parameter: Parameter, raw: Raw) -> Raw:
     """
     label = f"{drive}: {parameter.key} {parameter.name}"
     if parameter.access == "ro":
-        raise NotAllowed(
-            f"{label} is read-only",
-            drive=drive,
-            parameter=parameter.key,
-            value=raw,
-            remedy="it only shows what the drive measures or has worked out; change the setting "
-            "that it follows from",
-        )
+        raise NotAllowed("drive.read", drive=drive, parameter=parameter.key, value=raw, label=label)
     if isinstance(raw, str) != (parameter.type in ("STRING", "OCTETS")):
         raise OutOfRange(
-            f"{label}: {raw!r} is not a {parameter.type}",
+            "drive.not",
             drive=drive,
             parameter=parameter.key,
             value=raw,
-            remedy=f"give a value of type {parameter.type}",
+            label=label,
+            type=parameter.type,
         )
     if isinstance(raw, str):
         _encodes(drive, parameter, raw)
@@ -39,23 +33,24 @@ def checked(drive: str, parameter: Parameter, raw: Raw) -> Raw:
     if (low is not None and raw < low) or (high is not None and raw > high):
         limits = f"{_shown(parameter, low)} to {_shown(parameter, high)}"
         raise OutOfRange(
-            f"{label}: {_shown(parameter, raw)} is outside {limits}",
+            "drive.outside",
             drive=drive,
             parameter=parameter.key,
             value=raw,
             limit=limits,
-            remedy=f"choose a value from {limits}",
+            label=label,
+            shown=_shown(parameter, raw),
         )
     _encodes(drive, parameter, raw)
     if parameter.enum and not parameter.bits and int(raw) not in parameter.enum:
         choices = ", ".join(f"{code} ({text})" for code, text in parameter.enum.items())
         raise OutOfRange(
-            f"{label}: {raw} is none of its values: {choices}",
+            "drive.none-values",
             drive=drive,
             parameter=parameter.key,
             value=raw,
             limit=choices,
-            remedy="choose one of the listed values",
+            label=label,
         )
     return raw
 

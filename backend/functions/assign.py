@@ -91,19 +91,19 @@ async def _require_inputs_off(axis: Axis, parameter: Parameter, raw: Raw) -> Non
         if parameter.key == terminal.function_key:
             if raw not in facts.unused_inputs and state.on:
                 raise NotAllowed(
-                    f"{drive.name}: {name} is on, so its new function would act at once",
+                    "functions.new-function-act-once",
                     drive=drive.name,
                     parameter=parameter.key,
                     value=raw,
-                    remedy=f"switch {name} off, or give it no function",
+                    name=name,
                 )
         elif _inverts(axis, state, parameter, raw) and state.function not in facts.unused_inputs:
             raise NotAllowed(
-                f"{drive.name}: {name} has a function, which could act at once when it is inverted",
+                "functions.function-act-once-when",
                 drive=drive.name,
                 parameter=parameter.key,
                 value=raw,
-                remedy=f"give {name} no function, invert it, and then give it its function",
+                name=name,
             )
 
 
@@ -146,10 +146,13 @@ def _require_setting(axis: Axis, parameter: Parameter) -> None:
     if key in commanded | forced | run:
         door = door_of(profile, parameter)
         error = NotGranted(
-            f"{drive.name}: {key} {parameter.name} is a command, not a setting",
+            "functions.command-not-setting",
             drive=drive.name,
             parameter=key,
             remedy=f"{door.how} ({door.route})",
+            key=parameter.name,
+            how=door.how,
+            route=door.route,
         )
         error.page, error.route = door.page, door.route
         raise error
@@ -160,9 +163,8 @@ async def _require_rest(axis: Axis, parameter: Parameter) -> None:
     if await axis.state() in _DISABLED and await axis.standstill(_AT_REST_S):
         return
     raise NotAllowed(
-        f"{drive.name}: {parameter.key} {parameter.name} is set only while the motor has no "
-        "power and the axis stands",
+        "functions.set-motor-no-power",
         drive=drive.name,
         parameter=parameter.key,
-        remedy="disable the axis first",
+        key=parameter.name,
     )

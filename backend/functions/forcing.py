@@ -24,6 +24,7 @@ from backend.work.jobs import Job, JobResult, JobRunner, Progress
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange, Rejected
 from profiles.functions import Forcing, TerminalBits
+from texts.message import text
 
 #: A session ends when its page has not renewed it for this long.
 SILENT_S = 5.0
@@ -84,20 +85,14 @@ class ForcingSession:
         if self.over:
             why = self.reason or "cancelled"
             raise NotAllowed(
-                f"{self.axis.drive.name}: {self.spec.title} has ended: {why}",
-                drive=self.axis.drive.name,
-                remedy="begin it again",
+                "functions.ended", drive=self.axis.drive.name, spec_title=self.spec.title, why=why
             )
 
     def _require_known(self, name: str) -> None:
         if name not in self.spec.value.bits:
             names = ", ".join(self.spec.value.bits)
             raise OutOfRange(
-                f"{self.axis.drive.name}: {name} cannot be overruled",
-                drive=self.axis.drive.name,
-                value=name,
-                limit=names,
-                remedy=f"choose one of {names}",
+                "functions.cannot-overruled", drive=self.axis.drive.name, value=name, limit=names
             )
 
     async def _require_allowed(self, name: str) -> None:
@@ -110,23 +105,24 @@ class ForcingSession:
         code = await drive.raw(terminal.function_key)
         if terminal.direction == "out" and code in facts.brake_functions:
             raise NotAllowed(
-                f"{drive.name}: {name} has the function brake; forcing it could release a load",
+                "functions.function-brake-forcing-release",
                 drive=drive.name,
                 parameter=terminal.function_key,
                 value=code,
-                remedy="release a brake by hand only with the load held, as its maker says",
+                name=name,
             )
         needed = self.spec.needs_function
         if needed is not None and code != needed:
             label = next((f.name for f in terminal.functions if f.code == needed), str(needed))
             raise NotAllowed(
-                f"{drive.name}: {name} has function {code}, and only {needed} ({label}) lets it "
-                "be forced",
+                "functions.function-lets-forced",
                 drive=drive.name,
                 parameter=terminal.function_key,
                 value=code,
                 limit=str(needed),
-                remedy=f"give {name} the function {needed} ({label}) first",
+                name=name,
+                needed=needed,
+                label=label,
             )
 
     async def _write(self, values: Mapping[str, bool]) -> None:
@@ -161,17 +157,16 @@ class ForcingSession:
         ]
         if others:
             raise NotAllowed(
-                f"{drive.name}: {len(others)} changed parameters would begin to act with this: "
-                f"{', '.join(others[:5])}",
+                "functions.changed-parameters-begin-act",
                 drive=drive.name,
-                remedy="run “Write settings” for them first, or put them back",
+                others=len(others),
+                other_others=", ".join(others[:5]),
             )
         if await self.axis.state() is State.OPERATION_ENABLED:
             raise NotAllowed(
-                f"{drive.name}: {self.spec.title} needs “write settings”, which is possible only "
-                "while the motor is not enabled",
+                "functions.needs-write-settings-possible",
                 drive=drive.name,
-                remedy="disable the axis first",
+                spec_title=self.spec.title,
             )
 
     async def _write_bits(self, place: TerminalBits, wanted: Mapping[str, bool]) -> None:
@@ -185,14 +180,22 @@ class ForcingSession:
         kept = (await self._sent(place.key, raw)).raw
         if kept != raw:
             raise Rejected(
-                f"{drive.name}: {place.key} is 0x{raw:X} as written, and 0x{kept:X} as read back"
-                if isinstance(kept, int)
-                else f"{drive.name}: {place.key} cannot be read back",
+                (
+                    text(
+                        "functions.0x-written-0x-read",
+                        drive_name=drive.name,
+                        key=place.key,
+                        raw=raw,
+                        kept=kept,
+                    )
+                    if isinstance(kept, int)
+                    else text("functions.cannot-read-back", drive_name=drive.name, key=place.key)
+                ),
                 code=0,
                 drive=drive.name,
                 parameter=place.key,
                 value=kept,
-                remedy="perhaps process data of the running exchange hold this object; end it",
+                remedy=text("functions.try-perhaps-process-data-running"),
             )
 
     async def _sent(self, key: str, raw: int) -> Reading:
@@ -225,21 +228,16 @@ class ForcingSessions:
         spec = require_forcing(drive, name)
         if not confirmed:
             raise NotAllowed(
-                f"{drive.name}: {spec.title} needs your agreement: {spec.warning}",
+                "functions.needs-your-agreement",
                 drive=drive.name,
-                remedy="read the text and confirm",
+                spec_title=spec.title,
+                warning=spec.warning,
             )
         if (drive.id, name) in self._sessions:
-            raise NotAllowed(
-                f"{drive.name}: {spec.title} is in use already",
-                drive=drive.name,
-                remedy="end it first",
-            )
+            raise NotAllowed("functions.use-already", drive=drive.name, spec_title=spec.title)
         if spec.needs_cyclic and (axis.session is None or not axis.session.running):
             raise NotAllowed(
-                f"{drive.name}: {spec.title} acts only while process data are exchanged",
-                drive=drive.name,
-                remedy="start the exchange on the Connect page",
+                "functions.acts-process-data-exchanged", drive=drive.name, spec_title=spec.title
             )
         session = ForcingSession(axis, spec, connection)
         ready: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -294,8 +292,7 @@ class ForcingSessions:
                 session.before = {key: int(raw) for key, raw in before.items()}
                 if missing := [key for key in keys if key not in session.before]:
                     raise NotAllowed(
-                        f"{axis.drive.name}: {', '.join(missing)} cannot be read",
-                        drive=axis.drive.name,
+                        "functions.cannot-read", drive=axis.drive.name, missing=", ".join(missing)
                     )
                 ready.set_result(None)
                 try:
@@ -372,11 +369,11 @@ def require_forcing(drive: Drive, name: str) -> Forcing:
     spec = next((each for each in found if each.name == name), None)
     if spec is None:
         raise NotAllowed(
-            f"{drive.name}: {drive.profile.title} has no way to overrule terminals like this",
+            "functions.no-way-overrule-terminals",
             drive=drive.name,
             value=name,
             limit=", ".join(each.name for each in found) or "none",
-            remedy="choose one of the terminals within the limit",
+            profile_title=drive.profile.title,
         )
     for place in (spec.enable, spec.value):
         if place is not None and (why := drive.unreachable_why(drive.parameter(place.key))):

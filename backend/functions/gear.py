@@ -59,11 +59,7 @@ async def write_gear(axis: Axis, values: Sequence[GearValue]) -> GearChange:
     """
     drive = axis.drive
     if await axis.state() is State.OPERATION_ENABLED:
-        raise NotAllowed(
-            f"{drive.name}: the gear changes what a position means, and the axis is enabled",
-            drive=drive.name,
-            remedy="disable the axis first",
-        )
+        raise NotAllowed("functions.gear-changes-position-means", drive=drive.name)
     before: dict[str, int] = {}
     for value in values:
         before[value.parameter.key] = await drive.raw(value.parameter.key)
@@ -96,12 +92,13 @@ async def _write_all(
         kept: Raw | None = (await drive.write(key, value.raw)).raw
         if kept != value.raw:
             raise Rejected(
-                f"{drive.name}: {key} {value.parameter.name} keeps {kept} instead of {value.raw}",
+                "functions.keeps-instead",
                 code=0,
                 drive=drive.name,
                 parameter=key,
                 value=value.raw,
-                remedy="see its range; the gear is as it was before",
+                key=value.parameter.name,
+                kept=kept,
             )
 
 

@@ -84,11 +84,12 @@ def braking(cycle: BrakingCycle, limits: BrakingLimits) -> BrakingResult:
     stopping_s = cycle.deceleration_s * cycle.stops_per_cycle
     if not stopping_s <= cycle.cycle_s:
         raise OutOfRange(
-            f"{cycle.stops_per_cycle:g} stops of {cycle.deceleration_s:g} s do not fit into a "
-            f"cycle of {cycle.cycle_s:g} s",
+            "functions.stops-not-fit-cycle",
             value=stopping_s,
             limit=f"{cycle.cycle_s:g} s",
-            remedy="give the time of one stop, and of the whole cycle with its pauses",
+            stops_per_cycle=cycle.stops_per_cycle,
+            deceleration_s=cycle.deceleration_s,
+            cycle_s=cycle.cycle_s,
         )
     speed = cycle.speed_rpm * math.tau / 60.0
     kinetic = 0.5 * cycle.inertia_kgm2 * speed**2

@@ -24,15 +24,9 @@ def files_of(
     """
     on_ethercat = axis.profile.link("ethercat") is not None
     if form in _ETHERCAT_ONLY and not on_ethercat:
-        raise NotAllowed(
-            f"{axis.profile.title} is no EtherCAT drive, which {form} is for",
-            remedy="choose dcf, ros2, csv or python",
-        )
+        raise NotAllowed("handover.no-ethercat-drive", profile_title=axis.profile.title, form=form)
     if form == "ros2" and not on_ethercat and axis.profile.link("canopen") is None:
-        raise NotAllowed(
-            f"{axis.profile.title} is on neither EtherCAT nor CANopen, which ros2 is for",
-            remedy="choose csv or python",
-        )
+        raise NotAllowed("handover.neither-ethercat-nor-canopen", profile_title=axis.profile.title)
     files = _list(axis, form, name, saved, on_ethercat=on_ethercat)
     files[f"{name}.scaling.txt"] = text_lists.sheet(axis)
     return files

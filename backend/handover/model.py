@@ -111,12 +111,7 @@ class AxisHandover:
             NotAllowed: the set does not state them, nor does the profile.
         """
         if self.vendor_id is None or self.product_code is None:
-            raise NotAllowed(
-                f"{self.name}: the set states neither vendor ID nor product code (1018h), and this "
-                "format needs both",
-                drive=self.name,
-                remedy="save the set from the drive itself, or export twincat, codesys, igh or csv",
-            )
+            raise NotAllowed("handover.set-states-neither-vendor", drive=self.name)
         return self.vendor_id, self.product_code
 
 
@@ -181,14 +176,11 @@ def hand_over(
     """
     if content.profile != profile.drive:
         raise NotAllowed(
-            f"the set is of a {content.profile} drive, not of {profile.drive}",
-            remedy="use the profile that the set names",
+            "handover.set-drive-not", profile=content.profile, profile_drive=profile.drive
         )
     missing = sorted(set(only) - {row.key for row in content.rows})
     if missing:
-        raise NotAllowed(
-            f"the set has no value of {', '.join(missing)}", remedy="name keys that are in the set"
-        )
+        raise NotAllowed("handover.set-no-value", missing=", ".join(missing))
     tuned = gain_keys(profile)
     writes: list[StartupWrite] = []
     left: list[LeftOut] = []

@@ -74,22 +74,17 @@ def read_list(data: bytes, profile: Profile, name: str = "the file") -> Controll
         BadSet: too large, of no such format, damaged, or without a single write.
     """
     if len(data) > MAX_BYTES:
-        raise BadSet(f"{name} is larger than {MAX_BYTES} bytes", remedy="choose another file")
+        raise BadSet("handover.larger-bytes", name=name, max_bytes=MAX_BYTES)
     try:
         found = _by_contents(data, profile, name)
     except DefusedXmlException as error:
-        raise BadSet(
-            f"{name} defines XML entities, which no start-up list needs and an attack does",
-            remedy="export the list again",
-        ) from error
+        raise BadSet("handover.defines-xml-entities-no", name=name) from error
     except _DAMAGED as e:
-        raise BadSet(
-            f"{name} is damaged: {shorten(str(e), 200)}", remedy="export the list again"
-        ) from e
+        raise BadSet("handover.damaged", name=name, shorten=shorten(str(e), 200)) from e
     if not found.writes:
-        raise BadSet(f"{name} writes nothing at start-up", remedy="choose a list with writes")
+        raise BadSet("handover.writes-nothing-start-up", name=name)
     if len(found.writes) > _MAX_WRITES:
-        raise BadSet(f"{name} has more than {_MAX_WRITES} writes", remedy="choose another file")
+        raise BadSet("handover.more-writes", name=name, max_writes=_MAX_WRITES)
     return found
 
 
@@ -108,10 +103,7 @@ def _by_contents(data: bytes, profile: Profile, name: str) -> ControllerList:
         return ControllerList("igh", tuple(_igh(text)))
     if re.search(r"^\s*(sdo|vendor_id)\s*:", text, re.M):
         return ControllerList("ros2", tuple(_ros2(text, profile)))
-    raise BadSet(
-        f"{name} is no start-up list that is known here",
-        remedy="give TwinCAT, CODESYS or ENI, lcec XML, ROS 2 YAML, an ethercat script, DCF or CSV",
-    )
+    raise BadSet("handover.no-start-up-list", name=name)
 
 
 def _number(text: str | None, place: str, *, base: int = 0) -> int:
@@ -155,18 +147,12 @@ def _xml(data: bytes, name: str) -> ControllerList:
     if root.tag in ("EtherCATMailbox", "EtherCATConfig", "TreeItem"):
         form = "eni" if root.tag == "EtherCATConfig" else "twincat"
         return ControllerList(form, tuple(_init_commands(root, name)))
-    raise BadSet(
-        f"{name} is XML of another kind: its root is {str(root.tag)[:60]}",
-        remedy="give an EtherCATMailbox, EtherCATConfig or lcec masters file",
-    )
+    raise BadSet("handover.xml-another-kind-root", name=name, tag=str(root.tag)[:60])
 
 
 def _one(elements: list[Element], what: str, name: str) -> Element:
     if len(elements) != 1:
-        raise BadSet(
-            f"{name} has {len(elements)} {what}; one drive is compared at a time",
-            remedy="give a file with one slave",
-        )
+        raise BadSet("handover.drive-compared-time", name=name, elements=len(elements), what=what)
     return elements[0]
 
 

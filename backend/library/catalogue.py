@@ -127,18 +127,12 @@ class Library:
             label = f"{item.name} version {row.number}"
         if place == "file":
             raise NotInLibrary(
-                f"{label} lies in a folder of station {item.station}",
-                value=item.name,
-                remedy="open it on that station, or put it into the shared library there",
+                "library.lies-folder-station", value=item.name, label=label, station=item.station
             )
         if place == "blob":
             return self.blobs.get(name)
         if data is None or hashlib.sha256(data).hexdigest() != name:
-            raise BlobFailed(
-                f"the contents of {label} are missing or damaged",
-                value=name,
-                remedy="restore them from a backup",
-            )
+            raise BlobFailed("library.contents-missing-damaged", value=name, label=label)
         return data
 
     # --- changing ---------------------------------------------------------------------
@@ -200,11 +194,7 @@ class Library:
             NotInLibrary: no such entry. NotAllowed: too long or too many.
         """
         if notes is not None and len(notes) > MAX_NOTES:
-            raise NotAllowed(
-                "the notes are too long",
-                limit=f"{MAX_NOTES} characters",
-                remedy="shorten the notes",
-            )
+            raise NotAllowed("library.notes-too-long", limit=f"{MAX_NOTES} characters")
         if tags is not None:
             tags = _clean(tags)
         with self.store.writing() as session:
@@ -299,11 +289,7 @@ class Library:
     def _item(self, session: Session, entry_id: int) -> Item:
         item = session.get(Item, entry_id)
         if item is None:
-            raise NotInLibrary(
-                f"there is no entry {entry_id} in the library",
-                value=entry_id,
-                remedy="choose one from the Files page",
-            )
+            raise NotInLibrary("library.no-entry-library", value=entry_id)
         return item
 
     def _tell(self, action: str, entry: Entry, **detail: Value) -> None:
@@ -342,10 +328,7 @@ def _version(item: Item, number: int | None) -> VersionRow:
     row = next((v for v in reversed(item.versions) if number in (None, v.number)), None)
     if row is None:
         raise NotInLibrary(
-            f"{item.name} has no version {number}",
-            value=number,
-            limit=f"1 to {len(item.versions)}",
-            remedy="choose one of its versions",
+            "library.no-version", value=number, limit=f"1 to {len(item.versions)}", item=item.name
         )
     return row
 
@@ -364,8 +347,6 @@ def _clean(tags: tuple[str, ...]) -> tuple[str, ...]:
     found.pop("", None)
     if len(found) > MAX_TAGS or any(len(tag) > MAX_TAG for tag in found):
         raise NotAllowed(
-            "too many tags, or one is too long",
-            limit=f"{MAX_TAGS} tags of {MAX_TAG} characters",
-            remedy="use fewer or shorter tags",
+            "library.too-many-tags-too", limit=f"{MAX_TAGS} tags of {MAX_TAG} characters"
         )
     return tuple(found)

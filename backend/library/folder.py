@@ -50,11 +50,7 @@ class SetLibrary:
         try:
             return path.read_bytes()
         except FileNotFoundError as error:
-            raise NotAllowed(
-                f"there is no parameter set {path.name}",
-                value=path.name,
-                remedy="choose one from the Files page",
-            ) from error
+            raise NotAllowed("library.no-parameter-set", value=path.name) from error
 
     def load(self, name: str) -> ParameterSet:
         """Read and parse.
@@ -77,11 +73,7 @@ class SetLibrary:
         path = self._path(name)
         parameter_set.parse(data, path.name)
         if path.exists() and not overwrite:
-            raise NotAllowed(
-                f"{path.name} exists already",
-                value=path.name,
-                remedy="choose another name, or allow overwriting",
-            )
+            raise NotAllowed("library.exists-already", value=path.name)
         write_atomically(path, data)
         return path.name
 

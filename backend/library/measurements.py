@@ -170,10 +170,7 @@ def unpack_head(file: Path) -> Head:
 def _head(text: npt.NDArray[np.generic], name: str) -> Head:
     meta = json.loads(text.tobytes())
     if int(meta["version"]) > VERSION:
-        raise BadMeasurement(
-            f"{name} was written by a newer version", value=name,
-            remedy="update servodeck to open it",
-        )  # fmt: skip
+        raise BadMeasurement("library.written-newer-version", value=name)
     saved = datetime.fromisoformat(meta["saved"])
     return Head(str(meta["kind"]), saved, str(meta["drive"]), meta)
 
@@ -189,9 +186,8 @@ def _told(name: str) -> Iterator[None]:
         TokenError,
     ) as error:  # fmt: skip
         raise BadMeasurement(
-            f"{name} is damaged, or no measurement: {error}", value=name,
-            remedy="choose a file that servodeck wrote, or get an undamaged copy",
-        ) from error  # fmt: skip
+            "library.damaged-no-measurement", value=name, cause=str(error)
+        ) from error
 
 
 class MeasurementStore:
@@ -247,11 +243,7 @@ class MeasurementStore:
         try:
             return path.read_bytes()
         except FileNotFoundError as error:
-            raise NotAllowed(
-                f"there is no measurement {path.name}",
-                value=path.name,
-                remedy="choose one of the list; another person may have deleted it",
-            ) from error
+            raise NotAllowed("library.no-measurement-choose-list", value=path.name) from error
 
     def load(self, name: str) -> Measurement:
         """Read and parse.
@@ -277,7 +269,7 @@ class MeasurementStore:
         """
         path = self.path(name)
         if not path.is_file():
-            raise NotAllowed(f"there is no measurement {path.name}", value=path.name)
+            raise NotAllowed("library.no-measurement", value=path.name)
         return unpack_head(path)
 
     def store(self, name: str, data: bytes) -> str:
@@ -289,8 +281,7 @@ class MeasurementStore:
         path = self.path(name)
         unpack(data, path.name)
         if path.exists():
-            raise NotAllowed(f"{path.name} exists already", value=path.name,
-                             remedy="choose another name")  # fmt: skip
+            raise NotAllowed("library.exists-already-choose-another", value=path.name)
         write_atomically(path, data)
         return path.name
 

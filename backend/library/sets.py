@@ -65,11 +65,7 @@ class LibrarySets:
         name = checked_name(name, SUFFIX)
         entry = self.library.named("set", name)
         if entry is None:
-            raise NotAllowed(
-                f"there is no parameter set {name}",
-                value=name,
-                remedy="choose one from the Files page",
-            )
+            raise NotAllowed("library.no-parameter-set", value=name)
         return entry
 
     def read(self, name: str, number: int | None = None) -> bytes:
@@ -103,11 +99,7 @@ class LibrarySets:
         name = checked_name(name, SUFFIX)
         content = parameter_set.parse(data, name)
         if not overwrite and self.library.named("set", name) is not None:
-            raise NotAllowed(
-                f"{name} exists already",
-                value=name,
-                remedy="choose another name, or allow a new version of it",
-            )
+            raise NotAllowed("library.exists-already-choose-another-2", value=name)
         return self.library.add("set", name, data, addition_of(content, tags=tags)).name
 
     def delete(self, name: str) -> None:

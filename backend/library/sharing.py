@@ -36,18 +36,11 @@ def share(library: Library, index: Index, entry: Entry) -> Entry:
     """
     path = index.path(entry.kind, entry.name) if entry.station else None
     if path is None:
-        raise NotAllowed(
-            f"{entry.name} is no file of this station",
-            value=entry.name,
-            remedy="every station of this library has it already, or it was deleted",
-        )
+        raise NotAllowed("library.no-file-station", value=entry.name)
     size = path.stat().st_size
     if size > MOST_BYTES:
         raise NotAllowed(
-            f"{entry.name} is too large for the library",
-            value=size,
-            limit=f"{MOST_BYTES} bytes",
-            remedy="download it and copy it by hand, or record fewer signals",
+            "library.too-large-library", value=size, limit=f"{MOST_BYTES} bytes", entry=entry.name
         )
     latest = entry.latest
     facts = {name: value for name, value in latest.facts.items() if name != _STAMP}
@@ -69,27 +62,15 @@ def fetch(library: Library, index: Index, entry: Entry) -> str:
     """
     folder = index.folders.get(entry.kind)
     if folder is None or entry.station:
-        raise NotAllowed(
-            f"{entry.name} is not shared contents of a recording, measurement or report",
-            value=entry.name,
-            remedy="share it on its station first",
-        )
+        raise NotAllowed("library.not-shared-contents-recording", value=entry.name)
     if Path(entry.name).name != entry.name or not entry.name.endswith(folder.suffixes):
-        raise NotAllowed(
-            f"{entry.name!r} is no file name of this kind",
-            value=entry.name,
-            remedy="give the file the ending of its kind",
-        )
+        raise NotAllowed("library.no-file-name-kind", value=entry.name)
     path = folder.path / entry.name
     data = library.content(entry.id)
     if path.exists():
         if path.read_bytes() == data:
             return entry.name
-        raise NotAllowed(
-            f"another {entry.name} is on this station already",
-            value=entry.name,
-            remedy="delete that one first",
-        )
+        raise NotAllowed("library.another-station-already", value=entry.name)
     # Looked at under a name that no list shows, so that nobody opens what is damaged.
     waiting = path.with_name(f".{path.name}")
     try:
@@ -98,7 +79,9 @@ def fetch(library: Library, index: Index, entry: Entry) -> str:
         require_usable(entry.kind, waiting)
         waiting.rename(path)
     except OSError as error:
-        raise StorageFailed(f"{entry.name} cannot be kept: {error}", value=str(path)) from error
+        raise StorageFailed(
+            "library.cannot-kept", value=str(path), entry=entry.name, cause=str(error)
+        ) from error
     finally:
         waiting.unlink(missing_ok=True)
     return entry.name

@@ -87,12 +87,7 @@ class MotionAuthority:
         """
         grant = self.held(drive, key)
         if grant is None:
-            raise NotGranted(
-                f"{name}: nobody asked for this motion, so it is not begun",
-                drive=name,
-                parameter=key,
-                remedy="begin it on the Motion page",
-            )
+            raise NotGranted("motion.nobody-asked-motion-not", drive=name, parameter=key)
         return grant
 
     def require(
@@ -107,19 +102,15 @@ class MotionAuthority:
         """
         record = self._record(grant)
         if grant.drive != drive or record is None or not grant.covers(key):
-            raise NotGranted(
-                f"{name}: {key} can move the axis, and the permission at hand is not for it",
-                drive=name,
-                parameter=key,
-                remedy="begin the motion anew on the Motion page",
-            )
+            raise NotGranted("motion.move-axis-permission-hand", drive=name, parameter=key)
         why = record.why or ("its time is over" if time.monotonic() > grant.until else "")
         if why and not restores:
             raise NotGranted(
-                f"{name}: {grant.purpose}: the permission to move has ended: {why}",
+                "motion.permission-move-ended",
                 drive=name,
                 parameter=key,
-                remedy="begin the motion anew when it is safe",
+                purpose=grant.purpose,
+                why=why,
             )
 
     # --- issuing and ending -------------------------------------------------------------
@@ -225,11 +216,7 @@ class MotionAuthority:
             if keys is not None and other.keys is None:
                 continue
             if not apart:
-                raise Busy(
-                    f"{name} is moved already: {other.purpose}",
-                    drive=name,
-                    remedy="wait for it to end, or stop it",
-                )
+                raise Busy("motion.moved-already", drive=name, purpose=other.purpose)
         until = time.monotonic() + lasts_s
         if outer is not None:
             until = min(until, outer.until)

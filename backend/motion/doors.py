@@ -75,11 +75,13 @@ def refused(drive: str, profile: Profile, parameter: Parameter) -> NotGranted:
     """The refusal to write this object without a grant, with where it can be done."""
     door = door_of(profile, parameter)
     error = NotGranted(
-        f"{drive}: {parameter.key} {parameter.name} can put energy into the motor, so it is not "
-        "written as a parameter",
+        "motion.put-energy-motor-not",
         drive=drive,
         parameter=parameter.key,
         remedy=f"{door.how} ({door.route})",
+        key=parameter.name,
+        how=door.how,
+        route=door.route,
     )
     error.page, error.route = door.page, door.route
     return error

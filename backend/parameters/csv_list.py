@@ -83,7 +83,7 @@ def read_csv(data: bytes, profile: Profile, name: str = "the file") -> Parameter
         BadSet: too large, no text, or no line of it is a parameter of this family.
     """
     if len(data) > MAX_BYTES:
-        raise BadSet(f"{name} is larger than {MAX_BYTES} bytes", remedy="choose another file")
+        raise BadSet("sets.larger-bytes", name=name, max_bytes=MAX_BYTES)
     text = _decoded(data, name)
     separator = _separator(text)
     places, lines = _lines(text)
@@ -109,15 +109,12 @@ def read_csv(data: bytes, profile: Profile, name: str = "the file") -> Parameter
                 continue
             readings[reading.key] = reading
     except csv.Error as error:
-        raise BadSet(f"{name} is no CSV file: {error}", remedy="export it anew") from error
+        raise BadSet("sets.no-csv-file", name=name, cause=str(error)) from error
     if len(lines) > _MAX_LINES:
         problems.append(f"only the first {_MAX_LINES} lines were read")
     if not readings:
         first = f" ({problems[0]})" if problems else ""
-        raise BadSet(
-            f"{name} has no value of a {profile.title}{first}",
-            remedy="the columns must be key and raw, key and value, or index, subindex and value",
-        )
+        raise BadSet("sets.no-value", name=name, profile_title=profile.title, first=first)
     return ParameterList(tuple(readings.values()), tuple(problems))
 
 
@@ -130,7 +127,7 @@ def _decoded(data: bytes, name: str) -> str:
             continue
         if "\0" not in text:
             return text
-    raise BadSet(f"{name} is no text file", remedy="choose a CSV file")
+    raise BadSet("sets.no-text-file", name=name)
 
 
 def _lines(text: str) -> tuple[list[int], list[str]]:

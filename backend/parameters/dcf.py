@@ -66,8 +66,7 @@ def read_dcf(data: bytes, profile: Profile, name: str = "the file") -> Parameter
     if not readings:
         first = f" ({problems[0]})" if problems else ""
         raise BadSet(
-            f"{name} has no value of a {profile.title}{first}",
-            remedy="choose a file of the same drive family",
+            "sets.no-value-choose-file", name=name, profile_title=profile.title, first=first
         )
     return ParameterList(tuple(readings.values()), tuple(problems))
 
@@ -83,11 +82,12 @@ def _of_another_drive(data: bytes, profile: Profile, name: str) -> list[str]:
     ours = profile.identity
     if vendor is not None and ours.vendor_id and vendor != ours.vendor_id:
         raise BadSet(
-            f"{name} is for a drive of vendor {vendor:08X}h; a {profile.title} has "
-            f"{ours.vendor_id:08X}h",
+            "sets.drive-vendor",
             value=vendor,
             limit=f"{ours.vendor_id:08X}h",
-            remedy="choose the family that the file is of",
+            name=name,
+            profile_title=profile.title,
+            vendor_id=ours.vendor_id,
         )
     if product is not None and ours.product_code and product != ours.product_code:
         return [

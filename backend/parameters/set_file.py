@@ -164,28 +164,24 @@ def parse(data: bytes, name: str = "the file") -> ParameterSet:
         BadSet: not such a file, of a newer version, damaged or truncated.
     """
     if len(data) > MAX_BYTES:
-        raise BadSet(f"{name} is larger than {MAX_BYTES} bytes", remedy="choose another file")
+        raise BadSet("sets.larger-bytes", name=name, max_bytes=MAX_BYTES)
     try:
         content = tomllib.loads(data.decode("utf-8"))
     except (ValueError, RecursionError) as error:  # also of dates and of numbers without end
-        raise BadSet(
-            f"{name} is damaged or no parameter set: {error}",
-            remedy="use an undamaged copy",
-        ) from error
+        raise BadSet("sets.damaged-no-parameter-set", name=name, cause=str(error)) from error
     if content.get("format") != FORMAT:
-        raise BadSet(f"{name} is no parameter set of servodeck", remedy="choose a .sdset file")
+        raise BadSet("sets.no-parameter-set-servodeck", name=name)
     version = content.get("version")
     if version != VERSION:
         raise BadSet(
-            f"{name} has format version {version!r}; this program reads version {VERSION}",
-            remedy="open it with the program version that wrote it",
+            "sets.format-version-program-reads", name=name, version=version, other_version=VERSION
         )
     if "end" not in content:
-        raise BadSet(f"{name} is truncated: its [end] is missing", remedy="use an undamaged copy")
+        raise BadSet("sets.truncated-end-missing", name=name)
     identity, about = _table(content, "identity", name), _table(content, "about", name)
     rows = content.get("parameter", [])
     if not isinstance(rows, list):
-        raise BadSet(f"{name}: [[parameter]] rows are missing", remedy="use an undamaged copy")
+        raise BadSet("sets.parameter-rows-missing", name=name)
     saved = about.get("saved")
     return ParameterSet(
         profile=str(identity.get("profile", "")),
@@ -218,7 +214,7 @@ def _number(table: dict[str, Any], field: str) -> int | None:
 def _table(content: dict[str, Any], field: str, name: str) -> dict[str, Any]:
     table = content.get(field)
     if not isinstance(table, dict):
-        raise BadSet(f"{name}: its [{field}] is missing", remedy="use an undamaged copy")
+        raise BadSet("sets.missing", name=name, field=field)
     return table
 
 

@@ -75,10 +75,10 @@ class Accounts:
         self._budgets.require(_SET_UP, address)
         async with self._changing:
             if self.directory.is_set_up:
-                raise Forbidden("this station has an administrator", remedy="log in")
+                raise Forbidden("people.station-administrator")
             if not same_code(code, self.setup_code):
                 self._budgets.tried(_SET_UP, address)
-                raise Forbidden("the code is wrong", remedy="read it in the terminal again")
+                raise Forbidden("people.code-wrong")
             account = await self._add(name, password, Role.ADMINISTRATOR)
         return await self._begin(account, client)
 
@@ -105,7 +105,7 @@ class Accounts:
             kept = self._passwords.decoy if account is None else account.password
             good = await asyncio.to_thread(self._passwords.verify, kept, password)
         if account is None or not good:
-            raise NotLoggedIn("name or password is wrong", remedy="try again")
+            raise NotLoggedIn("people.name-password-wrong")
         self._budgets.succeeded(name, address, known)
         return await self._begin(account, client)
 
@@ -140,15 +140,11 @@ class Accounts:
     async def _add(self, name: str, password: str, role: Role) -> Account:
         name = checked_person(name)
         if role not in ACCOUNT_ROLES:
-            raise NotAllowed(f"{role} is not a role of an account", value=role)
+            raise NotAllowed("people.not-role-account", value=role)
         require_good(password, name)
         await self._load()
         if self.directory.find(name) is not None:
-            raise NotAllowed(
-                f"there is an account {name} already",
-                value=name,
-                remedy="choose another name, or change that account",
-            )
+            raise NotAllowed("people.account-already", value=name)
         kept = await self._hash(password)
         account = await self._store.call(
             changes.add_account, self._store, name, role, kept, self._now()
@@ -167,7 +163,7 @@ class Accounts:
         async with self._changing:
             account = self.directory.account(account_id)
             if role not in ACCOUNT_ROLES:
-                raise NotAllowed(f"{role} is not a role of an account", value=role)
+                raise NotAllowed("people.not-role-account", value=role)
             if role is not Role.ADMINISTRATOR:
                 self.directory.require_another_administrator(account)
             await self._store.call(
@@ -206,7 +202,7 @@ class Accounts:
         async with self._turns.turn(own, known=True):
             good = await asyncio.to_thread(self._passwords.verify, account.password, password)
         if not good:
-            raise Forbidden("the present password is wrong", remedy="try again")
+            raise Forbidden("people.present-password-wrong")
         self._budgets.succeeded(account.name, address, own)
 
     async def remove(self, account_id: int) -> None:
@@ -250,16 +246,13 @@ class Accounts:
         beyond = scopes - RIGHTS[account.role]
         if beyond or not scopes:
             raise NotAllowed(
-                f"{account.name} cannot give a token {', '.join(sorted(beyond)) or 'no scope'}",
+                "people.cannot-give-token",
                 limit=", ".join(sorted(RIGHTS[account.role])),
-                remedy="choose among these",
+                account=account.name,
+                beyond=", ".join(sorted(beyond)) or "no scope",
             )
         if not timedelta(0) < lifetime <= LONGEST_TOKEN:
-            raise NotAllowed(
-                "a token lives at least a minute and at most a year",
-                limit=f"{LONGEST_TOKEN.days} days",
-                remedy="choose a time within the limit",
-            )
+            raise NotAllowed("people.token-lives-least-minute", limit=f"{LONGEST_TOKEN.days} days")
         secret, now = new_secret(TOKEN_PREFIX), self._now()
         token = Token(digest(secret), account_id, name, scopes, now, now + lifetime)
         async with self._changing:

@@ -63,9 +63,7 @@ def checked_person(name: str) -> str:
     """
     name = unicodedata.normalize("NFC", name).strip()
     if not 1 <= len(name) <= 60 or not name.isprintable():
-        raise NotAllowed(
-            "this is not a name", limit="1 to 60 printable signs", remedy="choose another name"
-        )
+        raise NotAllowed("people.not-name", limit="1 to 60 printable signs")
     return name
 
 

@@ -63,7 +63,7 @@ class Directory:
         """
         session = self._sessions.get(session_id)
         if session is None:
-            raise NoSuchPerson("there is no such session", value=session_id)
+            raise NoSuchPerson("people.no-session", value=session_id)
         return self.account(session.account)
 
     def expires(self, session_id: str) -> datetime | None:
@@ -113,7 +113,7 @@ class Directory:
         """
         account = self._accounts.get(account_id)
         if account is None:
-            raise NoSuchPerson("there is no such account", value=account_id)
+            raise NoSuchPerson("people.no-account", value=account_id)
         return account
 
     def find(self, name: str) -> Account | None:
@@ -133,11 +133,7 @@ class Directory:
             if a.role is Role.ADMINISTRATOR and a.id != account.id
         ]
         if account.role is Role.ADMINISTRATOR and not others:
-            raise NotAllowed(
-                f"{account.name} is the only administrator",
-                value=account.name,
-                remedy="make another account administrator first",
-            )
+            raise NotAllowed("people.administrator", value=account.name)
 
     def sessions(self, account_id: int | None = None) -> list[LoginSession]:
         """Living sessions, newest first; of one account where given."""

@@ -112,11 +112,7 @@ class Leases:
         """
         holder = self._holders.get(drive)
         if holder is not None and holder.connection != connection:
-            raise Busy(
-                f"{holder.person} has control of this axis",
-                drive=drive,
-                remedy="ask for control; STOP works for everyone",
-            )
+            raise Busy("people.control-axis", drive=drive, person=holder.person)
 
     # --- asking and handing over ------------------------------------------------------
 
@@ -134,11 +130,7 @@ class Leases:
             return
         other = self._asked.get(drive)
         if other is not None and other.connection != connection:
-            raise Busy(
-                f"{other.person} is already asking for control",
-                drive=drive,
-                remedy="wait for the answer",
-            )
+            raise Busy("people.already-asking-control", drive=drive, person=other.person)
         if other is None:
             until = self._ticks() + ANSWER_WITHIN_S
             self._asked[drive] = Asked(connection, person, until)
@@ -163,15 +155,10 @@ class Leases:
         """
         holder = self._holders.get(drive)
         if holder is None or holder.connection != connection:
-            raise NotAllowed(
-                "only who has control can hand it over", drive=drive, remedy="take control first"
-            )
+            raise NotAllowed("people.control-hand-over", drive=drive)
         if time_s is not None and not 1.0 <= time_s <= LONGEST_HAND_OVER_S:
             raise NotAllowed(
-                "a hand-over lasts 1 s to 8 h",
-                value=time_s,
-                limit=f"{LONGEST_HAND_OVER_S:.0f} s",
-                remedy="choose a time within the limit",
+                "people.hand-over-lasts", value=time_s, limit=f"{LONGEST_HAND_OVER_S:.0f} s"
             )
         if to == connection:
             return

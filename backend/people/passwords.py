@@ -43,11 +43,12 @@ def require_good(password: str, name: str) -> None:
     """
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
         raise NotAllowed(
-            f"a password needs {MIN_LENGTH} to {MAX_LENGTH} characters",
+            "people.password-needs-characters",
             limit=f"{MIN_LENGTH} to {MAX_LENGTH} characters",
-            remedy="several words make a good one",
+            min_length=MIN_LENGTH,
+            max_length=MAX_LENGTH,
         )
     if name and name.casefold() in password.casefold() and len(password) < len(name) + 6:
-        raise NotAllowed("the password is the name", remedy="choose something else")
+        raise NotAllowed("people.password-name")
     if len(set(password)) < 4:
-        raise NotAllowed("the password repeats itself", remedy="several words make a good one")
+        raise NotAllowed("people.password-repeats-itself")

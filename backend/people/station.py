@@ -143,7 +143,7 @@ class People:
         now = self.renewed(identity)
         if now is None:
             if message != "stop":
-                raise NotLoggedIn("the session is over", remedy="log in again")
+                raise NotLoggedIn("people.session-over")
             return replace(identity, rights=frozenset())
         if message != "ping":
             self.accounts.directory.touch(identity.session)
@@ -170,10 +170,7 @@ class People:
             NotAllowed: this station has no accounts.
         """
         if not self.accounts_needed:
-            raise NotAllowed(
-                "this station runs without accounts, so that a guest could not be told from you",
-                remedy="start it with `servodeck serve --accounts`",
-            )
+            raise NotAllowed("people.station-runs-without-accounts")
 
     def _ended(self, session: str) -> None:
         for listener in self.on_ended:

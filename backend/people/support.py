@@ -112,7 +112,7 @@ class Support:
         """
         found = self._invitations.get(invitation_id)
         if found is None:
-            raise NoSuchPerson("there is no such invitation", value=invitation_id)
+            raise NoSuchPerson("people.no-invitation", value=invitation_id)
         return found
 
     def invite(
@@ -126,21 +126,18 @@ class Support:
         guest = checked_person(guest)
         if not 60.0 <= lifetime_s <= LONGEST_INVITATION_S:
             raise NotAllowed(
-                "an invitation lasts a minute to a day",
+                "people.invitation-lasts-minute-day",
                 value=lifetime_s,
                 limit=f"60 to {LONGEST_INVITATION_S:.0f} s",
-                remedy="choose a time within the limit",
             )
         if beyond := allowed - GRANTABLE:
             raise NotAllowed(
-                f"no guest may have {', '.join(sorted(beyond))}",
+                "people.no-guest-may",
                 limit=", ".join(sorted(GRANTABLE)),
-                remedy="leave these rights out; whoever needs them needs an account",
+                beyond=", ".join(sorted(beyond)),
             )
         if sum(i.state != "ended" for i in self._invitations.values()) >= MOST_OPEN:
-            raise NotAllowed(
-                f"{MOST_OPEN} invitations are open", remedy="end those that are not needed"
-            )
+            raise NotAllowed("people.invitations-open", most_open=MOST_OPEN)
         secret = new_secret()
         made = Invitation(
             id=secrets.token_hex(6),
@@ -165,21 +162,19 @@ class Support:
         """
         wait = self._throttle.wait_s(address)
         if wait > 0:
-            raise TooOften("too many wrong tries", wait)
+            raise TooOften("people.too-many-wrong-tries", wait)
         self.tick()
         hashed = digest(link)
         found = next((i for i in self._invitations.values() if i.link == hashed), None)
         if found is None or found.state != "open":
             self._throttle.failed(address)
-            raise NotLoggedIn(
-                "this invitation is not valid, or was used already", remedy="ask for a new one"
-            )
+            raise NotLoggedIn("people.invitation-not-valid-used")
         if not same_code(code, found.code):
             self._throttle.failed(address)
             found.tries += 1
             if found.tries >= CODE_TRIES:
                 self._end(found, "too many wrong codes")
-            raise NotLoggedIn("the code is wrong", remedy="ask the person on site for it")
+            raise NotLoggedIn("people.code-wrong-ask-person")
         secret = new_secret()
         found.state, found.session = "joined", digest(secret)
         self._changed()
@@ -224,21 +219,11 @@ class Support:
         found = self.of_session(identity.session)
         grant = None if found is None else self.running(found)
         if found is None or grant is None or right not in grant.rights:
-            raise Forbidden(
-                f"a guest may not do this without a grant ({right})",
-                drive=drive,
-                remedy="ask the person on site to grant control",
-            )
+            raise Forbidden("people.guest-may-not-without", drive=drive, right=right)
         if grant.drive is not None and drive != grant.drive:
-            raise Forbidden(
-                "the grant is for another axis", drive=drive, remedy="ask for this axis too"
-            )
+            raise Forbidden("people.grant-another-axis", drive=drive)
         if right in MOVING and not self.enabled(found.id):
-            raise Forbidden(
-                "the person on site does not hold the enabling button",
-                drive=drive,
-                remedy="ask them to hold it, then try again",
-            )
+            raise Forbidden("people.person-site-not-hold", drive=drive)
 
     # --- grants -----------------------------------------------------------------------
 
@@ -257,19 +242,18 @@ class Support:
         """
         found = self.find(invitation_id)
         if found.state != "joined":
-            raise NotAllowed(f"{found.guest} is not here", remedy="wait until they have joined")
+            raise NotAllowed("people.not", guest=found.guest)
         if beyond := rights - found.allowed:
             raise NotAllowed(
-                f"the invitation does not allow {', '.join(sorted(beyond))}",
+                "people.invitation-not-allow",
                 limit=", ".join(sorted(found.allowed)) or "look only",
-                remedy="end it and make one that does",
+                beyond=", ".join(sorted(beyond)),
             )
         if not rights or not 10.0 <= time_s <= LONGEST_GRANT_S:
             raise NotAllowed(
-                "a grant names a right and lasts 10 s to 8 h",
+                "people.grant-names-right-lasts",
                 value=time_s,
                 limit=f"10 to {LONGEST_GRANT_S:.0f} s",
-                remedy="choose a time within the limit",
             )
         found.grant = Grant(rights, self._ticks() + time_s, drive, by)
         self._changed()
@@ -300,9 +284,7 @@ class Support:
         found = self.find(invitation_id)
         grant = self.running(found)
         if grant is None or not grant.rights & MOVING:
-            raise NotAllowed(
-                f"{found.guest} has no grant to move anything", remedy="grant measure or motion"
-            )
+            raise NotAllowed("people.no-grant-move-anything", guest=found.guest)
         self._holds[invitation_id] = (connection, self._ticks())
         self._changed()
 
@@ -355,11 +337,7 @@ class Support:
         """
         text = text.strip()
         if not 1 <= len(text) <= CHAT_LENGTH:
-            raise NotAllowed(
-                "a line has 1 to 500 signs",
-                limit=f"{CHAT_LENGTH} signs",
-                remedy="write it in several lines",
-            )
+            raise NotAllowed("people.line-500-signs", limit=f"{CHAT_LENGTH} signs")
         self._said += 1
         said = Said(self._said, time.time(), identity.person, identity.is_guest, text)
         self._chat.append(said)

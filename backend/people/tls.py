@@ -43,9 +43,7 @@ def own_certificate(certificate: Path, key: Path) -> Certificate:
         first = x509.load_pem_x509_certificate(certificate.read_bytes())
         key.read_bytes()
     except (OSError, ValueError) as error:
-        raise NotAllowed(
-            f"the certificate cannot be used: {error}", remedy="give PEM files, chain included"
-        ) from error
+        raise NotAllowed("people.certificate-cannot-used", cause=str(error)) from error
     return Certificate(certificate, key, _fingerprint(first), own=True)
 
 

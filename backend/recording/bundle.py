@@ -75,9 +75,7 @@ def _build(evidence: Evidence, target: Path) -> None:
 
 def _failed(target: Path, why: str) -> StorageFailed:
     return StorageFailed(
-        f"the support bundle {target.name} could not be written: {why}",
-        value=str(target),
-        remedy="free some space",
+        "recording.support-bundle-not-written", value=str(target), target=target.name, why=why
     )
 
 

@@ -225,9 +225,11 @@ class FaultCapture:
         free = free_bytes(self.folder)
         if free < RESERVE_BYTES:
             raise StorageFailed(
-                f"the disk is nearly full, {free >> 20} MiB are left", value=free,
-                limit=f"{RESERVE_BYTES >> 20} MiB stay free", remedy="delete old recordings",
-            )  # fmt: skip
+                "recording.disk-nearly-full-mib",
+                value=free,
+                limit=f"{RESERVE_BYTES >> 20} MiB stay free",
+                free_mib=free >> 20,
+            )
         path = self._path_for(evidence.reason, evidence.time)
         await build_apart(evidence, path)
         for old in self.names()[KEEP_BUNDLES:]:
@@ -304,6 +306,5 @@ class FaultCapture:
         """
         path = self.folder / checked_name(name, SUFFIX)
         if not path.is_file():
-            raise NotAllowed(f"there is no support bundle {path.name}", value=path.name,
-                             remedy="choose one from the list")  # fmt: skip
+            raise NotAllowed("recording.no-support-bundle", value=path.name)
         return path

@@ -86,11 +86,7 @@ class RecordingLibrary:
         """
         path = self.path(name)
         if not path.is_file():
-            raise NotAllowed(
-                f"there is no recording {path.name}",
-                value=path.name,
-                remedy="choose one from the list of recordings",
-            )
+            raise NotAllowed("recording.no-recording", value=path.name)
         return path
 
     def free_name(self, wanted: str) -> str:
@@ -108,10 +104,7 @@ class RecordingLibrary:
             NotAllowed: no such kind.
         """
         if kind not in EXPORTS:
-            raise NotAllowed(
-                f"{kind!r} is no export format", value=kind, limit=", ".join(EXPORTS),
-                remedy="choose one of these",
-            )  # fmt: skip
+            raise NotAllowed("recording.no-export-format", value=kind, limit=", ".join(EXPORTS))
         stem = checked_name(name, SUFFIX).removesuffix(SUFFIX)
         return self.folder / "exports" / (stem + EXPORTS[kind])
 

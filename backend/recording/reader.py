@@ -106,11 +106,7 @@ class RecordingReader:
         try:
             self._file: BinaryIO = path.open("rb")
         except OSError as error:
-            raise NotAllowed(
-                f"there is no recording {path.name}",
-                value=path.name,
-                remedy="choose one from the list of recordings",
-            ) from error
+            raise NotAllowed("recording.no-recording", value=path.name) from error
         try:
             self.header = self._read_header()
             self.channels = _channels(self.header)
@@ -119,9 +115,7 @@ class RecordingReader:
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             self._file.close()
             raise BadRecording(
-                f"{path.name} is not a recording, or its beginning is damaged",
-                value=path.name,
-                remedy="delete it, or open it with the version that wrote it",
+                "recording.not-recording-beginning-damaged", value=path.name
             ) from error
 
     def __enter__(self) -> RecordingReader:
@@ -170,7 +164,7 @@ class RecordingReader:
         self._file.seek(ref.offset)
         chunk = self._chunk()
         if chunk is None:
-            raise BadRecording(f"{self.path.name} changed while it was read", value=ref.offset)
+            raise BadRecording("recording.changed-read", value=ref.offset, path=self.path.name)
         return chunks.read_samples(chunk[1])
 
     def events(self) -> list[dict[str, Any]]:

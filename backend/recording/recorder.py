@@ -125,21 +125,17 @@ class Recorder:
     def _check(self) -> None:
         settings = self.settings
         if not settings.channels:
-            raise OutOfRange("choose at least one signal to record", remedy="add a channel")
+            raise OutOfRange("recording.choose-least-signal-record")
         if len(set(settings.channels)) != len(settings.channels):
-            raise OutOfRange("a signal is there twice", remedy="remove one of them")
+            raise OutOfRange("recording.signal-twice")
         if settings.pre_s and settings.trigger is None:
-            raise OutOfRange(
-                "there is a time before the trigger but no trigger", value=settings.pre_s,
-                remedy="set a trigger, or no pre-trigger",
-            )  # fmt: skip
+            raise OutOfRange("recording.time-before-trigger-no", value=settings.pre_s)
         trigger = settings.trigger
         watched = None if trigger is None else (trigger.drive, trigger.key)
         if trigger and trigger.kind != "fault" and watched not in settings.channels:
             raise NotAllowed(
-                "the trigger looks at a signal that is not recorded",
-                drive=trigger.drive, parameter=trigger.key, remedy="record that signal too",
-            )  # fmt: skip
+                "recording.trigger-looks-signal-not", drive=trigger.drive, parameter=trigger.key
+            )
 
     async def start(self) -> None:
         """Read the settings that are not known, subscribe, and open the file.
@@ -301,11 +297,7 @@ class Recorder:
             NotAllowed: it does not wait.
         """
         if self.phase != "waiting":
-            raise NotAllowed(
-                f"{self.name} does not wait for a trigger",
-                value=self.phase,
-                remedy="nothing needs to be done: look at the state of the recording",
-            )
+            raise NotAllowed("recording.not-wait-trigger", value=self.phase, name=self.name)
         self._begin("triggered")
 
     # --- end --------------------------------------------------------------------------

@@ -43,7 +43,7 @@ class ViewerAssets:
             NotAllowed: no such file, or the SDK's command line does not run here.
         """
         if name not in FILES:
-            raise NotAllowed(f"the viewer has no file {name!r}", value=name)
+            raise NotAllowed("recording.viewer-no-file", value=name)
         path = self.folder / f"{name}.gz"
         async with self._lock:
             if not path.is_file():
@@ -65,9 +65,7 @@ def extract(folder: Path) -> None:
     """
     spec = find_spec("rerun_cli")
     if spec is None or not spec.submodule_search_locations:
-        raise NotAllowed(
-            "rerun's command line is not installed", remedy="install rerun-sdk with its CLI"
-        )
+        raise NotAllowed("recording.rerun-command-line-not")
     program = Path(spec.submodule_search_locations[0]) / (
         "rerun.exe" if os.name == "nt" else "rerun"
     )
@@ -117,7 +115,4 @@ def _fetch(process: subprocess.Popen[bytes], port: int, name: str) -> bytes:
         finally:
             connection.close()
         time.sleep(0.05)
-    raise NotAllowed(
-        f"rerun's viewer could not be taken out of the SDK: {problem}",
-        remedy="run `rerun --serve-web` in a terminal to see why it does not start",
-    )
+    raise NotAllowed("recording.rerun-viewer-not-taken", problem=problem)

@@ -61,9 +61,8 @@ class Recordings:
         """
         if len(self.running) >= MAX_RUNNING:
             raise Busy(
-                f"{MAX_RUNNING} recordings run already", limit=str(MAX_RUNNING),
-                remedy="end one of them",
-            )  # fmt: skip
+                "recording.recordings-run-already", limit=str(MAX_RUNNING), max_running=MAX_RUNNING
+            )
         settings = self._canonical(settings)
         stamp = datetime.now(UTC).strftime("%Y-%m-%d %H-%M-%S")
         name = self.library.free_name(settings.name or f"recording {stamp}")
@@ -113,9 +112,7 @@ class Recordings:
         file = self.library.path(name).name
         recorder = self.running.get(file)
         if recorder is None:
-            raise NotAllowed(
-                f"no recording {file} runs", value=file, remedy="look at the list of recordings"
-            )
+            raise NotAllowed("recording.no-recording-runs", value=file)
         return recorder
 
     def _ended(self, recorder: Recorder) -> None:
@@ -166,7 +163,7 @@ class Recordings:
         """
         path = self.library.existing(name)
         if path.name in self.running:
-            raise Busy(f"{path.name} is being recorded", value=path.name, remedy="end it first")
+            raise Busy("recording.being-recorded", value=path.name)
         return path
 
     async def delete(self, name: str) -> None:
@@ -179,7 +176,7 @@ class Recordings:
         if any(
             file == path.name and j.state == "running" for (file, _), j in self._exporting.items()
         ):
-            raise Busy(f"{path.name} is being exported", value=path.name, remedy="wait for it")
+            raise Busy("recording.being-exported", value=path.name)
         await asyncio.to_thread(self.library.delete, name)
         self.bench.journal.add(f"recording {path.name} was deleted")
 
@@ -240,7 +237,4 @@ async def run_export(source: Path, target: Path, kind: str, progress: Progress) 
         text = (await words).decode(errors="replace").strip()
     if status != 0:
         last = text.splitlines()[-1] if text else f"exit code {status}"
-        raise StorageFailed(
-            f"{target.name} could not be written: {last}", value=target.name,
-            remedy="free some space and try again; the recording itself is unharmed",
-        )  # fmt: skip
+        raise StorageFailed("recording.not-written", value=target.name, last=last)

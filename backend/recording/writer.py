@@ -124,10 +124,11 @@ class RecordingWriter:
                 return
             if self._queued + size > self._limit:
                 self._error = StorageFailed(
-                    f"{self.path.name}: the disk does not keep up; {self._queued >> 20} MiB wait",
+                    "recording.disk-not-keep-up",
                     value=self._queued,
                     limit=f"{self._limit >> 20} MiB",
-                    remedy="record fewer channels or onto a faster disk; what was written is good",
+                    path=self.path.name,
+                    queued_mib=self._queued >> 20,
                 )
             else:
                 self._queue.append(item)
@@ -260,17 +261,19 @@ class RecordingWriter:
         free = self._free(self.path.parent)
         if free < self._reserve:
             raise StorageFailed(
-                f"{self.path.name}: the disk is nearly full, {free >> 20} MiB are left",
+                "recording.disk-nearly-full-mib-left",
                 value=free,
                 limit=f"{self._reserve >> 20} MiB stay free",
-                remedy="delete old recordings or free some space; what was written is good",
+                path=self.path.name,
+                free_mib=free >> 20,
             )
 
     def _storage(self, error: OSError) -> StorageFailed:
         return StorageFailed(
-            f"{self.path.name} could not be written: {error.strerror or error}",
+            "recording.not-written-free-some",
             value=str(self.path),
-            remedy="free some space or choose another folder; what was written is good",
+            path=self.path.name,
+            strerror=error.strerror or error,
         )
 
 

@@ -64,9 +64,8 @@ class ChangeLog:
                 file.write(json.dumps(row) + "\n")
         except OSError as error:
             raise StorageFailed(
-                f"the change was written to the drive, but not to the report's list: {error}",
-                drive=drive_id, remedy="free some space; note the values by hand",
-            ) from error  # fmt: skip
+                "report.change-written-drive-not", drive=drive_id, cause=str(error)
+            ) from error
 
     def read(self, drive_id: str) -> tuple[Change, ...]:
         """All changes, oldest first. A line that a crash cut short is left out."""

@@ -203,10 +203,7 @@ def facts_of_files(heads: Mapping[str, Head], about: About) -> Facts:
     }
     if len(identities) != 1:
         drives = ", ".join(sorted(f"{name} ({serial})" for name, _, serial in identities))
-        raise NotAllowed(
-            "the measurements are of different drives", value=drives or "none",
-            remedy="make one report for each drive",
-        )  # fmt: skip
+        raise NotAllowed("report.measurements-different-drives", value=drives or "none")
     head = next(iter(heads.values()))
     told = head.meta.get("identity")
     numbers = told if isinstance(told, dict) else {}

@@ -35,8 +35,7 @@ class ReportStore:
     def _path(self, name: str) -> Path:
         suffix = next((f".{form}" for form in FORMATS if name.endswith(f".{form}")), None)
         if suffix is None:
-            raise NotAllowed(f"{name!r} is no report", value=name, limit=".html, .pdf",
-                             remedy="choose one of the list")  # fmt: skip
+            raise NotAllowed("report.no-report", value=name, limit=".html, .pdf")
         return self.folder / checked_name(name, suffix)
 
     def save(self, drive: str, form: Format, data: bytes) -> str:
@@ -68,11 +67,7 @@ class ReportStore:
         try:
             return path.read_bytes()
         except FileNotFoundError as error:
-            raise NotAllowed(
-                f"there is no report {path.name}",
-                value=path.name,
-                remedy="choose one of the list; another person may have deleted it",
-            ) from error
+            raise NotAllowed("report.no-report-choose-list", value=path.name) from error
 
     def delete(self, name: str) -> None:
         """Delete a file.

@@ -111,8 +111,8 @@ def view_of(tool: object, result: dict[str, object]) -> AnyView:
     }  # fmt: skip
     kind = kinds.get(tool)
     if kind is None:
-        raise BadMeasurement(f"a report cannot show what {tool!r} measures", value=str(tool))
+        raise BadMeasurement("report.report-cannot-show-measures", value=str(tool), tool=tool)
     try:
         return kind.model_validate(result)
     except ValidationError as error:
-        raise BadMeasurement(f"the result of {tool} is not complete: {error}") from error
+        raise BadMeasurement("report.result-not-complete", tool=tool, cause=str(error)) from error

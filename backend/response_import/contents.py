@@ -57,11 +57,10 @@ def read_table(data: bytes, name: str) -> Table:
     """
     if len(data) > MAX_FILE_BYTES:
         raise BadRecording(
-            f"{name} has {len(data)} bytes", value=len(data), limit=f"{MAX_FILE_BYTES} bytes",
-            remedy="export a shorter part, or fewer columns",
-        )  # fmt: skip
+            "import.bytes", value=len(data), limit=f"{MAX_FILE_BYTES} bytes", name=name
+        )
     if not data:
-        raise BadRecording(f"{name} is empty", value=0, remedy="export the recording again")
+        raise BadRecording("import.empty", value=0, name=name)
     data = _unpacked(data, name)
     if (found := read_matlab(data, name)) is not None:
         names, columns = found
@@ -78,15 +77,14 @@ def _unpacked(data: bytes, name: str) -> bytes:
         with gzip.GzipFile(fileobj=io.BytesIO(data)) as packed:
             plain = packed.read(MAX_UNPACKED_BYTES + 1)
     except (OSError, EOFError, zlib.error) as error:
-        raise BadRecording(
-            f"{name} is a damaged gzip file: {error}", value=name, remedy="copy the file again"
-        ) from error
+        raise BadRecording("import.damaged-gzip-file", value=name, cause=str(error)) from error
     if len(plain) > MAX_UNPACKED_BYTES:
         raise BadRecording(
-            f"{name} unpacks to more than {MAX_UNPACKED_BYTES} bytes",
-            value=name, limit=f"{MAX_UNPACKED_BYTES} bytes",
-            remedy="export a shorter part, or fewer columns",
-        )  # fmt: skip
+            "import.unpacks-more-bytes",
+            value=name,
+            limit=f"{MAX_UNPACKED_BYTES} bytes",
+            max_unpacked_bytes=MAX_UNPACKED_BYTES,
+        )
     return plain
 
 
@@ -103,8 +101,7 @@ _KNOWN = (
 def _refuse_known(data: bytes, name: str) -> None:
     for begin, what, remedy in _KNOWN:
         if data.lstrip(b"\xef\xbb\xbf").startswith(begin):
-            raise BadRecording(f"{name} is {what}, not a table of numbers", value=name,
-                               remedy=remedy)  # fmt: skip
+            raise BadRecording("import.not-table-numbers", value=name, remedy=remedy, what=what)
 
 
 def _decoded(data: bytes, name: str) -> str:
@@ -119,10 +116,7 @@ def _decoded(data: bytes, name: str) -> str:
     if sample[0::2].count(0) > 0.4 * half:
         return _as(data, "utf-16-be", name)
     if b"\0" in data[: 1 << 20]:
-        raise BadRecording(
-            f"{name} holds binary data (a zero byte at {data.index(0)})", value=name,
-            remedy="export the recording as CSV or as MATLAB MAT (version 7 or older)",
-        )  # fmt: skip
+        raise BadRecording("import.holds-binary-data-zero", value=name, index=data.index(0))
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
@@ -135,9 +129,8 @@ def _as(data: bytes, encoding: str, name: str) -> str:
         return data.decode(encoding)
     except UnicodeDecodeError as error:
         raise BadRecording(
-            f"{name} is damaged: it begins as {encoding} text and is none at byte {error.start}",
-            value=name, remedy="export it again, as UTF-8",
-        ) from error  # fmt: skip
+            "import.damaged-begins-text-none", value=name, encoding=encoding, start=error.start
+        ) from error
 
 
 def _split(line: str, separator: str | None) -> list[str]:
@@ -179,10 +172,8 @@ def _layout(lines: list[str], name: str) -> _Layout:
     if best is None:
         first = next((line for line in lines if line.strip()), "")[:60]
         raise BadRecording(
-            f"{name} holds no table of numbers within its first {_HEAD_LINES} lines; it begins "
-            f"{first!r}", value=name,
-            remedy="export at least two columns of numbers, separated by comma, semicolon or tab",
-        )  # fmt: skip
+            "import.holds-no-table-numbers", value=name, head_lines=_HEAD_LINES, first=first
+        )
     return best[2]
 
 
@@ -218,16 +209,10 @@ def _from_text(text: str, name: str) -> Table:
     # Only line ends: other characters that Python splits at occur inside units.
     lines = re.split(r"\r\n|\n|\r", text)
     if len(lines) > MAX_ROWS + _HEAD_LINES:
-        raise BadRecording(
-            f"{name} has {len(lines)} lines", value=len(lines), limit=f"{MAX_ROWS} lines",
-            remedy="export a shorter part",
-        )  # fmt: skip
+        raise BadRecording("import.lines", value=len(lines), limit=f"{MAX_ROWS} lines", name=name)
     layout = _layout(lines[:_HEAD_LINES], name)
     if layout.width > MAX_COLUMNS:
-        raise BadRecording(
-            f"{name} has {layout.width} columns", value=layout.width, limit=str(MAX_COLUMNS),
-            remedy="export fewer columns",
-        )  # fmt: skip
+        raise BadRecording("import.columns", value=layout.width, limit=str(MAX_COLUMNS), name=name)
     rows = lines[layout.first :]
     while rows and not rows[-1].strip():
         rows.pop()
@@ -252,19 +237,25 @@ def _numbers(rows: list[str], layout: _Layout, name: str) -> tuple[FloatArray, .
             cells.pop()
         if len(cells) > layout.width:
             raise BadRecording(
-                f"{name}, line {layout.first + 1 + i}: {len(cells)} columns where the table has "
-                f"{layout.width}", value=line[:80], limit=f"{layout.width} columns",
-                remedy="remove that line, or export the recording again",
-            )  # fmt: skip
+                "import.line-columns-table",
+                value=line[:80],
+                limit=f"{layout.width} columns",
+                name=name,
+                first=layout.first + 1 + i,
+                cells=len(cells),
+                width=layout.width,
+            )
         for j, cell in enumerate(cells):
             if cell.lower() in _MISSING:
                 continue
             if not _is_number(cell, layout.comma):
                 raise BadRecording(
-                    f"{name}, line {layout.first + 1 + i}, column {j + 1}: {cell[:40]!r} is no "
-                    "number", value=cell[:40],
-                    remedy="remove that line, or export the recording again",
-                )  # fmt: skip
+                    "import.line-column-no-number",
+                    value=cell[:40],
+                    name=name,
+                    first=layout.first + 1 + i,
+                    j=j + 1,
+                )
             out[i, j] = float(re.sub("[dD]", "e", cell.replace(",", ".")))
     return tuple(np.ascontiguousarray(c) for c in out.T)
 

@@ -101,26 +101,29 @@ def evaluate_signals(signals: Signals, name: str, settings: ImportSettings) -> d
 def _check(settings: ImportSettings, scale: Scale) -> None:
     if settings.structure == "motor_speed" and not scale.speed:
         raise BadRecording(
-            f"the structure motor_speed needs a speed as output, not {settings.output_unit}",
-            parameter="output-unit", value=settings.output_unit, limit="rad/s, rpm, rev/s, deg/s",
-            remedy="give the output's unit",
-        )  # fmt: skip
+            "import.structure-motor-speed-needs",
+            parameter="output-unit",
+            value=settings.output_unit,
+            limit="rad/s, rpm, rev/s, deg/s",
+        )
     for what, value in (
         ("output filter", settings.output_filter_hz),
         ("current bandwidth", settings.current_bandwidth_hz),
     ):
         if value is not None and not 0.1 <= value <= 1e5:
-            raise BadRecording(f"the {what} is {value:g} Hz", parameter=what, value=value,
-                               limit="0.1 Hz to 100 kHz", remedy="give it in Hz")  # fmt: skip
+            raise BadRecording("import.hz", parameter=what, value=value, limit="0.1 Hz to 100 kHz")
     if settings.loop_delay_s is not None and not 0.0 <= settings.loop_delay_s <= 0.1:
         raise BadRecording(
-            f"the loop delay is {settings.loop_delay_s:g} s", parameter="loop delay",
-            value=settings.loop_delay_s, limit="0 to 0.1 s", remedy="give it in seconds",
-        )  # fmt: skip
+            "import.loop-delay",
+            parameter="loop delay",
+            value=settings.loop_delay_s,
+            limit="0 to 0.1 s",
+        )
     low, high = settings.band_hz or (1.0, 2.0)
     if not 0.0 <= low < high:
-        raise BadRecording(f"the band is {low:g} to {high:g} Hz", parameter="band", value=low,
-                           limit=f"below {high:g}", remedy="give the lower end first")  # fmt: skip
+        raise BadRecording(
+            "import.band-hz", parameter="band", value=low, limit=f"below {high:g}", high_hz=high
+        )
 
 
 def _told(error: NoResponse, name: str, signals: Signals) -> BadRecording:
@@ -128,25 +131,33 @@ def _told(error: NoResponse, name: str, signals: Signals) -> BadRecording:
     facts = error.facts
     if error.code == "few-lines":
         return BadRecording(
-            f"{name}: the input {signals.input_name!r} excites {facts['lines']:.0f} frequencies",
-            parameter=signals.input_name, value=facts["lines"], limit=f"{facts['least']:.0f}",
-            remedy="record a multisine, a chirp or noise, or widen the band that is evaluated",
-        )  # fmt: skip
+            "import.input-excites-frequencies",
+            parameter=signals.input_name,
+            value=facts["lines"],
+            limit=f"{facts['least']:.0f}",
+            name=name,
+            facts=facts["lines"],
+        )
     if error.code == "incoherent":
         return BadRecording(
-            f"{name}: {signals.output_name!r} does not follow {signals.input_name!r} "
-            f"(coherence {facts['coherence']:.2f})", parameter=signals.output_name,
-            value=facts["coherence"], limit="0.5",
-            remedy="check which columns are input and output, or excite more strongly",
-        )  # fmt: skip
+            "import.not-follow-coherence",
+            parameter=signals.output_name,
+            value=facts["coherence"],
+            limit="0.5",
+            name=name,
+            input_name=signals.input_name,
+            facts=facts["coherence"],
+        )
     if error.code == "too-short":
         return BadRecording(
-            f"{name} has {facts['samples']:.0f} samples", value=facts["samples"],
-            limit=f"at least {facts['least']:.0f}", remedy="record longer",
-        )  # fmt: skip
+            "import.samples",
+            value=facts["samples"],
+            limit=f"at least {facts['least']:.0f}",
+            name=name,
+            facts=facts["samples"],
+        )
     column = signals.input_name if error.code == "input-constant" else signals.output_name
-    return BadRecording(f"{name}: the column {column!r} is constant", parameter=column,
-                        value=facts["value"], remedy="give another column")  # fmt: skip
+    return BadRecording("import.column-constant", parameter=column, value=facts["value"], name=name)
 
 
 def _as_json(

@@ -27,9 +27,8 @@ def read_matlab(data: bytes, name: str) -> tuple[tuple[str, ...], tuple[FloatArr
     """
     if data[:8] == b"\x89HDF\r\n\x1a\n" or data[512:520] == b"\x89HDF\r\n\x1a\n":
         raise BadRecording(
-            f"{name} is a MATLAB file of version 7.3 (HDF5)", value="7.3", limit="version 7",
-            remedy="in MATLAB: save('file.mat', 'a', 'b', '-v7'); or writematrix to a CSV",
-        )  # fmt: skip
+            "import.matlab-file-version-hdf5", value="7.3", limit="version 7", name=name
+        )
     five = data[:6] == b"MATLAB" or (len(data) > 128 and data[126:128] in {b"IM", b"MI"})
     if not five:
         return None
@@ -42,18 +41,14 @@ def read_matlab(data: bytes, name: str) -> tuple[tuple[str, ...], tuple[FloatArr
                         chars_as_strings=True)  # fmt: skip
     except Exception as error:
         # A damaged file makes this reader raise nearly anything; it runs in a process of its own.
-        raise BadRecording(
-            f"{name} is a damaged MATLAB file: {error}", value=name,
-            remedy="save it again with save(…, '-v7')",
-        ) from error  # fmt: skip
+        raise BadRecording("import.damaged-matlab-file", value=name, cause=str(error)) from error
     names: list[str] = []
     columns: list[FloatArray] = []
     for key, value in found.items():
         if not key.startswith("__"):
             _collect(key, value, names, columns, 0)
     if not columns:
-        raise BadRecording(f"{name} holds no vectors of numbers", value=name,
-                           remedy="save time, input and output as vectors")  # fmt: skip
+        raise BadRecording("import.holds-no-vectors-numbers", value=name)
     return tuple(names), tuple(columns)
 
 
@@ -71,16 +66,19 @@ def _refuse_bomb(data: bytes, name: str) -> None:
                 try:
                     total += len(packed.decompress(rest, 1 << 24))
                 except zlib.error as error:
-                    raise BadRecording(f"{name} is a damaged MATLAB file: {error}", value=name,
-                                       remedy="copy the file again") from error  # fmt: skip
+                    raise BadRecording(
+                        "import.damaged-matlab-file-copy-file", value=name, cause=str(error)
+                    ) from error
                 rest = packed.unconsumed_tail
         else:
             total += size
         if total > _MAX_UNPACKED:
             raise BadRecording(
-                f"{name} unpacks to more than {_MAX_UNPACKED} bytes", value=name,
-                limit=f"{_MAX_UNPACKED} bytes", remedy="save fewer variables",
-            )  # fmt: skip
+                "import.unpacks-more-bytes-save-fewer",
+                value=name,
+                limit=f"{_MAX_UNPACKED} bytes",
+                max_unpacked_bytes=_MAX_UNPACKED,
+            )
         place += 8 + size
 
 

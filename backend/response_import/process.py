@@ -64,9 +64,11 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
             out, said = await process.communicate(pickle.dumps(task))
     except TimeoutError:
         raise BadRecording(
-            f"{task.name}: the evaluation was ended after {limit_s:g} s", value=task.name,
-            limit=f"{limit_s:g} s", remedy="export a shorter part of the recording",
-        ) from None  # fmt: skip
+            "import.evaluation-ended-after",
+            value=task.name,
+            limit=f"{limit_s:g} s",
+            limit_s=limit_s,
+        ) from None
     finally:
         if process.returncode is None:
             with contextlib.suppress(ProcessLookupError):
@@ -77,9 +79,11 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
     except ValueError:
         last = said.decode("utf-8", "replace").strip().splitlines()[-1:] or ["it said nothing"]
         raise BadRecording(
-            f"{task.name}: the evaluation failed (exit code {process.returncode}): {last[0]}",
-            value=task.name, remedy="this is a defect of servodeck; report it with the file",
-        ) from None  # fmt: skip
+            "import.evaluation-failed-exit-code",
+            value=task.name,
+            returncode=process.returncode,
+            last=last[0],
+        ) from None
     if "error" in answer:
         raise BadRecording(**answer["error"])
     result: dict[str, Any] = answer["ok"]

@@ -52,18 +52,24 @@ def column_of(table: Table, wanted: str, use: str, name: str) -> int:
         if fits:
             numbers = ", ".join(str(i + 1) for i in fits)
             raise BadRecording(
-                f"{name}: the {use} column {wanted!r} is there {len(fits)} times",
-                parameter=use, value=wanted, limit=f"one of the columns {numbers}",
-                remedy="give the column's number",
-            )  # fmt: skip
+                "import.column-times",
+                parameter=use,
+                value=wanted,
+                limit=f"one of the columns {numbers}",
+                name=name,
+                fits=len(fits),
+            )
     if key.isdigit() and 1 <= int(key) <= len(table.columns):
         return int(key) - 1
     listed = ", ".join(f"{i + 1} {n}" for i, n in enumerate(table.names[:24]))
     raise BadRecording(
-        f"{name} has no {use} column {wanted!r}; it has {listed}",
-        parameter=use, value=wanted, limit=f"1 to {len(table.columns)}",
-        remedy="give a column's name or number",
-    )  # fmt: skip
+        "import.no-column",
+        parameter=use,
+        value=wanted,
+        limit=f"1 to {len(table.columns)}",
+        name=name,
+        listed=listed,
+    )
 
 
 def _bare(name: str) -> str:
@@ -84,28 +90,36 @@ def signals_of(
     )  # fmt: skip
     if first == second:
         raise BadRecording(
-            f"{name}: input and output are the same column {table.names[first]!r}",
-            parameter="output", value=signal_out, remedy="give two columns",
-        )  # fmt: skip
+            "import.input-output-same-column",
+            parameter="output",
+            value=signal_out,
+            name=name,
+            names=table.names[first],
+        )
     if (time is None) == (sample_rate_hz is None):
-        raise BadRecording(f"{name}: give either the time column or the sample rate",
-                           parameter="time", remedy="give one of the two")  # fmt: skip
+        raise BadRecording("import.give-either-time-column", parameter="time", name=name)
     at = None if time is None else column_of(table, time, "time", name)
     if at is not None and at in (first, second):
         raise BadRecording(
-            f"{name}: {table.names[at]!r} is given as time and as a signal",
-            parameter="time", value=time, remedy="give three columns",
-        )  # fmt: skip
+            "import.given-time-signal",
+            parameter="time",
+            value=time,
+            name=name,
+            names=table.names[at],
+        )
     used = [i for i in (at, first, second) if i is not None]
     columns = _complete(table, used, name)
     u, y = columns[-2], columns[-1]
     for use, values, column in (("input", u, first), ("output", y, second)):
         if float(np.ptp(values)) == 0.0:
             raise BadRecording(
-                f"{name}: the {use} column {table.names[column]!r} is constant",
-                parameter=use, value=float(values[0]),
+                "import.column-constant-2",
+                parameter=use,
+                value=float(values[0]),
                 remedy=f"give the column of the {'excitation' if use == 'input' else 'motion'}",
-            )  # fmt: skip
+                name=name,
+                names=table.names[column],
+            )
     if at is None:
         assert sample_rate_hz is not None
         _check_rate(sample_rate_hz, name, "sample rate")
@@ -132,39 +146,42 @@ def _complete(table: Table, used: list[int], name: str) -> list[FloatArray]:
     for i, values in zip(used, columns, strict=True):
         good = np.flatnonzero(np.isfinite(values))
         if not good.size:
-            raise BadRecording(f"{name}: column {table.names[i]!r} holds no numbers",
-                               value=table.names[i], remedy="give another column")  # fmt: skip
+            raise BadRecording("import.column-holds-no-numbers", value=table.names[i], name=name)
         ends.append(int(good[-1]) + 1)
     end = min(ends)
     if table.form == "MAT" and len({v.size for v in columns}) > 1:
         sizes = ", ".join(f"{table.names[i]} {table.columns[i].size}" for i in used)
-        raise BadRecording(f"{name}: the vectors differ in length: {sizes}", value=sizes,
-                           remedy="save vectors of one length")  # fmt: skip
+        raise BadRecording("import.vectors-differ-length", value=sizes, name=name)
     if end < LEAST_SAMPLES:
         raise BadRecording(
-            f"{name} has {end} samples", value=end, limit=f"at least {LEAST_SAMPLES}",
-            remedy="record longer; a few seconds at the drive's fastest rate are enough",
-        )  # fmt: skip
+            "import.samples-record-longer", value=end, limit=f"at least {LEAST_SAMPLES}", name=name
+        )
     for i, values in zip(used, columns, strict=True):
         bad = np.flatnonzero(~np.isfinite(values[:end]))
         if bad.size:
             row = int(bad[0])
             place = f"line {table.first_line + row}" if table.first_line else f"row {row + 1}"
             raise BadRecording(
-                f"{name}, {place}: column {table.names[i]!r} holds no number "
-                f"({bad.size} such rows)", parameter=table.names[i], value=str(values[row]),
-                remedy="export it again without gaps, or cut the file before that line",
-            )  # fmt: skip
+                "import.column-holds-no-number",
+                parameter=table.names[i],
+                value=str(values[row]),
+                name=name,
+                place=place,
+                bad_size=bad.size,
+            )
     return [np.asarray(v[:end], dtype=np.float64) for v in columns]
 
 
 def _check_rate(rate: float, name: str, what: str) -> None:
     if not (np.isfinite(rate) and _SLOWEST_HZ <= rate <= _FASTEST_HZ):
         raise BadRecording(
-            f"{name}: the {what} is {rate:g} Hz", parameter="time", value=rate,
+            "import.hz-give-unit",
+            parameter="time",
+            value=rate,
             limit=f"{_SLOWEST_HZ:g} Hz to {_FASTEST_HZ:g} Hz",
-            remedy="give the unit of the time column: s, ms, us or ns",
-        )  # fmt: skip
+            name=name,
+            what=what,
+        )
 
 
 def _clock(
@@ -179,25 +196,36 @@ def _clock(
     kept = np.ones(t.size, dtype=bool)
     steps = np.diff(t)
     if np.all(steps <= 0) or float(np.ptp(t)) == 0.0:
-        raise BadRecording(f"{name}: the time column {head!r} does not rise", parameter="time",
-                           value=float(t[0]), remedy="give the column of the time")  # fmt: skip
+        raise BadRecording(
+            "import.time-column-not-rise", parameter="time", value=float(t[0]), name=name, head=head
+        )
     back = np.flatnonzero(steps < 0)
     if back.size:
         row = int(back[0]) + 1
         raise BadRecording(
-            f"{name}, {place(row)}: the time {head!r} goes back from {t[row - 1]:.9g} s to "
-            f"{t[row]:.9g} s", parameter="time", value=float(t[row]),
-            remedy="cut the file there: it holds several recordings, or another column is meant",
-        )  # fmt: skip
+            "import.time-goes-back",
+            parameter="time",
+            value=float(t[row]),
+            name=name,
+            place=place(row),
+            head=head,
+            t=t[row - 1],
+            other_t=t[row],
+        )
     kept[1:] = steps > 0
     again = np.flatnonzero(steps == 0)
     for row in again[:1]:
         if again.size > 0.01 * t.size:
             raise BadRecording(
-                f"{name}, {place(int(row) + 1)}: the time {head!r} stands at {t[row]:.9g} s "
-                f"({again.size} rows do)", parameter="time", value=float(t[row]),
-                remedy="export the time with more digits, or give the sample rate instead",
-            )  # fmt: skip
+                "import.time-stands-rows",
+                parameter="time",
+                value=float(t[row]),
+                name=name,
+                place=place(int(row) + 1),
+                head=head,
+                t=t[row],
+                again_size=again.size,
+            )
     steps = np.diff(t[kept])
     usual = float(np.median(steps))
     rows = np.flatnonzero(kept)
@@ -211,13 +239,16 @@ def _clock(
         at = int(np.flatnonzero(uneven)[0])
         row = int(rows[at + 1])
         raise BadRecording(
-            f"{name}, {place(row)}: {steps[at] * 1e3:.6g} ms after the row before, where the usual "
-            f"step is {usual * 1e3:.6g} ms ({np.count_nonzero(uneven)} such steps): samples are "
-            "lost, or the clock is not even", parameter="time", value=float(steps[at]),
+            "import.ms-after-row-before",
+            parameter="time",
+            value=float(steps[at]),
             limit=f"within {_JITTER:.0%} of {usual * 1e3:.6g} ms",
-            remedy="record again without gaps, cut the file before that line, or give the sample "
-            "rate instead if the rows are even and only the written time is not",
-        )  # fmt: skip
+            name=name,
+            place=place(row),
+            steps_ms=steps[at] * 1e3,
+            usual_ms=usual * 1e3,
+            count_nonzero=np.count_nonzero(uneven),
+        )
     rate = 1.0 / pace
     _check_rate(rate, name, f"sample rate (time in {unit})")
     # A written clock of few digits is a whole number of hertz more often than not.

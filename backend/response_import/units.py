@@ -49,9 +49,13 @@ def scale_of(
     """
     for use, given, known in (("input", input_unit, _INPUT), ("output", output_unit, _OUTPUT)):
         if given not in known:
-            raise BadRecording(f"the {use} unit {given!r} is not known", parameter=f"{use}-unit",
-                               value=given, limit=", ".join(known),
-                               remedy="give one of these, or 1")  # fmt: skip
+            raise BadRecording(
+                "import.unit-not-known",
+                parameter=f"{use}-unit",
+                value=given,
+                limit=", ".join(known),
+                use=use,
+            )
     factor, kind = _INPUT[input_unit]
     out, moved = _OUTPUT[output_unit]
     for what, value, needs in (
@@ -60,14 +64,15 @@ def scale_of(
         if value is None:
             continue
         if not 0.0 < value < 1e6:
-            raise BadRecording(f"the {what} is {value:g}", parameter=what, value=value,
-                               limit="above 0", remedy="take it from the nameplate")  # fmt: skip
+            raise BadRecording("import.detail", parameter=what, value=value, limit="above 0")
         if kind != needs:
             raise BadRecording(
-                f"a {what} says nothing of an input in {input_unit}", parameter=what, value=value,
+                "import.says-nothing-input",
+                parameter=what,
+                value=value,
                 limit="rated, percent or permille" if needs == "rated" else "A or mA",
-                remedy="give the input's unit, or leave it out",
-            )  # fmt: skip
+                input_unit=input_unit,
+            )
         factor, kind = factor * value, "Nm"
     text = "1" if kind == moved else f"({moved})/{'rated torque' if kind == 'rated' else kind}"
     text = text if text != "(rad/s)/1" else "rad/s"

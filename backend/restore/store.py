@@ -124,7 +124,9 @@ class RestoreList:
             try:
                 file.unlink(missing_ok=True)
             except OSError as error:
-                raise StorageFailed(f"{file} cannot be removed: {error.strerror}") from error
+                raise StorageFailed(
+                    "restore.cannot-removed", file=file, strerror=error.strerror
+                ) from error
         self._taken_over.clear()
 
 

@@ -84,9 +84,7 @@ class Mechanics(BaseModel):
         value: float | None = getattr(self, name)
         if value is None:
             raise OutOfRange(
-                f"{self.kind}: {name.replace('_', ' ')} is missing",
-                value=name,
-                remedy="fill in the dimensions of the mechanics",
+                "scales.missing", value=name, kind=self.kind, replace=name.replace("_", " ")
             )
         return value
 
@@ -142,10 +140,7 @@ def plan_gear(profile: Profile, mechanics: Mechanics, encoder_counts: int | None
     spec = profile.units
     counts = encoder_counts or spec.encoder_counts_per_rev or spec.counts_per_rev
     if counts is None or spec.gear_numerator is None or spec.gear_denominator is None:
-        raise OutOfRange(
-            f"{profile.title} has no electronic gear that is known here",
-            remedy="set its unit parameters by hand on the Parameters page",
-        )
+        raise OutOfRange("scales.no-electronic-gear-known", profile_title=profile.title)
     wanted = mechanics.increments_per_load_turn() * Fraction(
         mechanics.load_turns, mechanics.motor_turns
     )
@@ -220,10 +215,12 @@ def _fit(profile: Profile, value: Fraction, above: str | None, below: str | None
     fitted = _simplest(value, room) if room >= 1 else Fraction(0)
     if not 1 <= fitted.numerator <= most_above or fitted.denominator > most_below:
         raise OutOfRange(
-            f"{profile.title}: a ratio of {float(value):.6g} does not fit {above} and {below}",
+            "scales.ratio-not-fit",
             value=float(value),
             limit=f"up to {most_above:.0f} over {most_below:.0f}",
-            remedy="choose a coarser or finer user increment",
+            profile_title=profile.title,
+            above=above,
+            below=below,
         )
     return fitted
 

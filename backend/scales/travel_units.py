@@ -73,17 +73,11 @@ def travel_unit(drive: str, name: str, mechanics: Mechanics | None, units: AxisU
     known = mechanics.unit if mechanics is not None else ""
     if mechanics is None or known != name:
         raise NotAllowed(
-            f"{drive}: travel in {name} needs mechanics that say how far a revolution moves it",
+            "scales.travel-needs-mechanics-say",
             drive=drive,
             value=name,
             limit=f"rev, {known}" if known else "rev",
-            remedy="keep the mechanics on the Mechanics page, or type revolutions",
         )
     if units.counts_per_rev is None:
-        raise NotAllowed(
-            f"{drive}: increments per revolution are unknown, so {name} cannot be converted",
-            drive=drive,
-            value=name,
-            remedy="set feed constant and gear ratio on the Parameters page",
-        )
+        raise NotAllowed("scales.increments-per-revolution-unknown", drive=drive, value=name)
     return TravelUnit(name, float(mechanics.travel_per_motor_turn()))

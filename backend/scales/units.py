@@ -195,13 +195,14 @@ def ramp_raw(units: AxisUnits, drive: Drive, key: str, rpm_per_s: float) -> int:
     if gentlest is None or longest is None or raw <= longest:
         return raw
     raise OutOfRange(
-        f"{drive.name}: {rpm_per_s:g} rpm/s is gentler than this drive can be: its longest ramp "
-        f"({key}) takes {longest:g} ms for {reference:g} rpm",
+        "scales.rpm-gentler-drive-longest",
         drive=drive.name,
         parameter=key,
         value=rpm_per_s,
         limit=f"at least {gentlest:g} rpm/s",
-        remedy=f"choose {gentlest:g} rpm/s or more, and a low speed to begin with",
+        longest_ms=longest,
+        reference_rpm=reference,
+        gentlest=gentlest,
     )
 
 
@@ -271,11 +272,13 @@ async def _check_unit_switches(drive: Drive) -> None:
         found = (await drive.read(quirk.key)).raw
         if found != quirk.raw:
             raise NotAllowed(
-                f"{drive.name}: {parameter.number or parameter.key} {parameter.name} is {found}; "
-                f"the units of this tool hold for {quirk.raw}",
+                "scales.units-tool-hold",
                 drive=drive.name,
                 parameter=parameter.key,
                 value=found,
                 limit=str(quirk.raw),
-                remedy=f"set it back to {quirk.raw}. {quirk.help}",
+                parameter_number=parameter.number or parameter.key,
+                key=parameter.name,
+                raw=quirk.raw,
+                help=quirk.help,
             )

@@ -74,10 +74,7 @@ def _checked_header(head: bytes, total_bytes: int, name: str) -> dict[str, Any]:
 
 
 def _bad(name: str, why: str) -> BadSnapshot:
-    return BadSnapshot(
-        f"{name} is no snapshot of the scope: {why}", value=name,
-        remedy="choose a file that the Scope page wrote",
-    )  # fmt: skip
+    return BadSnapshot("scope.no-snapshot-scope", value=name, why=why)
 
 
 class ScopeStore:
@@ -176,20 +173,20 @@ class ScopeStore:
 
 def _existing(path: Path) -> Path:
     if not path.is_file():
-        raise NotAllowed(f"there is no {path.name}", value=path.name, remedy="choose from the list")
+        raise NotAllowed("scope.no", value=path.name)
     return path
 
 
 def _check_room(path: Path, suffix: str, most: int) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     if not path.exists() and len(list(path.parent.glob(f"*{suffix}"))) >= most:
-        raise NotAllowed(
-            f"there are {most} already", value=path.name, limit=str(most),
-            remedy="delete some that are not needed",
-        )  # fmt: skip
+        raise NotAllowed("scope.already", value=path.name, limit=str(most), most=most)
     free = free_bytes(path.parent)
     if free < RESERVE_BYTES:
         raise StorageFailed(
-            f"{path.name} was not stored: the disk is nearly full, {free >> 20} MiB are left",
-            value=free, limit=f"{RESERVE_BYTES >> 20} MiB stay free", remedy="free some space",
-        )  # fmt: skip
+            "scope.not-stored-disk-nearly",
+            value=free,
+            limit=f"{RESERVE_BYTES >> 20} MiB stay free",
+            path=path.name,
+            free_mib=free >> 20,
+        )

@@ -126,11 +126,7 @@ class Bench:
         """
         member = self.members.get(drive_id)
         if member is None:
-            raise NotAllowed(
-                f"there is no drive {drive_id!r} on this bench",
-                drive=drive_id,
-                remedy="connect it on the Connect page",
-            )
+            raise NotAllowed("station.no-drive-bench", drive=drive_id)
         return member
 
     async def connect(
@@ -179,11 +175,12 @@ class Bench:
         spec = drive.profile.link(link.kind)
         if spec is None:
             raise NotAllowed(
-                f"{drive.profile.title} has no {link.kind} port",
+                "station.no-port",
                 drive=drive.name,
                 value=url,
                 limit=", ".join(known.kind for known in drive.profile.links),
-                remedy="choose one of its links",
+                profile_title=drive.profile.title,
+                kind=link.kind,
             )
         if isinstance(link, NeedsProfile):
             link.configure_station(station, drive.profile)
@@ -202,9 +199,10 @@ class Bench:
         for member in self.members.values():
             if any(p.link is link and p.station == station for p in member.drive.ports):
                 raise Busy(
-                    f"{url} station {station} is already connected as {member.drive.name}",
+                    "station.station-already-connected",
                     drive=member.drive.name,
-                    remedy="use that drive, or remove it first",
+                    url=url,
+                    station=station,
                 )
 
     def _add(self, drive: Drive) -> Member:

@@ -57,12 +57,10 @@ class Buses:
         """
         users = [m.drive.name for m in self._bench.members.values() if url in self.urls_of(m.drive)]
         if users:
-            raise Busy(f"{url} is used by {', '.join(users)}", remedy="remove these drives first")
+            raise Busy("station.used", url=url, users=", ".join(users))
         link = self.opened.pop(url, None)
         if link is None:
-            raise NotAllowed(
-                f"{url} is not open", value=url, remedy="open the bus on the page Connect"
-            )
+            raise NotAllowed("station.not-open", value=url)
         await link.close()
         self._bench.drives_changed()
 

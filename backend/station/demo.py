@@ -81,8 +81,7 @@ class DemoBench:
         if not answer.get("ready"):
             self.stop()
             raise LinkLost(
-                f"the virtual drives did not start: {answer.get('error', 'the process ended')}",
-                remedy="see docs/virtual-drives.md",
+                "station.virtual-drives-not-start", get=answer.get("error", "the process ended")
             )
         wires = answer["wires"]
         if isinstance(wires, dict):
@@ -126,12 +125,12 @@ class DemoBench:
             ValueError: the command is refused. LinkLost: the process has ended.
         """
         if self._host is None or self._host.stdin is None:
-            raise LinkLost("the virtual drives do not run")
+            raise LinkLost("station.virtual-drives-not-run")
         try:
             self._host.stdin.write(json.dumps(command) + "\n")
             self._host.stdin.flush()
         except OSError as error:
-            raise LinkLost("the virtual drives have ended") from error
+            raise LinkLost("station.virtual-drives-ended") from error
         answer = self._read()
         if not answer.get("ok"):
             raise ValueError(str(answer.get("error", "the process ended")))

@@ -65,10 +65,7 @@ async def import_in_process(task: Task, limit_s: float = IMPORT_LIMIT_S) -> dict
         async with asyncio.timeout(limit_s):
             out, said = await process.communicate(pickle.dumps(task))
     except TimeoutError:
-        raise BadDescription(
-            f"the import was ended after {limit_s:g} s",
-            remedy="use another file of this drive; a plain EDS is the simplest",
-        ) from None
+        raise BadDescription("station.import-ended-after", limit_s=limit_s) from None
     finally:
         if process.returncode is None:
             with contextlib.suppress(ProcessLookupError):
@@ -79,8 +76,7 @@ async def import_in_process(task: Task, limit_s: float = IMPORT_LIMIT_S) -> dict
     except ValueError:
         last = said.decode("utf-8", "replace").strip().splitlines()[-1:] or ["it said nothing"]
         raise BadDescription(
-            f"the import failed (exit code {process.returncode}): {last[0]}",
-            remedy="this is a defect of servodeck; report it with the file",
+            "station.import-failed-exit-code", returncode=process.returncode, last=last[0]
         ) from None
     if "error" in answer:
         raise BadDescription(
@@ -107,10 +103,7 @@ async def drive_task(
         eds = await _stored_eds(link, found)
         return FileTask(eds, f"1021h of station {found.station}", user_folder(), name)
     if not isinstance(link, ListsObjects):
-        raise NotAllowed(
-            f"a drive on {link.kind} cannot list its own objects",
-            remedy="import the maker's EDS or ESI file, or use the generic profile",
-        )
+        raise NotAllowed("station.drive-cannot-list-objects", kind=link.kind)
     report = ImportReport()
     description = describe_dictionary(
         dictionary_entries(await link.enumerate(found.station, progress)),
@@ -150,9 +143,10 @@ async def _stored_eds(link: Link, found: Found) -> bytes:
         data = await link.read(found.station, _STORED_EDS)
     except Rejected as error:
         raise NotAllowed(
-            f"the drive at station {found.station} cannot list its own objects: CANopen has no "
-            f"such service, and it carries no EDS (1021h: {error.message})",
+            "station.drive-station-cannot-list",
             remedy=remedy,
+            station=found.station,
+            cause=error.text,
         ) from error
     try:
         packed = int.from_bytes(await link.read(found.station, _STORED_FORMAT), "little")
@@ -160,9 +154,7 @@ async def _stored_eds(link: Link, found: Found) -> bytes:
         packed = 0  # plain text is what 1021h holds where nothing else is said
     if packed:
         raise NotAllowed(
-            f"the drive at station {found.station} carries its EDS in the maker's own format "
-            f"(1022h = {packed})",
-            remedy=remedy,
+            "station.drive-station-carries-eds", remedy=remedy, station=found.station, packed=packed
         )
     return data
 

@@ -70,13 +70,9 @@ def recompute(measurement: Measurement) -> dict[str, object]:
         ValueError, KeyError, TypeError, IndexError, AttributeError, ArithmeticError, MemoryError,
     ) as error:  # fmt: skip
         raise BadMeasurement(
-            f"the measurement is not complete: {error}", value=measurement.kind,
-            remedy="get an undamaged copy of the file, or measure again",
-        ) from error  # fmt: skip
-    raise BadMeasurement(
-        f"a measurement of kind {measurement.kind} has nothing to evaluate",
-        value=measurement.kind, remedy="update servodeck to open it",
-    )  # fmt: skip
+            "station.measurement-not-complete", value=measurement.kind, cause=str(error)
+        ) from error
+    raise BadMeasurement("station.measurement-kind-nothing-evaluate", value=measurement.kind)
 
 
 def _step(measurement: Measurement) -> dict[str, object]:

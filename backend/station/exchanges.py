@@ -43,13 +43,13 @@ class Exchanges:
         link = await bench.buses.open(url)
         users = [m for m in bench.members.values() if any(p.link is link for p in m.drive.ports)]
         if not users:
-            raise NotAllowed(f"{url} has no connected drives", remedy="connect a drive first")
+            raise NotAllowed("station.no-connected-drives", url=url)
         for member in users:
             if member.drive.id != in_job_of:
                 bench.motion.require_idle(member)
         self._require_settled(url)
         if (old := self.running.get(url)) is not None and old.running:
-            raise Busy(f"{url}: the cyclic exchange runs already", remedy="end it first")
+            raise Busy("station.cyclic-exchange-runs-already", url=url)
         # From here on nothing else may change it, nor begin to move: not even while the old one
         # ends.
         with self._changing_of(url):
@@ -120,10 +120,9 @@ class Exchanges:
         for other in [] if session is None else self._movers(session):
             if other is not member:
                 raise Busy(
-                    f"{member.drive.name} shares its cyclic exchange with {other.drive.name}, "
-                    "which moves",
+                    "station.shares-cyclic-exchange-moves",
                     drive=member.drive.name,
-                    remedy=f"stop {other.drive.name} first",
+                    other_drive=other.drive.name,
                 )
 
     async def close(self) -> None:
@@ -169,7 +168,7 @@ class Exchanges:
 
     def _require_settled(self, url: str) -> None:
         if url in self._changing:
-            raise Busy(f"{url}: {_CHANGING}", remedy="wait for it")
+            raise Busy("station.cyclic-exchange-just-being", url=url)
 
     async def _end(self, url: str) -> None:
         session = self.running.pop(url, None)

@@ -21,11 +21,7 @@ async def search_line(
     """
     wanted = parse_url(url)
     if wanted.scheme not in ("modbus", "mlink") or wanted.is_virtual or url in bench.buses.wires:
-        raise NotAllowed(
-            f"{url} has no baud rate and parity to search for",
-            value=url,
-            remedy="choose a serial adapter, for example modbus:///dev/ttyUSB0",
-        )
+        raise NotAllowed("station.no-baud-rate-parity", value=url)
     same = [known for known in bench.buses.opened if parse_url(known).place == wanted.place]
     users = [
         member.drive.name
@@ -33,10 +29,7 @@ async def search_line(
         if any(bench.buses.url_of(port) in same for port in member.drive.ports)
     ]
     if users:
-        raise Busy(
-            f"{wanted.place} is used by {', '.join(users)}",
-            remedy="take these drives off the bench first",
-        )
+        raise Busy("station.used-take-drives", place=wanted.place, users=", ".join(users))
     for known in same:
         await bench.buses.close(known)
     found = await search_line_settings(wanted, progress, stations=stations)

@@ -65,9 +65,10 @@ def profile_for(kind: str, name: str) -> tuple[Profile, LinkSpec]:
     if spec is None:
         kinds = ", ".join(link.kind for link in profile.links)
         raise NotAllowed(
-            f"a {profile.title} has no {kind} port: this must be a drive of another family",
+            "station.no-port-must-drive",
             value=name,
             limit=kinds,
-            remedy=f"choose a profile of drives with {kind}",
+            profile_title=profile.title,
+            kind=kind,
         )
     return profile, spec

@@ -57,11 +57,7 @@ class Motion:
             Busy: a job does.
         """
         if (job := self._bench.jobs.moving(member.drive.id)) is not None:
-            raise Busy(
-                f"{member.drive.name} is moved by {job.title!r}",
-                drive=member.drive.name,
-                remedy="wait for it to end, or stop it",
-            )
+            raise Busy("station.moved", drive=member.drive.name, job_title=job.title)
 
     @contextlib.contextmanager
     def parting(self, member: Member) -> Iterator[None]:
@@ -79,11 +75,7 @@ class Motion:
             Busy: somebody is.
         """
         if member.drive.id in self._parting:
-            raise Busy(
-                f"{member.drive.name} is being taken off the bench",
-                drive=member.drive.name,
-                remedy="wait until it is gone, then add it again if it is still needed",
-            )
+            raise Busy("station.being-taken-off-bench", drive=member.drive.name)
 
     def permit(self, drive_id: str) -> None:
         """A new motion begins by a person's command; it takes back an earlier STOP.
@@ -94,11 +86,7 @@ class Motion:
         member = self._bench.member(drive_id)
         self.require_stays(member)
         if self._still[drive_id]:
-            raise Busy(
-                f"{member.drive.name}: its settings are just being changed",
-                drive=member.drive.name,
-                remedy="try again when they have been",
-            )
+            raise Busy("station.settings-just-being-changed", drive=member.drive.name)
         self._bench.exchanges.require_calm(
             member.drive.name, self._bench.buses.urls_of(member.drive)
         )

@@ -55,10 +55,9 @@ class Records:
             self.store.folder.mkdir(parents=True, exist_ok=True)
         if not self._lock.take():
             raise Busy(
-                f"another servodeck uses the state folder {self.store.folder}: two would write "
-                "over one another's list of drives and move the same axes",
+                "station.another-servodeck-uses-state",
                 value=str(self.store.folder),
-                remedy="end the other one, or choose another folder with --config",
+                folder=self.store.folder,
             )
 
     def release(self) -> None:

@@ -66,10 +66,11 @@ async def require_same_drive(drive: Drive, other: Port) -> None:
     theirs = await there.read_many([p.key for p in shared])
     if shared and all(reading.raw is None for reading in theirs.values()):
         raise LinkTimeout(
-            f"{drive.name}: nothing can be read at station {other.station} of {other.link.url}: "
-            f"{next(iter(theirs.values())).error}",
+            "station.nothing-read-station",
             drive=drive.name,
-            remedy="check cable, station number, baud rate and parity",
+            station=other.station,
+            url=other.link.url,
+            error=next(iter(theirs.values())).error,
         )
     ours = await drive.read_many([p.key for p in shared])
     different = [
@@ -82,12 +83,14 @@ async def require_same_drive(drive: Drive, other: Port) -> None:
     if different:
         parameter, here, other_value = different[0]
         raise NotAllowed(
-            f"the drive at station {other.station} of {other.link.url} does not hold the settings "
-            f"of {drive.name}: {parameter.key} {parameter.name} is {other_value} there and {here} "
-            f"here ({len(different)} of {len(shared)} differ)",
+            "station.drive-station-not-hold",
             drive=drive.name,
             parameter=parameter.key,
             value=other_value,
-            remedy="check which drive each cable goes to; if it is the same drive, accept the "
-            "difference",
+            station=other.station,
+            url=other.link.url,
+            key=parameter.name,
+            here=here,
+            different_count=len(different),
+            shared_count=len(shared),
         )

@@ -71,10 +71,7 @@ class SpeedWatch:
                 sample = await self._sample()
         except TimeoutError as error:
             name = self._axis.drive.name
-            raise LinkTimeout(
-                f"{name} does not tell how it moves", drive=name,
-                remedy="use the machine's emergency stop",
-            ) from error  # fmt: skip
+            raise LinkTimeout("stopping.not-tell-how-moves", drive=name) from error
         self.take(sample)
         return sample
 

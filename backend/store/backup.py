@@ -63,11 +63,7 @@ def make_backup(
         StorageFailed: disk or database; no archive then.
     """
     if archive.exists() and not overwrite:
-        raise BackupFailed(
-            f"{archive} exists already",
-            value=str(archive),
-            remedy="choose another name, or replace it with --overwrite",
-        )
+        raise BackupFailed("store.exists-already", value=str(archive), archive=archive)
     try:
         archive.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".servodeck-", dir=archive.parent) as folder:
@@ -79,9 +75,10 @@ def make_backup(
             unfinished.replace(archive)
     except OSError as error:
         raise StorageFailed(
-            f"the backup {archive} could not be written: {error.strerror or error}",
+            "store.backup-not-written",
             value=str(archive),
-            remedy="free some space or choose another folder; no half archive was left",
+            archive=archive,
+            strerror=error.strerror or error,
         ) from error
     return parts
 
@@ -137,11 +134,7 @@ def _online_copy(source: Path, target: Path) -> Path:
 
 
 def _damaged(source: Path, found: str) -> BackupFailed:
-    return BackupFailed(
-        f"the database {source} is damaged: {found}",
-        value=str(source),
-        remedy="keep the older backups and restore one of them",
-    )
+    return BackupFailed("store.database-damaged", value=str(source), source=source, found=found)
 
 
 def _shared_copy(store: Store, folder: Path) -> Path:
@@ -167,11 +160,7 @@ def _checked_head(database: Path | None) -> str:
     finally:
         copy.close()
     if not verdict.ok:
-        raise BackupFailed(
-            f"the audit is broken at entry {verdict.broken}: {verdict.why}",
-            value=verdict.broken,
-            remedy="keep the older backups; find out who changed the database",
-        )
+        raise BackupFailed("store.audit-broken-entry", value=verdict.broken, why=verdict.why)
     return str(verdict.head)
 
 
@@ -283,8 +272,4 @@ def _copy_checked(source: IO[bytes], target: BinaryIO, part: Part) -> bool:
 
 
 def _bad(shown: str, why: str) -> BackupFailed:
-    return BackupFailed(
-        f"{shown} cannot be restored: {why}; nothing was changed",
-        value=shown,
-        remedy="use an undamaged copy of the backup",
-    )
+    return BackupFailed("store.cannot-restored-nothing-changed", value=shown, why=why)

@@ -37,10 +37,11 @@ class Blobs:
             self._fs, self._root = fsspec.core.url_to_fs(place)
         except (ImportError, ValueError) as error:
             raise BlobFailed(
-                f"{place.split('://', 1)[0]}:// cannot be used for contents: {error}",
+                "store.cannot-used-contents",
                 value=place,
                 limit="a folder, or s3:// with the extra servodeck[s3] installed",
-                remedy="install what is missing or choose a folder",
+                split=place.split("://", 1)[0],
+                cause=str(error),
             ) from error
 
     def put(self, data: bytes) -> str:
@@ -74,18 +75,12 @@ class Blobs:
             data = self._fs.cat_file(path)
         except FileNotFoundError as error:
             raise BlobFailed(
-                f"the contents {name[:12]}… are missing at {self.place}",
-                value=name,
-                remedy="restore them from a backup",
+                "store.contents-missing", value=name, name=name[:12], place=self.place
             ) from error
         except Exception as error:
             raise self._failed("fetched", error) from error
         if not isinstance(data, bytes) or hashlib.sha256(data).hexdigest() != name:
-            raise BlobFailed(
-                f"the contents {name[:12]}… at {self.place} are damaged",
-                value=name,
-                remedy="restore them from a backup",
-            )
+            raise BlobFailed("store.contents-damaged", value=name, name=name[:12], place=self.place)
         return data
 
     def names(self) -> Iterator[str]:
@@ -114,7 +109,7 @@ class Blobs:
         except Exception as error:
             raise self._failed("found", error) from error
         if not isinstance(moment, datetime):
-            raise BlobFailed(f"{self.place} does not tell when contents were stored", value=name)
+            raise BlobFailed("store.not-tell-when-contents", value=name, place=self.place)
         return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
 
     def delete(self, name: str) -> None:
@@ -132,13 +127,9 @@ class Blobs:
 
     def _path(self, name: str) -> str:
         if not _NAME.match(name):
-            raise BlobFailed(f"{name!r} is no name of contents", value=name)
+            raise BlobFailed("store.no-name-contents", value=name)
         return f"{self._root}/{name[:2]}/{name}"
 
     def _failed(self, what: str, error: Exception) -> BlobFailed:
         # Every kind of store has its own errors; a botocore error is no OSError.
-        return BlobFailed(
-            f"contents could not be {what} at {self.place}: {error}",
-            value=self.place,
-            remedy="check free space, permissions and, for S3, address and keys",
-        )
+        return BlobFailed("store.contents-not", value=self.place, what=what, error=error)

@@ -50,11 +50,7 @@ def _require_empty(session: Session, shown: str) -> None:
     items = session.scalar(select(func.count()).select_from(Item))
     head = session.get(AuditHead, 1, with_for_update=True)
     if items or head is None or head.hash != ZERO:
-        raise NotAllowed(
-            f"{shown} has a library or an audit already; nothing was changed",
-            value=shown,
-            remedy="choose an empty database",
-        )
+        raise NotAllowed("store.library-audit-already-nothing", value=shown)
 
 
 def _set_sequences(session: Session) -> None:

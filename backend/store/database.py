@@ -180,9 +180,7 @@ class Store:
         lock = _writers.setdefault(str(Path(self.url.database or "").resolve()), threading.Lock())
         if not lock.acquire(timeout=_SQLITE_PATIENCE_S):
             raise DatabaseFailed(
-                f"the database {self.shown} has been busy for {_SQLITE_PATIENCE_S} s",
-                value=self.shown,
-                remedy="try again; if it stays so, its disk is too slow or fails",
+                "store.database-busy", value=self.shown, sqlite_patience_s=_SQLITE_PATIENCE_S
             )
         try:
             yield
@@ -215,9 +213,10 @@ class Store:
                 file.touch(mode=0o600)  # accounts are in it
             except OSError as error:
                 raise DatabaseFailed(
-                    f"the database {file} cannot be made: {error.strerror}",
+                    "store.database-cannot-made",
                     value=str(file),
-                    remedy="choose another folder with --config",
+                    file=file,
+                    strerror=error.strerror,
                 ) from error
         # No error text, and so no log, may repeat what was stored: hashes of passwords too.
         engine = create_engine(
@@ -244,10 +243,9 @@ class Store:
         known = {revision.revision for revision in script.walk_revisions()}
         if have - known:
             raise DatabaseFailed(
-                f"{self.shown} was written by a newer servodeck "
-                f"(it has {', '.join(sorted(have - known))})",
+                "store.written-newer-servodeck",
                 value=self.shown,
-                remedy="update servodeck on this station; nothing was changed",
+                have=", ".join(sorted(have - known)),
             )
         return have == set(script.get_heads())
 
@@ -260,17 +258,9 @@ class Store:
             first = (str(cause).strip() or type(cause).__name__).splitlines()[0]
             if getattr(cause, "sqlite_errorcode", None) in _DAMAGED:
                 raise DatabaseFailed(
-                    f"the database {self.shown} is damaged, or is no database: {first}",
-                    value=self.shown,
-                    remedy="keep a copy of the file and restore a backup (`servodeck restore`); "
-                    "servodeck has not tried to repair it, and does not know what of it is whole",
+                    "store.database-damaged-no-database", value=self.shown, first=first
                 ) from error
-            raise DatabaseFailed(
-                f"the database {self.shown} failed: {first}",
-                value=self.shown,
-                remedy="check free space, permissions and, for PostgreSQL, that its server "
-                "runs and can be reached",
-            ) from error
+            raise DatabaseFailed("store.database-failed", value=self.shown, first=first) from error
 
 
 def _url(folder: Path, database: str | None) -> URL:
@@ -279,24 +269,15 @@ def _url(folder: Path, database: str | None) -> URL:
     try:
         url = make_url(database)
     except ArgumentError as error:
-        raise DatabaseFailed(
-            "the database address is not a URL",
-            remedy="write it as postgresql://user:password@host/name or sqlite:////folder/file.db",
-        ) from error
+        raise DatabaseFailed("store.database-address-not-url") from error
     if url.drivername in ("postgresql", "postgres"):
         url = url.set(drivername="postgresql+psycopg")
     if url.drivername not in ("postgresql+psycopg", "sqlite"):
         raise DatabaseFailed(
-            f"servodeck cannot use a {url.drivername} database",
-            value=url.drivername,
-            limit="sqlite, postgresql",
-            remedy="choose one of these",
+            "store.servodeck-cannot-use-database", value=url.drivername, limit="sqlite, postgresql"
         )
     if url.drivername == "sqlite" and not url.database:
-        raise DatabaseFailed(
-            "an SQLite database in memory would forget everything",
-            remedy="name a file: sqlite:////folder/file.db",
-        )
+        raise DatabaseFailed("store.sqlite-database-memory-forget")
     return url
 
 

@@ -28,10 +28,7 @@ def checked_name(name: str, suffix: str) -> str:
     stem = name.removesuffix(suffix)
     if not _NAME.match(stem) or ".." in stem:
         raise NotAllowed(
-            f"{name!r} is not a file name",
-            value=name,
-            limit="letters, digits, spaces, . - _, at most 100",
-            remedy="choose a plain name without folders",
+            "store.not-file-name", value=name, limit="letters, digits, spaces, . - _, at most 100"
         )
     return stem + suffix
 
@@ -69,7 +66,8 @@ def write_atomically(path: Path, data: bytes, *, durable: bool = True) -> None:
 
 def _failed(path: Path, error: OSError) -> StorageFailed:
     return StorageFailed(
-        f"{path.name or path} could not be written: {error.strerror or error}",
+        "store.not-written",
         value=str(path),
-        remedy="free some space or choose another folder; the old file is unharmed",
+        path=path.name or path,
+        strerror=error.strerror or error,
     )

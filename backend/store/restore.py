@@ -41,17 +41,11 @@ def restore(
     """
     used = folder.exists() and any(path.name != FolderLock.NAME for path in folder.iterdir())
     if used and not replace:
-        raise BackupFailed(
-            f"{folder} is not empty; nothing was changed",
-            value=str(folder),
-            remedy="choose another folder, or let it be replaced (it is kept beside)",
-        )
+        raise BackupFailed("store.not-empty-nothing-changed", value=str(folder), folder=folder)
     with FolderLock(folder) as lock:
         if not lock.held:
             raise BackupFailed(
-                f"a running servodeck uses {folder}; nothing was changed",
-                value=str(folder),
-                remedy="end it first",
+                "store.running-servodeck-uses-nothing", value=str(folder), folder=folder
             )
         try:
             folder.parent.mkdir(parents=True, exist_ok=True)
@@ -64,9 +58,11 @@ def restore(
                 aside = _put_in_place(fresh, folder)
         except OSError as error:
             raise StorageFailed(
-                f"{archive} could not be restored to {folder}: {error.strerror or error}",
+                "store.not-restored",
                 value=str(folder),
-                remedy="free some space or choose another folder",
+                archive=archive,
+                folder=folder,
+                strerror=error.strerror or error,
             ) from error
     return Restored(parts, entries, aside, copied)
 
@@ -77,17 +73,11 @@ def _unpack(archive: Path, folder: Path) -> int:
             parts = backup.read_manifest(file, str(archive))
             needed = sum(part.bytes for part in parts.values())
             if shutil.disk_usage(folder).free < needed:
-                raise StorageFailed(
-                    f"{archive} needs {needed} bytes, which the disk does not have",
-                    value=needed,
-                    remedy="free some space or choose another folder",
-                )
+                raise StorageFailed("store.needs-bytes-disk-not", value=needed, archive=archive)
             backup.unpack(file, parts, folder, str(archive))
     except zipfile.BadZipFile as error:
         raise BackupFailed(
-            f"{archive} is no whole backup: {error}; nothing was changed",
-            value=str(archive),
-            remedy="use an undamaged copy of the backup",
+            "store.no-whole-backup-nothing", value=str(archive), archive=archive, cause=str(error)
         ) from error
     return len(parts)
 
@@ -105,10 +95,10 @@ def _check(folder: Path, shown: str) -> int:
             store.close()
         if not verdict.ok:
             raise BackupFailed(
-                f"{shown}: the audit is broken at entry {verdict.broken}: {verdict.why}; "
-                "nothing was changed",
+                "store.audit-broken-entry-nothing",
                 value=verdict.broken,
-                remedy="use an undamaged copy of the backup",
+                shown=shown,
+                why=verdict.why,
             )
         entries = max(entries, verdict.entries)
     return entries

@@ -58,11 +58,7 @@ async def read_settings(
     keys = [p.key for p in wanted if not drive.unreachable_why(p)]
     readings = await drive.read_many(keys, progress)
     if all(r.raw is None for r in readings.values()):
-        raise LinkTimeout(
-            f"{drive.name}: no parameter could be read, so nothing was saved",
-            drive=drive.name,
-            remedy="check the connection",
-        )
+        raise LinkTimeout("set.no-parameter-read-nothing", drive=drive.name)
     return readings
 
 
@@ -137,12 +133,7 @@ async def load_set(
     for key in keys:
         row = rows.get(key)
         if row is None or row.raw is None:
-            raise NotAllowed(
-                f"{drive.name}: the file has no usable value for {key}; nothing was written",
-                drive=drive.name,
-                parameter=key,
-                remedy="untick this row",
-            )
+            raise NotAllowed("set.file-no-usable-value", drive=drive.name, parameter=key)
         chosen.append((key, drive.check(drive.parameter(key), row.raw)))
     progress(0.0, "storing the present values")
     backup = await _back_up(drive, library, [key for key, _ in chosen])
@@ -175,21 +166,19 @@ def _check_identity(drive: Drive, content: ParameterSet, accepted: bool) -> bool
     """
     if content.profile != drive.profile.drive:
         raise NotAllowed(
-            f"the file is of a {content.profile} drive, {drive.name} is a {drive.profile.drive}; "
-            "nothing was written",
+            "set.file-drive-nothing-written",
             drive=drive.name,
             value=content.profile,
             limit=drive.profile.drive,
-            remedy="choose a file of the same drive family",
         )
     other = [doubt for doubt in doubts(content, drive) if doubt.other_drive]
     if other and not accepted:
         raise NotAllowed(
-            f"{drive.name}: the file is of another drive: {other[0]}; nothing was written",
+            "set.file-another-drive-nothing",
             drive=drive.name,
             value=other[0].theirs,
             limit=other[0].ours,
-            remedy="compare the values, then accept the other drive explicitly",
+            other=other[0],
         )
     return bool(other)
 
@@ -204,11 +193,10 @@ def _refuse_motor_individual(drive: Drive, keys: Sequence[str]) -> None:
         parameter = drive.parameter(key)
         if parameter.motor_individual:
             raise NotAllowed(
-                f"{drive.name}: {parameter.key} {parameter.name} belongs to the motor that the "
-                "file was saved with; nothing was written",
+                "set.belongs-motor-file-saved",
                 drive=drive.name,
                 parameter=parameter.key,
-                remedy="untick this row, or accept explicitly that the motor is the same",
+                key=parameter.name,
             )
 
 

@@ -118,12 +118,7 @@ class JobRunner:
         if same >= self.MOST_OF_A_KIND or len(running) >= self.MOST:
             what, limit = ("such jobs", self.MOST_OF_A_KIND) if same >= self.MOST_OF_A_KIND else (
                 "jobs", self.MOST)  # fmt: skip
-            raise Busy(
-                f"{limit} {what} run already",
-                drive=drive,
-                limit=str(limit),
-                remedy="wait until one of them has ended, or cancel one",
-            )
+            raise Busy("work.run-already", drive=drive, limit=str(limit), bound=limit, what=what)
 
     def start(
         self,
@@ -147,11 +142,7 @@ class JobRunner:
                 run as may.
         """
         if motion and drive is not None and (other := self.moving(drive)) is not None:
-            raise Busy(
-                f"the axis is already moved by {other.title!r}",
-                drive=drive,
-                remedy="wait for it to end, or stop it",
-            )
+            raise Busy("work.axis-already-moved", drive=drive, other_title=other.title)
         if not motion and by_person:
             self._require_room(kind, drive)
         if motion and by_person and drive is not None:

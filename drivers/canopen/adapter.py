@@ -80,7 +80,7 @@ def translate(url: CanUrl, error: BaseException) -> LinkLost:
         remedy = "check its USB cable and plug it in again; it is opened by itself when it is back"
     else:
         why, remedy = text or type(error).__name__, "unplug it, plug it in, and check the wiring"
-    return LinkLost(f"CAN adapter {name}: {why}", drive=url.url, remedy=remedy)
+    return LinkLost("canopen.adapter", drive=url.url, remedy=remedy, name=name, why=why)
 
 
 def _errno(error: BaseException | None) -> int | None:

@@ -40,11 +40,13 @@ def require_room(pdo_bytes: Sequence[int], cycle_s: float, bitrate: int) -> BusL
     load = bus_load(pdo_bytes, cycle_s, bitrate)
     if load.fraction > LIMIT:
         raise NotAllowed(
-            f"{len(pdo_bytes)} PDOs every {cycle_s * 1e3:g} ms would load the bus at "
-            f"{bitrate / 1e3:g} kbit/s with {load.fraction:.0%}",
+            "canopen.pdos-every-ms-load",
             value=round(load.fraction, 3),
             limit=f"{LIMIT:.0%}",
-            remedy=f"use a cycle of {load.shortest_cycle_s * 1e3:.2f} ms or longer, fewer signals, "
-            "or a higher bit rate",
+            pdo_bytes=len(pdo_bytes),
+            cycle_ms=cycle_s * 1e3,
+            bitrate_kbits=bitrate / 1e3,
+            fraction=load.fraction,
+            shortest_cycle_ms=load.shortest_cycle_s * 1e3,
         )
     return load

@@ -138,12 +138,18 @@ class SdoChannel:
         self._unanswered.add(mux)
         self._send(sdo.abort_frame(mux, sdo.ABORT_TIMED_OUT))
         index, subindex = int.from_bytes(mux[:2], "little"), mux[2]
-        raise (_BlockUnanswered if opens_block else LinkTimeout)(
-            f"node {self.node} did not answer about {index:04X}:{subindex:02X} "
-            f"within {timeout_s:g} s",
-            parameter=f"{index:04X}:{subindex:02X}",
-            limit=f"{timeout_s:g} s",
-            remedy=_SILENT_REMEDY,
+        raise (
+            _BlockUnanswered
+            if opens_block
+            else LinkTimeout(
+                "canopen.node-not-answer-about",
+                parameter=f"{index:04X}:{subindex:02X}",
+                limit=f"{timeout_s:g} s",
+                node=self.node,
+                index=index,
+                subindex=subindex,
+                timeout_s=timeout_s,
+            )
         )
 
     def _wait_out_late_answers(self, timeout_s: float) -> None:
@@ -178,11 +184,7 @@ class SdoChannel:
     def _still_silent(self, mux: bytes, timeout_s: float) -> NoReturn:
         self.timeouts += 1
         self._send(sdo.abort_frame(mux, sdo.ABORT_TIMED_OUT))
-        raise NotAsked(
-            f"node {self.node} has not answered since an earlier time-out; nothing was asked",
-            limit=f"{timeout_s:g} s",
-            remedy=_SILENT_REMEDY,
-        )
+        raise NotAsked("canopen.node-not-answered-since", limit=f"{timeout_s:g} s", node=self.node)
 
     def _next_barrier(self) -> tuple[int, int]:
         for index, subindex in self._candidates():

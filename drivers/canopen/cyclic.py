@@ -118,15 +118,10 @@ class CanopenCyclic:
                 signals only, or still running.
         """
         if self._loop is not None:
-            raise NotAllowed(
-                "the cyclic exchange is running", remedy="stop it before changing signals"
-            )
+            raise NotAllowed("canopen.cyclic-exchange-running")
         if cycle_s < SHORTEST_CYCLE_S * 0.999:
             raise NotAllowed(
-                f"a cycle of {cycle_s * 1e3:g} ms is too short for CANopen",
-                value=cycle_s,
-                limit="1 ms",
-                remedy="use 1 ms or longer",
+                "canopen.cycle-ms-too-short", value=cycle_s, limit="1 ms", cycle_ms=cycle_s * 1e3
             )
         by_sdo = [s for s in outputs if self._by_sdo(s.station)]
         cyclic = [s for s in outputs if not self._by_sdo(s.station)]
@@ -134,7 +129,7 @@ class CanopenCyclic:
         why = "the drive has no cyclic mode: it is commanded by SDO"
         self.left_over = (*planned.left_over, *((s, why) for s in by_sdo))
         if not planned.pdos:
-            raise NotAllowed("none of these signals can travel in a PDO", remedy="poll them")
+            raise NotAllowed("canopen.none-signals-travel-pdo")
         self.load = planned.load
         self._configured = _Configured(planned.pdos, cycle_s)
         left = [signal for signal, _ in self.left_over]
@@ -149,7 +144,7 @@ class CanopenCyclic:
         """
         configured = self._configured
         if configured is None:
-            raise NotAllowed("no signals are configured", remedy="configure before starting")
+            raise NotAllowed("canopen.no-signals-configured")
         if self._loop is not None:
             return
         event_loop = asyncio.get_running_loop()
@@ -237,7 +232,7 @@ class CanopenCyclic:
         if self._loop is not None:
             self._loop.halt(station, Halted(HaltCause.COMMANDED))
             if self._loop.bus_lost:
-                raise LinkLost("the CAN bus is lost", remedy="wait until the adapter is back")
+                raise LinkLost("canopen.bus-lost")
 
     async def pause(self, station: int) -> None:
         """See `drivers.link.Pauses`."""
@@ -338,9 +333,10 @@ class CanopenCyclic:
         loop = self._require_running()
         if station in loop.images.axes and subindex == 0 and index in _OWNED:
             raise NotAllowed(
-                f"node {station}: the cyclic exchange writes {index:04X}h",
+                "canopen.node-cyclic-exchange-writes",
                 parameter=f"{index:04X}:00",
-                remedy="end the cyclic exchange, or use a cyclic mode",
+                node=station,
+                index=index,
             )
         loop.put((station, index, subindex), data)
 
@@ -348,15 +344,12 @@ class CanopenCyclic:
 
     def _require_running(self) -> SyncLoop:
         if self._loop is None:
-            raise NotAllowed("the cyclic exchange is not running", remedy="start it first")
+            raise NotAllowed("canopen.cyclic-exchange-not-running")
         return self._loop
 
     def _require_axis(self, station: int) -> None:
         if not self.owns(station):
-            raise NotAllowed(
-                f"node {station}: the control word is not in the cyclic data",
-                remedy="configure 6040:00 as an output, or command the drive by SDO",
-            )
+            raise NotAllowed("canopen.node-control-word-not", node=station)
 
     def _report(self, station: int, text: str) -> None:
         self._tell(LinkEvent("fault", station, f"node {station}: {text}"))
@@ -373,12 +366,7 @@ class CanopenCyclic:
         """Raises NotAllowed where a node's heartbeat could stand for ours."""
         own = self._settings.own_id
         if self._heard(own):
-            raise NotAllowed(
-                f"node {own} is on this bus, and {own} is the number under which this computer"
-                " sends its heartbeat: the drives would not notice if the computer fell silent",
-                value=own,
-                remedy="add own_id= with a number that no node has to the address of the bus",
-            )
+            raise NotAllowed("canopen.node-bus-number-under", value=own)
 
     def _prepare(self, configured: _Configured, images: Images) -> None:
         """Map, guard, and begin with the drives' present values, so nothing changes at first."""
@@ -404,8 +392,11 @@ class CanopenCyclic:
             data = self._read(*key)
             if len(data) != slot.size:
                 raise NotAllowed(
-                    f"node {key[0]}: {key[1]:04X}:{key[2]:02X} has {len(data)} bytes, "
-                    f"{slot.size} were expected",
-                    remedy="compare the profile with the drive's own dictionary",
+                    "canopen.node-bytes-expected",
+                    node=key[0],
+                    key=key[1],
+                    other_key=key[2],
+                    bytes=len(data),
+                    slot_size=slot.size,
                 )
             images.set_output(key, data)

@@ -108,11 +108,13 @@ class DriveSetup:
                 ]
             names = ", ".join(str(s.address) for s in pdo.signals)
             raise NotAllowed(
-                f"node {station} does not let {names} be mapped to PDO {pdo.number + 1}: "
-                f"{refusal.message}",
+                "canopen.node-not-let-mapped",
                 drive=f"node {station}",
                 parameter=refusal.parameter,
-                remedy="leave these signals out, they can be polled",
+                node=station,
+                names=names,
+                pdo_number=pdo.number + 1,
+                cause=refusal.text,
             ) from refusal
 
     def _remember(self, pdo: PdoPlan, cob: bytes) -> None:
@@ -148,7 +150,4 @@ class DriveSetup:
             except DriveError as error:
                 failures.append(f"node {station} {write.index:04X}:{write.subindex:02X} ({error})")
         if failures:
-            raise NotAllowed(
-                "these settings of the drives could not be put back: " + "; ".join(failures),
-                remedy="restart the drives before using them with another master",
-            )
+            raise NotAllowed("canopen.settings-drives-not-put", failures="; ".join(failures))

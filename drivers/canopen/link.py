@@ -249,12 +249,7 @@ class CanopenLink:
     def _channel(self, station: int) -> SdoChannel:
         channel = self._channels.get(station)
         if channel is None:
-            raise NotAllowed(
-                f"{station} is not a CANopen node number",
-                value=station,
-                limit="1…127",
-                remedy="choose the node number that is set in the drive",
-            )
+            raise NotAllowed("canopen.not-canopen-node-number", value=station, limit="1…127")
         return channel
 
     def _request_sender(self, node: int) -> Callable[[bytes], None]:
@@ -287,7 +282,7 @@ class CanopenLink:
         self, work: Callable[[], T], cancelled: threading.Event | None = None
     ) -> T:
         if self._workers is None:
-            raise LinkLost(f"{self.url} is not open", drive=self.url, remedy="open the bus first")
+            raise LinkLost("canopen.not-open", drive=self.url)
         future = asyncio.get_running_loop().run_in_executor(self._workers, work)
         try:
             return await asyncio.shield(future)
@@ -362,11 +357,7 @@ class CanopenLink:
 
 def _object(address: Address) -> tuple[int, int]:
     if address.index is None:
-        raise NotAllowed(
-            f"{address} exists only over Modbus",
-            parameter=str(address),
-            remedy="connect the drive's RS232 port as well",
-        )
+        raise NotAllowed("canopen.exists-over-modbus", parameter=str(address), address=address)
     return address.index, address.subindex
 
 

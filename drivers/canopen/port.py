@@ -113,8 +113,8 @@ class CanPort:
     def _lost_error(self) -> LinkLost:
         why = self._why
         if why is None:
-            return LinkLost(f"CAN adapter {self.url.channel} is closed", drive=self.url.url)
-        return LinkLost(why.message, drive=self.url.url, remedy=why.remedy)
+            return LinkLost("canopen.adapter-closed", drive=self.url.url, channel=self.url.channel)
+        return LinkLost(why.text, drive=self.url.url, remedy=why.remedy_text)
 
     def _receive(self) -> None:
         idle_due_s = 0.0
@@ -149,10 +149,7 @@ class CanPort:
             return
         self.bus_offs += 1
         why = LinkLost(
-            f"CAN adapter {self.url.channel}: bus-off, it has switched itself off after too many "
-            "errors",
-            drive=self.url.url,
-            remedy=_BUS_OFF_REMEDY,
+            "canopen.adapter-bus-off-switched", drive=self.url.url, channel=self.url.channel
         )
         self._recover(why, "fault", _FIRST_RETRY_S)
 

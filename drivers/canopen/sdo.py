@@ -112,7 +112,9 @@ def _upload_segments(mux: bytes, announced: int | None) -> Transfer[bytes]:
             break
         toggle ^= 0x10
     if announced is not None and len(data) != announced:
-        raise ProtocolError(f"the drive announced {announced} bytes and sent {len(data)}")
+        raise ProtocolError(
+            "canopen.drive-announced-bytes-sent", announced_bytes=announced, count=len(data)
+        )
     return bytes(data)
 
 

@@ -159,9 +159,9 @@ class SyncLoop:
                     lambda: self._sent_cycle >= wanted or self._bus_lost, 0.5 + 3 * self.cycle_s
                 )
                 if not sent:
-                    raise LinkTimeout("the cyclic exchange did not run", remedy="start it anew")
+                    raise LinkTimeout("canopen.cyclic-exchange-not-run")
             if self._bus_lost:
-                raise LinkLost("the CAN bus is lost", remedy="wait until the adapter is back")
+                raise LinkLost("canopen.bus-lost")
 
     def axis(self, station: int, use: Callable[[AxisLoop], None]) -> None:
         """Do something with the axis of ``station`` between two cycles; nothing without one."""
@@ -179,7 +179,7 @@ class SyncLoop:
         """
         with self._lock:
             if self._bus_lost:
-                raise LinkLost("the CAN bus is lost", remedy="wait until the adapter is back")
+                raise LinkLost("canopen.bus-lost")
             for station, motion in motions:
                 self.images.axes[station].check(motion)
             for station, motion in motions:

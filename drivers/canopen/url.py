@@ -54,43 +54,32 @@ def parse_canopen_url(url: str) -> CanUrl:
     """
     parts = urlsplit(url)
     if parts.scheme != "canopen":
-        raise OutOfRange(
-            f"{url!r} is not a canopen:// address",
-            value=url,
-            remedy="write canopen://INTERFACE/CHANNEL, for example canopen://socketcan/can0",
-        )
+        raise OutOfRange("canopen.not-canopen-address", value=url)
     interface = parts.netloc
     if interface not in INTERFACES:
         raise OutOfRange(
-            f"{interface!r} is not a kind of CAN adapter known here",
+            "canopen.not-kind-adapter-known",
             value=url,
             limit=", ".join(INTERFACES),
-            remedy="write canopen://INTERFACE/CHANNEL, for example canopen://socketcan/can0",
+            interface=interface,
         )
     channel = unquote(parts.path.removeprefix("/")) or _DEFAULT_CHANNEL.get(interface, "")
     if not channel:
-        raise OutOfRange(
-            f"{url!r} names no channel",
-            value=url,
-            remedy=f"write canopen://{interface}/CHANNEL, for example can0 or /dev/ttyACM0",
-        )
+        raise OutOfRange("canopen.names-no-channel", value=url, interface=interface)
     require_channel(interface, channel)
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
     unknown = sorted(set(options) - set(_OPTIONS))
     if unknown:
         raise OutOfRange(
-            f"{url!r}: unknown option {', '.join(unknown)}",
+            "canopen.unknown-option",
             value=url,
             limit=", ".join(_OPTIONS),
-            remedy="use only the options within the limit",
+            unknown=", ".join(unknown),
         )
     bitrate = _number(options, "bitrate", 1_000_000.0, 1, 1_000_000)
     if int(bitrate) not in BITRATES:
         raise OutOfRange(
-            f"{int(bitrate)} bit/s is not a CANopen bit rate",
-            value=int(bitrate),
-            limit=", ".join(map(str, BITRATES)),
-            remedy="choose the bit rate that is set in the drives",
+            "canopen.bit-not-canopen-bit", value=int(bitrate), limit=", ".join(map(str, BITRATES))
         )
     return CanUrl(
         url=url,
@@ -122,8 +111,11 @@ def _number(options: dict[str, str], name: str, default: float, low: float, high
         value = float("nan")
     if not low <= value <= high:
         raise OutOfRange(
-            f"{name}={text} must be a number from {low:g} to {high:g}",
+            "canopen.must-number",
             value=text,
             limit=f"{low:g}…{high:g}",
+            name=name,
+            low=low,
+            high=high,
         )
     return value

@@ -32,11 +32,7 @@ def require_ethercat(interface: str) -> None:
     """
     if sys.platform != "linux":
         raise NotAllowed(
-            f"EtherCAT on {interface} is not available: servodeck runs EtherCAT on Linux only",
-            value=interface,
-            limit="Linux",
-            remedy="run servodeck on a computer with Linux at the machine and open its page from"
-            " here; Modbus, MLink and CANopen by slcan work on this one",
+            "computer.ethercat-not-available-servodeck", value=interface, limit="Linux"
         )
 
 
@@ -59,12 +55,7 @@ def shared_memory_file(name: str) -> int:
     """
     if sys.platform == "linux":
         return os.memfd_create(name)
-    raise NotAllowed(
-        f"shared memory for {name} is not available: servodeck runs EtherCAT on Linux only",
-        value=name,
-        limit="Linux",
-        remedy="run servodeck on a computer with Linux at the machine",
-    )
+    raise NotAllowed("computer.shared-memory-not-available", value=name, limit="Linux")
 
 
 def receive_with_notes(

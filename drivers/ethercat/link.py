@@ -136,9 +136,7 @@ class EthercatLink:
             and not cia402.stops(int.from_bytes(data, "little"))
         ):
             raise NotAllowed(
-                "the cyclic exchange broke off and is being set up again: no axis can be enabled"
-                f" before that ({self.process_data.trouble})",
-                remedy="wait until it runs again, or end the cyclic exchange",
+                "ethercat.cyclic-exchange-broke-off", trouble=self.process_data.trouble
             )
         await self._call(
             {"op": "write", "station": station, "index": index, "subindex": subindex, "data": data},

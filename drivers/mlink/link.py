@@ -33,9 +33,10 @@ def register_of(index: int, subindex: int) -> int:
     register = (index & 0xF000) + ((index & 0x0FFF) << 4) + max(subindex - 1, 0)
     if register > 0xFFFF:
         raise NotAllowed(
-            f"{index:04X}:{subindex:02X} has no register number on MLink",
+            "mlink.no-register-number-mlink",
             parameter=f"{index:04X}:{subindex:02X}",
-            remedy="use EtherCAT for this object",
+            index=index,
+            subindex=subindex,
         )
     return register
 
@@ -64,23 +65,19 @@ class MlinkLayout:
     def place(self, station: int, address: Address) -> Place:
         """See `drivers.modbus.layout.Layout.place`."""
         if address.index is None:
-            raise NotAllowed(
-                f"{address} is no object: MLink reaches objects only",
-                remedy="name the object by index and subindex",
-            )
+            raise NotAllowed("mlink.no-object-mlink-reaches", address=address)
         rival = self._rivals.get(station, {}).get((address.index, address.subindex))
         if rival:
             raise NotAllowed(
-                f"MLink cannot tell {address} from {rival}: both have the same register",
-                parameter=str(address),
-                remedy="use EtherCAT for this object",
+                "mlink.mlink-cannot-tell-both", parameter=str(address), address=address, rival=rival
             )
         count = words_of(address.type)
         if count > _MAX_WORDS:
             raise NotAllowed(
-                f"{address} is a {address.type}: MLink moves at most 32 bits",
+                "mlink.mlink-moves-most-32",
                 parameter=str(address),
-                remedy="use EtherCAT for this object",
+                address=address,
+                type=address.type,
             )
         blocks = self.limits(station).max_registers > _MAX_WORDS
         group = address.index if blocks and count == 1 else None

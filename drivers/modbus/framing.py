@@ -121,17 +121,15 @@ class Query:
 
 def _check(station: int, start: int, count: int, longest: int) -> None:
     if not 1 <= station <= 247:
-        raise OutOfRange(
-            f"station {station} is outside the addresses 1 to 247 of Modbus RTU",
-            value=station, limit="1…247",
-            remedy="choose the station number that is set in the drive",
-        )  # fmt: skip
+        raise OutOfRange("modbus.station-outside-addresses-247", value=station, limit="1…247")
     if not 1 <= count <= longest or start < 0 or start + count > 0x10000:
         raise OutOfRange(
-            f"{count} registers from {start:#06x} do not fit one request (1 to {longest}, "
-            "up to register 0xffff)",
-            value=count, limit=f"1…{longest}",
-        )  # fmt: skip
+            "modbus.registers-not-fit-request",
+            value=count,
+            limit=f"1…{longest}",
+            start=start,
+            longest=longest,
+        )
 
 
 @lru_cache(maxsize=4096)
@@ -176,9 +174,7 @@ def write_many_query(station: int, start: int, values: Sequence[int]) -> Query:
 def _check_words(values: Sequence[int]) -> None:
     for value in values:
         if not 0 <= value <= 0xFFFF:
-            raise OutOfRange(
-                f"{value} does not fit a 16-bit register", value=value, limit="0…65535"
-            )
+            raise OutOfRange("modbus.not-fit-16-bit", value=value, limit="0…65535")
 
 
 @dataclass(frozen=True, slots=True)

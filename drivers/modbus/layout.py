@@ -66,11 +66,7 @@ class TableLayout:
     def place(self, station: int, address: Address) -> Place:
         """See `Layout.place`."""
         if address.register is None:
-            raise NotAllowed(
-                f"{address} has no Modbus register",
-                parameter=str(address),
-                remedy="connect the drive's other bus as well: this value is only there",
-            )
+            raise NotAllowed("modbus.no-modbus-register", parameter=str(address), address=address)
         order = self._orders.get(station, self._default_order)
         return Place(address.register, words_of(address.type), address.type, order)
 

@@ -165,11 +165,7 @@ class Line:
         try:
             self._ask(query, None, at_any_rate=at_any_rate)
         except ProtocolError as error:
-            raise LinkTimeout(
-                f"the answer of station {station} to a write came damaged: whether the drive took "
-                "the value is unknown",
-                remedy="read the value back before writing again",
-            ) from error
+            raise LinkTimeout("modbus.answer-station-write-came", station=station) from error
 
     def count_retry(self, station: int) -> None:
         """Note that the caller repeats a read."""
@@ -207,10 +203,7 @@ class Line:
 
     def _ask(self, query: Query, timeout_s: float | None, *, at_any_rate: bool = False) -> bytes:
         if self._port is None:
-            raise LinkLost(
-                f"the serial port {self.settings.device} is not open",
-                remedy="check the cable and the adapter; the line opens by itself when it is back",
-            )
+            raise LinkLost("modbus.serial-port-not-open", device=self.settings.device)
         try:
             late = self._late.get(query.station)
             if late is None:
@@ -256,9 +249,12 @@ class Line:
             counters.refusals += 1
             text = EXCEPTION_TEXTS.get(code, "the drive refused for a reason Modbus does not name")
             raise Rejected(
-                f"station {query.station}: {text} (exception {code})",
+                "modbus.station-exception",
                 code=code,
                 remedy=EXCEPTION_REMEDIES.get(code, UNKNOWN_EXCEPTION_REMEDY),
+                station=query.station,
+                text=text,
+                number=code,
             )
         late.answered(query)
         return answer.frame
@@ -313,15 +309,15 @@ class Line:
             counters.framing_errors += not answer.crc_errors
             shown = received[:24].hex(" ") + (" …" if len(received) > 24 else "")
             raise ProtocolError(
-                f"station {query.station} sent a damaged answer ({shown})",
-                remedy="check baud rate, parity, shield, termination, and that no two drives have "
-                "the same address",
+                "modbus.station-sent-damaged-answer", station=query.station, shown=shown
             )
         counters.timeouts += 1
         only_echo = " (only the adapter's echo of the question came back)" if self.echo else ""
         raise LinkTimeout(
-            f"station {query.station} did not answer within {limit_s * 1000:.0f} ms{only_echo}",
-            remedy="check the drive's supply, its address, baud rate and parity, and A/B swapped",
+            "modbus.station-not-answer-within",
+            station=query.station,
+            limit_ms=limit_s * 1000,
+            only_echo=only_echo,
         )
 
     def _accept(self, answer: Answer, received: bytes, counters: Counters, sent_at: float) -> None:
@@ -361,10 +357,7 @@ class Line:
         while port.read(pause):
             pause = self.settings.gap_s
             if self._clock() > until:
-                raise ProtocolError(
-                    f"the line {self.settings.device} never falls silent",
-                    remedy="another master is talking on it, or the baud rate is wrong",
-                )
+                raise ProtocolError("modbus.line-never-falls-silent", device=self.settings.device)
         self._restless = False
         self._quiet_since = self._clock()
 
@@ -389,8 +382,7 @@ class Line:
             self._settle(port)
             return
         raise LinkTimeout(
-            f"station {query.station} answers too late, so its answers cannot be told apart",
-            remedy=f"ask again in {self.settings.late_s:.0f} s; if it goes on, raise timeout_ms",
+            "modbus.station-answers-too-late", station=query.station, late_s=self.settings.late_s
         )
 
     def _count(self, station: int) -> Counters:

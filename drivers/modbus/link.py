@@ -315,7 +315,7 @@ class RegisterLink:
 
     async def _run(self, job: Callable[[], T], *, urgent: bool = False) -> T:
         if self._thread is None:
-            raise LinkLost(f"{self.url} is not open", remedy="connect the bus first")
+            raise LinkLost("modbus.not-open", url=self.url)
         return await self._thread.run(job, urgent=urgent)
 
     def _tell(self, up: bool, text: str) -> None:
@@ -397,13 +397,13 @@ def _summary(found: Sequence[Found], damaged: Sequence[int]) -> str:
 def _again(error: DriveError) -> DriveError:
     """The same error as a new object: callers fill in which parameter it was about."""
     if isinstance(error, Rejected):
-        return Rejected(error.message, code=error.code, remedy=error.remedy)
+        return Rejected(error.text, code=error.code, remedy=error.remedy_text)
     return type(error)(error.message, value=error.value, limit=error.limit, remedy=error.remedy)
 
 
 def _decided(result: bytes | DriveError | None) -> bytes | DriveError:
     if result is None:
-        raise ProtocolError("a value was neither read nor refused")
+        raise ProtocolError("modbus.value-neither-read-nor")
     return result
 
 

@@ -115,35 +115,21 @@ def is_pseudo_terminal(device: str) -> bool:
 
 def _unsuitable(settings: LineSettings, text: str) -> OutOfRange:
     line = f"{settings.baudrate} baud, parity {settings.parity}, {settings.stopbits} stop bits"
-    return OutOfRange(
-        f"{settings.device} cannot be set to {line}: {text}",
-        value=line,
-        remedy="choose a baud rate and parity that the adapter's chip supports",
-    )
+    return OutOfRange("modbus.cannot-set", value=line, device=settings.device, text=text)
 
 
 def _explain(settings: LineSettings, error: OSError) -> DriveError:
     device, text = settings.device, str(error)
     number = error.errno or next((n for n in _ERRNOS if f"Errno {n}]" in text), 0)
     if number == errno.ENOENT:
-        return LinkLost(
-            f"there is no serial port {device}",
-            remedy=f"plug the adapter in; ports found now: {ports_found()}",
-        )
+        return LinkLost("modbus.no-serial-port", device=device, ports_found=ports_found())
     if number == errno.EACCES:
-        return LinkLost(
-            f"no permission to open {device}",
-            remedy="on Linux add yourself to the group of the port, usually dialout: "
-            "sudo usermod -aG dialout $USER, then log in again",
-        )
+        return LinkLost("modbus.no-permission-open", device=device)
     if number in (errno.EAGAIN, errno.EBUSY) or "exclusively lock" in text:
-        return LinkLost(
-            f"{device} is in use by another program",
-            remedy="close the other program, for example the maker's tool or ModemManager",
-        )
+        return LinkLost("modbus.use-another-program", device=device)
     if number == errno.EINVAL or "baud" in text:
         return _unsuitable(settings, text)
-    return LinkLost(f"{device} cannot be opened: {text}", remedy="unplug and replug the adapter")
+    return LinkLost("modbus.cannot-opened", device=device, text=text)
 
 
 _ERRNOS = (errno.ENOENT, errno.EACCES, errno.EAGAIN, errno.EBUSY, errno.EINVAL)
@@ -151,10 +137,7 @@ _ERRNOS = (errno.ENOENT, errno.EACCES, errno.EAGAIN, errno.EBUSY, errno.EINVAL)
 
 def _gone(device: str, error: Exception | None) -> LinkLost:
     detail = f" ({error})" if error else ""
-    return LinkLost(
-        f"the serial port {device} is gone{detail}",
-        remedy="check the cable and the adapter; the line is opened again when it is back",
-    )
+    return LinkLost("modbus.serial-port-gone", device=device, detail=detail)
 
 
 class _PosixPort:

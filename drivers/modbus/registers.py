@@ -53,10 +53,7 @@ def words_of(data_type: DataType) -> int:
     """
     size = size_of(data_type)
     if size is None:
-        raise NotAllowed(
-            f"values of type {data_type} cannot be carried in Modbus registers",
-            remedy="read this one over another bus of the drive",
-        )
+        raise NotAllowed("modbus.values-type-cannot-carried", data_type=data_type)
     return max(1, size // 2)
 
 
@@ -73,9 +70,10 @@ def to_bytes(place: Place, registers: bytes) -> bytes:
         sign_extended = high == 0xFF and low >= 0x80 and place.type == "INT8"
         if high and not sign_extended:
             raise ProtocolError(
-                f"register {place.start:#06x} holds {registers.hex()}h, which is no {place.type}",
-                remedy="the drive's firmware may be of another version: compare the parameter's "
-                "type with the drive's own documentation",
+                "modbus.register-holds-no",
+                start=place.start,
+                registers=registers.hex(),
+                type=place.type,
             )
         return registers[1:]
     if place.word_order == "high_first":
@@ -93,7 +91,7 @@ def to_words(place: Place, data: bytes) -> tuple[int, ...]:
         ProtocolError: the length does not fit the type.
     """
     if len(data) != size_of(place.type):
-        raise ProtocolError(f"{len(data)} bytes given for a {place.type}")
+        raise ProtocolError("modbus.bytes-given", bytes=len(data), type=place.type)
     if len(data) == 1:
         negative = place.type == "INT8" and data[0] >= 0x80
         return (data[0] | (0xFF00 if negative else 0),)

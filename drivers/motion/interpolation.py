@@ -11,7 +11,4 @@ def interpolation_period(cycle_ns: int) -> tuple[int, int]:
         unit_ns = 10 ** (9 + exponent)
         if cycle_ns % unit_ns == 0 and cycle_ns // unit_ns <= 255:
             return cycle_ns // unit_ns, exponent
-    raise NotAllowed(
-        f"a cycle of {cycle_ns / 1000:g} µs cannot be told to the drive",
-        remedy="choose another cycle, such as 1 ms",
-    )
+    raise NotAllowed("cyclic.cycle-cannot-told-drive", cycle_us=cycle_ns / 1000)

@@ -117,27 +117,18 @@ class AxisLoop:
             NotAllowed: the control word is not in the process data, or the axis is in a fault.
         """
         if CONTROL not in self._out:
-            raise NotAllowed(f"station {self.station}: the control word is not in the cyclic data")
+            raise NotAllowed("cyclic.station-control-word-not", station=self.station)
         if goal is State.OPERATION_ENABLED:
             if self.goal is not State.OPERATION_ENABLED:
                 # That samples are older than its disabling is no reason to stay disabled.
                 self._was_enabled, self._stale = False, _STALE_CYCLES
             if self.state in (State.FAULT, State.FAULT_REACTION):
-                raise NotAllowed(
-                    f"station {self.station} has a fault and cannot be enabled",
-                    remedy="read its active faults, remove the cause and reset the fault",
-                )
+                raise NotAllowed("cyclic.station-fault-cannot-enabled", station=self.station)
             if self.phase is Phase.BRAKING:
-                raise NotAllowed(
-                    f"station {self.station} is braking: {self._why}",
-                    remedy="wait until it stands",
-                )
+                raise NotAllowed("cyclic.station-braking", station=self.station, why=self._why)
             self.halted = None
         if mode is not None and self.phase is not Phase.IDLE:
-            raise NotAllowed(
-                f"station {self.station} moves: its mode cannot be changed now",
-                remedy="disable the axis and wait until it stands",
-            )
+            raise NotAllowed("cyclic.station-moves-mode-cannot", station=self.station)
         if mode is not None and MODE in self._out:
             self.outputs[self._out[MODE]] = self._dialect.mode(mode)
         if (
@@ -454,21 +445,25 @@ class AxisLoop:
         motion.require_mapped(self._out, where)
         if self.state is not State.OPERATION_ENABLED or self.goal is not State.OPERATION_ENABLED:
             raise NotAllowed(
-                f"{where} is in {self.state.value!r}, a motion needs 'Operation enabled'",
+                "cyclic.motion-needs-operation-enabled",
                 remedy=self._why or "enable the axis first",
+                where=where,
+                state=self.state.value,
             )
         wanted = cia402.Mode(self._dialect.mode(MODE_OF[motion.target]))
         if self._mode is not None and self._mode != wanted:
             raise NotAllowed(
-                f"{where} is in mode {self._mode}, this setpoint needs mode {int(wanted)}"
-                f" ({cia402.MODE_NAMES[wanted]})",
-                remedy="choose the mode when enabling the axis",
+                "cyclic.mode-setpoint-needs-mode",
+                where=where,
+                mode=self._mode,
+                wanted=int(wanted),
+                mode_names=cia402.MODE_NAMES[wanted],
             )
         motion.limits.require_watched(self._in, where)
         if self.phase is Phase.BRAKING:
-            raise NotAllowed(f"{where} is braking: {self._why}", remedy="wait until it stands")
+            raise NotAllowed("cyclic.braking", where=where, why=self._why)
         if not len(motion.values):
-            raise NotAllowed(f"{where}: a trajectory without values")
+            raise NotAllowed("cyclic.trajectory-without-values", where=where)
         if motion.target == POSITION:
             now = self.setpoint_now(POSITION)
             assert now is not None

@@ -57,8 +57,7 @@ class Limits:
         ):
             if limit is not None and index not in inputs:
                 raise NotAllowed(
-                    f"{where}: the {name} limit cannot be watched, {index:04X}h is not mapped",
-                    remedy=f"configure the cyclic data with {index:04X}h",
+                    "cyclic.limit-cannot-watched-not", where=where, name=name, index=index
                 )
 
 
@@ -90,10 +89,7 @@ class Motion:
         """
         for index in (self.target, self.offset):
             if index is not None and index not in outputs:
-                raise NotAllowed(
-                    f"{where}: {index:04X}h is not in the cyclic data",
-                    remedy="configure the cyclic data with this target",
-                )
+                raise NotAllowed("cyclic.not-cyclic-data", where=where, index=index)
 
     def require_near(self, now: int, speed: float, where: str) -> None:
         """The first position is no further away than the longest step that follows.
@@ -107,8 +103,9 @@ class Motion:
         longest = max(self.longest_step, abs(round(speed)), 1)
         if abs(first - now) > longest:
             raise NotAllowed(
-                f"{where}: the trajectory begins at {first}, the axis is held at {now}",
+                "cyclic.trajectory-begins-axis-held",
                 value=first,
                 limit=f"{longest} per cycle",
-                remedy="begin where the axis stands",
+                where=where,
+                now=now,
             )

@@ -22,15 +22,15 @@ def require_fits(trajectory: Trajectory) -> None:
     """
     if trajectory.target.index not in TARGETS or trajectory.target.subindex:
         raise NotAllowed(
-            f"{trajectory.target} is not a setpoint for cyclic motion",
+            "cyclic.not-setpoint-cyclic-motion",
             parameter=str(trajectory.target),
-            remedy="play a position, velocity or torque",
+            target=trajectory.target,
         )
     _check_type(trajectory.target, trajectory.values)
     if trajectory.offset_target is not None and trajectory.offset_values is not None:
         _check_type(trajectory.offset_target, trajectory.offset_values)
         if len(trajectory.offset_values) != len(trajectory.values):
-            raise OutOfRange("offsets and values of a trajectory differ in number")
+            raise OutOfRange("cyclic.offsets-values-trajectory-differ")
 
 
 def longest_step(trajectory: Trajectory) -> int:
@@ -42,10 +42,14 @@ def _check_type(address: Address, values: npt.NDArray[np.int64]) -> None:
     low, high = INTEGER_RANGE[address.type]
     if len(values) and not (low <= int(values.min()) and int(values.max()) <= high):
         raise OutOfRange(
-            f"the trajectory goes from {values.min()} to {values.max()}, {address} holds"
-            f" {low} to {high}",
+            "cyclic.trajectory-goes-holds",
             parameter=str(address),
             limit=f"{low}…{high}",
+            min_values=values.min(),
+            max_values=values.max(),
+            address=address,
+            low=low,
+            high=high,
         )
 
 
@@ -66,12 +70,15 @@ def require_within_envelope(trajectory: Trajectory) -> None:
     elif kind == "torque" and limits.torque_max is not None:
         low, high = -limits.torque_max, limits.torque_max
     if not len(values):
-        raise OutOfRange("a trajectory without values")
+        raise OutOfRange("cyclic.trajectory-without-values-2")
     if (low is not None and values.min() < low) or (high is not None and values.max() > high):
         raise OutOfRange(
-            f"the {kind} setpoints go from {values.min()} to {values.max()}, the envelope allows"
-            f" {low} to {high}",
+            "cyclic.setpoints-go-envelope-allows",
             parameter=str(trajectory.target),
             limit=f"{low}…{high}",
-            remedy="shorten the move or widen the envelope",
+            kind=kind,
+            min_values=values.min(),
+            max_values=values.max(),
+            low=low,
+            high=high,
         )

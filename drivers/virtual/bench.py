@@ -99,9 +99,11 @@ def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise NotAllowed(
-            f"bench file {path}: {place}: {first['msg']}",
+            "virtual.bench-file-see-docs",
             value=str(path),
-            remedy="see docs/virtual-drives.md",
+            path=path,
+            place=place,
+            first=first["msg"],
         ) from error
     except OSError as error:
         raise _wrong(path, f"{error.filename or path}: {error.strerror}") from error
@@ -115,20 +117,14 @@ def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
 
 
 def _wrong(path: Path, why: str) -> NotAllowed:
-    return NotAllowed(
-        f"bench file {path}: {why}", value=str(path), remedy="see docs/virtual-drives.md"
-    )
+    return NotAllowed("virtual.bench-file", value=str(path), path=path, why=why)
 
 
 def _check_names(bench: BenchSpec, path: Path) -> None:
     names = [axis.name for axis in bench.axis]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise NotAllowed(
-            f"bench file {path}: two axes are named {twice!r}",
-            value=twice,
-            remedy="give each axis a name of its own",
-        )
+        raise NotAllowed("virtual.bench-file-two-axes", value=twice, path=path)
 
 
 def _check_ports(axis: AxisSpec, path: Path) -> None:
@@ -145,26 +141,33 @@ def _check_ports(axis: AxisSpec, path: Path) -> None:
         kinds = ", ".join(link.kind for link in profile.links)
         if profile.link(bus.scheme) is None:
             raise NotAllowed(
-                f"bench file {path}: {axis.name}: a {profile.title} has no {bus.scheme} port",
+                "virtual.bench-file-no-port",
                 value=url,
                 limit=kinds,
-                remedy=f"it can hang on {kinds}",
+                path=path,
+                drive_name=axis.name,
+                profile_title=profile.title,
+                scheme=bus.scheme,
             )
         if bus.scheme == "canopen" and not (bus.is_virtual or bus.place.startswith("slcan/")):
             raise NotAllowed(
-                f"bench file {path}: {axis.name}: a virtual drive answers on no {bus}",
+                "virtual.bench-file-virtual-drive",
                 value=url,
                 limit="canopen://virtual0, canopen://slcan/PATH",
-                remedy="let it make an slcan adapter, as canopen://slcan//tmp/can0",
+                path=path,
+                drive_name=axis.name,
+                bus=bus,
             )
         last = _LAST_STATION[bus.scheme]
         if not 1 <= station <= last:
             raise NotAllowed(
-                f"bench file {path}: {axis.name}: station {station} of {url} is outside 1 to "
-                f"{last}",
+                "virtual.bench-file-station-outside",
                 value=station,
                 limit=f"1 to {last}",
-                remedy="give a number that the bus has",
+                path=path,
+                drive_name=axis.name,
+                url=url,
+                last=last,
             )
 
 
@@ -173,8 +176,4 @@ def _check_stations(bench: BenchSpec, path: Path) -> None:
         stations = [station for _, station in bench.on(url)]
         twice = sorted({s for s in stations if stations.count(s) > 1})
         if twice:
-            raise NotAllowed(
-                f"bench file {path}: station {twice[0]} of {url} is given twice",
-                value=twice[0],
-                remedy="give each drive of a bus a station of its own",
-            )
+            raise NotAllowed("virtual.bench-file-station-given", value=twice[0], path=path, url=url)

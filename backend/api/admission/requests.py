@@ -91,7 +91,7 @@ class Admission:
         while len(self._buckets) > _KEEP:
             self._buckets.popitem(last=False)
         if not bucket.take():
-            raise TooOften("too many requests without login", 1.0)
+            raise TooOften("api-admission.too-many-requests-without", 1.0)
 
     @contextmanager
     def running(self, address: str, *, known: bool, stop: bool) -> Iterator[None]:
@@ -105,11 +105,11 @@ class Admission:
             return
         place = "" if known else address_group(address)
         if self._running >= MOST_REQUESTS:
-            raise TooOften("too many requests run at once", 1.0)
+            raise TooOften("api-admission.too-many-requests-run", 1.0)
         if not known and (
             self._strangers[place] >= MOST_OF_PLACE or self._strangers.total() >= MOST_OF_STRANGERS
         ):
-            raise TooOften("too many requests without login run at once", 1.0)
+            raise TooOften("api-admission.too-many-requests-without-login", 1.0)
         self._running += 1
         if not known:
             self._strangers[place] += 1

@@ -123,7 +123,7 @@ async def export_audit(
     """Entries as a table, or as JSON lines with hashes, oldest first."""
     wanted = _filter(kind, person, axis, station, words, since, until)
     if wanted.since and wanted.until and wanted.since >= wanted.until:
-        raise OutOfRange("since must be before until", remedy="exchange the two")
+        raise OutOfRange("api-audit.since-must-before-until")
     lines = bench.records.trail.export(wanted, form)
     store = bench.records.store
 

@@ -182,7 +182,7 @@ async def keep_watch(member: Controlled, store: TheStore, request: WatchUpdate) 
     for key in request.keys:
         parameter = member.drive.profile.parameter(key)
         if parameter is None:
-            raise NotFound(f"{member.drive.name} has no parameter {key}", drive=member.drive.name)
+            raise NotFound("api-drive.no-parameter", drive=member.drive.name, key=key)
         if parameter.key not in keys:
             keys.append(parameter.key)
     old = store.get(member.drive.id)

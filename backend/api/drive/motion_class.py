@@ -32,11 +32,7 @@ def _known(profile: str, key: str) -> tuple[Profile, Parameter]:
         raise NotFound(str(error), value=profile, remedy="see the list of profiles") from error
     parameter = known.parameter(key)
     if parameter is None:
-        raise NotFound(
-            f"{known.title} has no parameter {key}",
-            parameter=key,
-            remedy="see the list of parameters",
-        )
+        raise NotFound("api-drive.no-parameter-see-list", parameter=key, known_title=known.title)
     return known, parameter
 
 

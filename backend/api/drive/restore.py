@@ -17,11 +17,7 @@ router = APIRouter(prefix="/drives/{drive_id}")
 async def put_back(bench: TheBench, member: Controlled) -> JobInfo:
     """Put back every value that is owed to the drive, while its axis stands."""
     if not member.drive.owed:
-        raise NotAllowed(
-            f"{member.drive.name}: nothing is to be put back",
-            drive=member.drive.name,
-            remedy="look at its parameters; they may have been put back already",
-        )
+        raise NotAllowed("api-drive.nothing-put-back", drive=member.drive.name)
     return convert.job(bench.returning.start(member, asked=True))
 
 

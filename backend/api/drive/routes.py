@@ -93,11 +93,7 @@ async def _alone(
     job = bench.jobs.start("power", f"{title}: {drive.name}", run, drive=drive.id, motion=True)
     await job.wait()
     if job.state == "cancelled":
-        raise NotAllowed(
-            f"{drive.name}: STOP was pressed during “{title}”",
-            drive=drive.name,
-            remedy="try again when it is safe",
-        )
+        raise NotAllowed("api-drive.stop-pressed-during", drive=drive.name, title=title)
     if job.error is not None:
         raise job.error
 
@@ -107,11 +103,10 @@ def _mode(member: Member, number: int) -> Mode:
         return Mode(number)
     except ValueError as error:
         raise OutOfRange(
-            f"{member.drive.name} has no mode {number}",
+            "api-drive.no-mode",
             drive=member.drive.name,
             value=number,
             limit=", ".join(str(mode) for mode in member.drive.modes),
-            remedy="choose one of its modes",
         ) from error
 
 
@@ -182,22 +177,14 @@ def _choose(known: Iterable[str]) -> str:
 def _require_known(member: Member, key: str) -> None:
     if member.drive.profile.parameter(key) is None:
         raise NotFound(
-            f"{member.drive.name} has no parameter {key}",
-            drive=member.drive.name,
-            parameter=key,
-            remedy="search the Parameters page for its name or number; keys look like 6040:00",
+            "api-drive.no-parameter-search-parameters", drive=member.drive.name, parameter=key
         )
 
 
 async def _write(bench: TheBench, member: Member, key: str, request: ParameterWrite) -> Reading:
     drive = member.drive
     if (request.raw is None) == (request.value is None):
-        raise OutOfRange(
-            f"{drive.name}: {key}: give either raw or value",
-            drive=drive.name,
-            parameter=key,
-            remedy="send exactly one of the two",
-        )
+        raise OutOfRange("api-drive.give-either-raw-value", drive=drive.name, parameter=key)
     parameter = drive.parameter(key)
     old = drive.readings.get(parameter.key)
     value, raw = (request.value, False) if request.raw is None else (request.raw, True)
@@ -248,10 +235,7 @@ def _raw_of(drive: Drive, parameter: Parameter, request: ParameterWrite) -> Raw:
     """The raw value that is asked for, in whichever of the two ways."""
     if (request.raw is None) == (request.value is None):
         raise OutOfRange(
-            f"{drive.name}: {parameter.key}: give either raw or value",
-            drive=drive.name,
-            parameter=parameter.key,
-            remedy="send exactly one of the two",
+            "api-drive.give-either-raw-value", drive=drive.name, parameter=parameter.key
         )
     if request.raw is not None:
         return request.raw
@@ -260,10 +244,7 @@ def _raw_of(drive: Drive, parameter: Parameter, request: ParameterWrite) -> Raw:
         return value if isinstance(value, str) else parameter.to_raw(value)
     except OverflowError as error:
         raise OutOfRange(
-            f"{drive.name}: {parameter.key}: {value:g} is no number",
-            drive=drive.name,
-            parameter=parameter.key,
-            remedy="give a number that is finite",
+            "api-drive.no-number", drive=drive.name, parameter=parameter.key, given=value
         ) from error
 
 
@@ -275,10 +256,7 @@ async def _require_disabled(member: Member, key: str) -> None:
     """
     if await member.axis.state() is State.OPERATION_ENABLED:
         raise NotAllowed(
-            f"{member.drive.name}: {key} commands motion and the axis is enabled",
-            drive=member.drive.name,
-            parameter=key,
-            remedy="use the Motion page, which sets limits and a dead-man; or disable the axis",
+            "api-drive.commands-motion-axis-enabled", drive=member.drive.name, parameter=key
         )
 
 
@@ -299,7 +277,7 @@ async def run_procedure(
     known = member.drive.profile.procedure(name)
     if known is None:
         raise NotFound(
-            f"{member.drive.name} has no procedure {name!r}",
+            "api-drive.no-procedure",
             drive=member.drive.name,
             value=name,
             remedy=_choose(p.name for p in member.drive.profile.procedures),
@@ -391,11 +369,7 @@ async def start_generator(bench: TheBench, member: Controlled, request: Generate
     """Play a test signal in a cyclic mode, one value per cycle."""
     session = member.axis.session
     if session is None or not session.running:
-        raise NotAllowed(
-            f"{member.drive.name}: the cyclic exchange does not run",
-            drive=member.drive.name,
-            remedy="start it on the Connect page",
-        )
+        raise NotAllowed("api-drive.cyclic-exchange-not-run", drive=member.drive.name)
     unit = await convert_motion.unit_of(bench, member, request.unit)
     settings = convert_motion.generator_settings(request, unit)
     job = bench.jobs.start(
@@ -424,7 +398,7 @@ async def start_homing(bench: TheBench, member: Controlled, request: HomeRequest
     settings = convert_motion.homing_settings(request, unit)
     if request.method not in {m.method for m in member.drive.profile.homing_methods}:
         raise NotAllowed(
-            f"{member.drive.name} has no homing method {request.method}",
+            "api-drive.no-homing-method",
             drive=member.drive.name,
             value=request.method,
             remedy=_choose(str(m.method) for m in member.drive.profile.homing_methods),

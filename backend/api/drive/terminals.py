@@ -152,12 +152,7 @@ async def end_forcing(
 def _running(member: Member, sessions: ForcingSessions, name: str) -> ForcingSession:
     session = sessions.get(member.drive.id, name)
     if session is None:
-        raise NotFound(
-            f"{member.drive.name}: no terminals are overruled like this now",
-            drive=member.drive.name,
-            value=name,
-            remedy="begin again; a session ends when the page falls silent",
-        )
+        raise NotFound("api-drive.no-terminals-overruled-like", drive=member.drive.name, value=name)
     return session
 
 

@@ -44,11 +44,11 @@ def _entry(bench: Bench, entry_id: int) -> Entry:
         NotFound: there is none of this id.
     """
     if not 0 < entry_id <= _MOST:
-        raise NotFound("there is no such thing in the library", value=entry_id)
+        raise NotFound("api-library.no-thing-library", value=entry_id)
     try:
         return bench.records.library.entry(entry_id)
     except NotInLibrary as error:
-        raise NotFound(error.message, value=entry_id, remedy=error.remedy) from error
+        raise NotFound(error.text, value=entry_id, remedy=error.remedy_text) from error
 
 
 def _page(bench: Bench, recordings: Recordings, query: LibraryQuery) -> LibraryPage:
@@ -136,15 +136,12 @@ async def library_content(
     if entry.station == records.station:
         path = await records.store.call(records.index.path, entry.kind, entry.name)
         if path is None:
-            raise NotFound(
-                f"{entry.name} is no longer in its folder", value=entry.name,
-                remedy="it was deleted; search again",
-            )  # fmt: skip
+            raise NotFound("api-library.no-longer-folder", value=entry.name)
         return FileResponse(path, media_type=kind, headers=headers)
     try:
         data = await records.store.call(records.library.content, entry_id, version)
     except NotInLibrary as error:
-        raise NotFound(error.message, value=version, remedy=error.remedy) from error
+        raise NotFound(error.text, value=version, remedy=error.remedy_text) from error
     return Response(data, media_type=kind, headers=headers)
 
 
@@ -157,11 +154,7 @@ async def share_library_entry(
     def work() -> Entry:
         records, entry = bench.records, _entry(bench, entry_id)
         if entry.station != records.station or entry.name in recordings.running:
-            raise NotAllowed(
-                f"{entry.name} is no finished file of this station",
-                value=entry.name,
-                remedy="share it on its station, when it has ended",
-            )
+            raise NotAllowed("api-library.no-finished-file-station", value=entry.name)
         return sharing.share(records.library, records.index, entry)
 
     return convert_library.entry(await bench.records.store.call(work), bench.records.station)
@@ -221,11 +214,7 @@ async def delete_library_entry(
         records = bench.records
         entry = _entry(bench, entry_id)
         if entry.station not in ("", records.station):
-            raise NotAllowed(
-                f"{entry.name} lies on station {entry.station}",
-                value=entry.name,
-                remedy="delete it there",
-            )
+            raise NotAllowed("api-library.lies-station", value=entry.name, station=entry.station)
         if entry.station == "":
             records.library.delete(entry_id)
             return

@@ -198,10 +198,7 @@ class Connection:
             request = from_page.validate_json(text)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
-            problem = DriveError(
-                f"not a message of this interface: {first['msg']}",
-                remedy="reload the page: it is of another version than the server",
-            )
+            problem = DriveError("api-live.not-message-interface", first=first["msg"])
             self.send(Refused(request="?", problem=problem_of(problem)))
             return
         try:
@@ -245,11 +242,7 @@ class Connection:
         failed = {drive: text for drive, text in problems.items() if text}
         self.send(StopTaken(drives=known, problems=failed))
         for drive, text in failed.items():
-            failure = DriveError(
-                f"STOP did not reach it: {text}",
-                drive=drive,
-                remedy="use the hardware stop, then look at its supply and cable",
-            )
+            failure = DriveError("api-live.stop-not-reach", drive=drive, text=text)
             self.send(Refused(request="stop", problem=problem_of(failure)))
         # The connection goes on meanwhile: STOP may be pressed again.
         task = asyncio.create_task(self._stopped(drives, known), name=f"stop-answer-{self.id}")

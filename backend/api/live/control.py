@@ -20,6 +20,7 @@ from backend.people.rights import GRANTABLE, Right
 from backend.people.station import People
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
+from texts.message import text
 
 
 class PeopleControl:
@@ -58,11 +59,7 @@ class PeopleControl:
             case LeaseHand():
                 to = self._pages.get(request.to)
                 if to is None:
-                    raise NotAllowed(
-                        "this person is not here any more",
-                        drive=drive,
-                        remedy="take control yourself if it is free",
-                    )
+                    raise NotAllowed("api-live.person-not-more", drive=drive)
                 require_control(self._people, to.identity, drive)
                 page.release(drive, "control was handed over")
                 leases.hand(drive, page.id, to.id, to.identity.person, request.time_s)
@@ -75,11 +72,7 @@ class PeopleControl:
         held_by = None if holder is None else self._pages.get(holder.connection)
         from_guest = held_by is not None and held_by.identity.is_guest
         if Right.ADMINISTER not in identity.rights and not from_guest:
-            raise Forbidden(
-                "only an administrator takes control from somebody",
-                drive=drive,
-                remedy="ask for control",
-            )
+            raise Forbidden("api-live.administrator-takes-control-somebody", drive=drive)
         if held_by is not None and held_by.id != page.id:
             held_by.release(drive, "control was taken")
             if self._bench.jobs.moving(drive) is not None:
@@ -108,14 +101,17 @@ def require_control(people: People, identity: Identity, drive: str) -> None:
     rights = frozenset() if now is None else now.rights & GRANTABLE
     if now is None or not rights:
         raise Forbidden(
-            f"{identity.person} may only look",
+            "api-live.may-look",
             drive=drive,
-            remedy="ask the person on site to grant control"
-            if identity.is_guest
-            else "ask an administrator",
+            remedy=(
+                text("api-live.try-ask-person-site-grant")
+                if identity.is_guest
+                else text("api-live.try-ask-administrator")
+            ),
+            person=identity.person,
         )
     if now.is_guest:
         found = people.support.of_session(now.session)
         grant = None if found is None else people.support.running(found)
         if grant is not None and grant.drive not in (None, drive):
-            raise Forbidden("the grant is for another axis", drive=drive)
+            raise Forbidden("api-live.grant-another-axis", drive=drive)

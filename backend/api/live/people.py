@@ -132,7 +132,7 @@ class PeopleLive:
 
     def _say(self, page: Page, identity: Identity, text: str) -> None:
         if not self._talk.setdefault(page.id, Bucket(*_TALK)).take():
-            raise TooOften("too many lines at once", 1.0)
+            raise TooOften("api-live.too-many-lines-once", 1.0)
         line = self._support.say(identity, text)
         self._bench.journal.add(f"“{line.text}”", person=identity.person)
         shared = only(chat_line(line))
@@ -143,7 +143,7 @@ class PeopleLive:
 
     def _press(self, page: Page, identity: Identity, invitation: str) -> None:
         if identity.is_guest or identity.kind == "token":
-            raise Forbidden("the enabling button is for a person on site")
+            raise Forbidden("api-live.enabling-button-person-site")
         self._support.press(invitation, page.id)
         self._watch.hold_pressed.set()
         guest = self._support.find(invitation).guest

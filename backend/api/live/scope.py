@@ -74,9 +74,9 @@ class ScopeStreams:
             self._requests.put_nowait(request)
         except asyncio.QueueFull as error:
             raise Busy(
-                f"{MOST_REQUESTS} scope requests wait already",
+                "api-live.scope-requests-wait-already",
                 limit=str(MOST_REQUESTS),
-                remedy="wait for the answers",
+                most_requests=MOST_REQUESTS,
             ) from error
 
     def bench_changed(self) -> None:
@@ -112,10 +112,14 @@ class ScopeStreams:
     async def _start(self, request: ScopeStart) -> None:
         await self._stop(request.subscription)
         if len(self._running) >= MOST_SUBSCRIPTIONS:
-            self._refuse(request, Busy(
-                f"{MOST_SUBSCRIPTIONS} subscriptions are the most of one page",
-                limit=str(MOST_SUBSCRIPTIONS), remedy="end some",
-            ))  # fmt: skip
+            self._refuse(
+                request,
+                Busy(
+                    "api-live.subscriptions-most-page",
+                    limit=str(MOST_SUBSCRIPTIONS),
+                    most_subscriptions=MOST_SUBSCRIPTIONS,
+                ),
+            )
             return
         signature = self._signature(request)
         try:

@@ -75,7 +75,7 @@ async def revoke_token(people: ThePeople, record: TheRecord, me: Me, token_id: s
         None,
     )
     if found is None:
-        raise NoSuchPerson("there is no such token", value=token_id)
+        raise NoSuchPerson("api-people.no-token", value=token_id)
     await accounts.revoke_token(found)
     record.note(
         "account",

@@ -150,7 +150,7 @@ async def end_session(people: ThePeople, record: TheRecord, me: Me, session_id: 
         None,
     )
     if found is None:
-        raise NoSuchPerson("there is no such session", value=session_id)
+        raise NoSuchPerson("api-people.no-session", value=session_id)
     whose = accounts.directory.account(found.account).name
     await accounts.log_out(session_id)
     record.note(

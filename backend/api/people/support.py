@@ -98,7 +98,7 @@ async def invite(
     """Invite a guest. The link and the code go to them by different ways."""
     people.require_accounts()
     if me.kind == "token":
-        raise Forbidden("a script invites nobody", remedy="do it on the page")
+        raise Forbidden("api-people.script-invites-nobody")
     secret, made = people.support.invite(
         me.person, body.guest, frozenset(body.allowed), body.minutes * 60.0
     )

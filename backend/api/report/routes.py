@@ -64,10 +64,7 @@ def _chosen(
         if belongs(head, member.drive):
             heads[name] = head
         elif asked is not None:
-            raise NotAllowed(
-                f"{name} was not measured on {member.drive.name}", drive=member.drive.name,
-                value=name, remedy="choose measurements of this drive",
-            )  # fmt: skip
+            raise NotAllowed("api-report.not-measured", drive=member.drive.name, value=name)
     if asked is None or len({kind_of(head) for head in heads.values()}) == len(heads):
         return choose(heads, first)
     # Chosen by hand: of two of a kind the older one is what the newer is compared with.
@@ -93,7 +90,7 @@ async def read_report(bench: TheBench, name: str) -> Response:
     try:
         data = await asyncio.to_thread(_store(bench).read, name)
     except NotAllowed as error:
-        raise NotFound(error.message, value=name) from error
+        raise NotFound(error.text, value=name) from error
     form: Format = "html" if name.endswith(".html") else "pdf"
     headers = disposition("inline", name)
     if form == "html":
@@ -110,4 +107,4 @@ async def delete_report(bench: TheBench, name: str) -> None:
     try:
         _store(bench).delete(name)
     except NotAllowed as error:
-        raise NotFound(error.message, value=name) from error
+        raise NotFound(error.text, value=name) from error

@@ -63,7 +63,7 @@ TheRecordings = Annotated[Recordings, Depends(recordings_of)]
 
 async def _capture(recordings: TheRecordings) -> FaultCapture:
     if recordings.capture is None:
-        raise NotAllowed("the server is starting or ending", remedy="try again")
+        raise NotAllowed("api-scope.server-starting-ending")
     return recordings.capture
 
 
@@ -165,14 +165,14 @@ async def _info(recordings: Recordings, name: str) -> RecordingInfo:
     try:
         return _stored(await asyncio.to_thread(recordings.library.describe, name))
     except NotAllowed as error:
-        raise NotFound(error.message, value=name, remedy=error.remedy) from error
+        raise NotFound(error.text, value=name, remedy=error.remedy_text) from error
 
 
 def _existing(recordings: Recordings, name: str) -> Path:
     try:
         return recordings.library.existing(name)
     except NotAllowed as error:
-        raise NotFound(error.message, value=name, remedy=error.remedy) from error
+        raise NotFound(error.text, value=name, remedy=error.remedy_text) from error
 
 
 # --- recordings -------------------------------------------------------------------------
@@ -319,9 +319,7 @@ async def download_export(recordings: TheRecordings, name: str, kind: ExportKind
     """A finished export."""
     path = recordings.library.export_path(name, kind)
     if not path.is_file():
-        raise NotFound(
-            f"{path.name} was not exported yet", value=path.name, remedy="export it first"
-        )
+        raise NotFound("api-scope.not-exported-yet", value=path.name)
     return FileResponse(path, media_type=_TYPES[kind], filename=path.name)
 
 
@@ -362,7 +360,7 @@ def _bundle(capture: FaultCapture, name: str) -> Path:
     try:
         return capture.path(name)
     except NotAllowed as error:
-        raise NotFound(error.message, value=name, remedy=error.remedy) from error
+        raise NotFound(error.text, value=name, remedy=error.remedy_text) from error
 
 
 @router.get("/bundles/{name}", response_class=FileResponse)

@@ -40,17 +40,15 @@ def install(app: FastAPI, feed: RerunFeed, assets: ViewerAssets) -> None:
     async def viewer_part(kind: str) -> Response:
         types = {"js": "text/javascript", "css": "text/css"}
         if kind not in types:
-            raise NotFound(f"there is no viewer.{kind}")
+            raise NotFound("api-scope.no-viewer", kind=kind)
         return FileResponse(_FOLDER / f"viewer.{kind}", media_type=types[kind], headers=_HEADERS)
 
     @app.get("/rerun/{version}/{name}", include_in_schema=False)
     async def viewer_file(request: Request, version: str, name: str) -> Response:
         if version != assets.version or name not in FILES:
-            raise NotFound(
-                f"the viewer has no {name} of version {version}", remedy="load the page again"
-            )
+            raise NotFound("api-scope.viewer-no-version", name=name, version=version)
         if "gzip" not in request.headers.get("accept-encoding", ""):
-            raise NotAllowed("the viewer is sent compressed", remedy="use a browser")
+            raise NotAllowed("api-scope.viewer-sent-compressed")
         path = await assets.file(name)
         return FileResponse(
             path,

@@ -57,7 +57,7 @@ async def delete_scope_setup(store: TheStore, name: str) -> Response:
     try:
         await asyncio.to_thread(store.delete_setup, name)
     except NotAllowed as error:
-        raise NotFound(error.message, value=name, remedy=error.remedy) from error
+        raise NotFound(error.text, value=name, remedy=error.remedy_text) from error
     return Response(status_code=204)
 
 
@@ -83,10 +83,10 @@ async def save_scope_snapshot(store: TheStore, name: str, request: Request) -> S
         data += part
         if len(data) > MAX_SNAPSHOT_BYTES:
             raise OutOfRange(
-                "the snapshot is too large", value=len(data),
+                "api-scope.snapshot-too-large",
+                value=len(data),
                 limit=f"{MAX_SNAPSHOT_BYTES >> 20} MiB",
-                remedy="show a shorter stretch, or record it",
-            )  # fmt: skip
+            )
     content = bytes(data)
     header = snapshot_header(content, name)
     try:
@@ -94,9 +94,8 @@ async def save_scope_snapshot(store: TheStore, name: str, request: Request) -> S
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         raise BadSnapshot(
-            f"{name} is no snapshot of the scope: {first['loc']}: {first['msg']}", value=name,
-            remedy="take it on the Scope page",
-        ) from error  # fmt: skip
+            "api-scope.no-snapshot-scope", value=name, first=first["loc"], other_first=first["msg"]
+        ) from error
     file = await asyncio.to_thread(store.save_snapshot, name, content)
     return SnapshotInfo(name=file, bytes=len(content), header=SnapshotHeader.model_validate(header))
 
@@ -107,7 +106,7 @@ async def read_scope_snapshot(store: TheStore, name: str) -> Response:
     try:
         data = await asyncio.to_thread(store.snapshot, name)
     except NotAllowed as error:
-        raise NotFound(error.message, value=name, remedy=error.remedy) from error
+        raise NotFound(error.text, value=name, remedy=error.remedy_text) from error
     return Response(
         data,
         media_type="application/octet-stream",
@@ -121,5 +120,5 @@ async def delete_scope_snapshot(store: TheStore, name: str) -> Response:
     try:
         await asyncio.to_thread(store.delete_snapshot, name)
     except NotAllowed as error:
-        raise NotFound(error.message, value=name, remedy=error.remedy) from error
+        raise NotFound(error.text, value=name, remedy=error.remedy_text) from error
     return Response(status_code=204)

@@ -249,7 +249,7 @@ class Gate:
             return
         if identity is None:
             what = "make the first account" if self._people.setup_needed else "log in"
-            raise NotLoggedIn("nobody is logged in", remedy=what)
+            raise NotLoggedIn("api-security.nobody-logged", remedy=what)
         if not isinstance(need.right, Right):
             return
         require_right(self._people, identity, need.right, matched.drive)
@@ -258,13 +258,10 @@ class Gate:
 
     def _undeclared(self, method: str, path: str, identity: Identity | None) -> DriveError:
         if identity is None:
-            return NotLoggedIn("nobody is logged in", remedy="log in")
+            return NotLoggedIn("api-security.nobody-logged-log")
         if methods := self._policy.methods(path):
-            return WrongMethod(f"{method} is not for {path}", methods)
-        return NotFound(
-            f"there is nothing at {path}",
-            remedy="check the address; /api/v1/openapi.json lists those that there are",
-        )
+            return WrongMethod("api-security.not", methods, method=method, path=path)
+        return NotFound("api-security.nothing", path=path)
 
     def _require_csrf(self, scope: Scope, identity: Identity | None, brought: Credentials) -> None:
         """A cookie comes by itself; this token only our own page can read and send.
@@ -276,11 +273,7 @@ class Gate:
             return
         given = header(scope["headers"], CSRF_HEADER.encode())
         if brought.cookie is None or not same_text(given or "", csrf_of(brought.cookie)):
-            raise Forbidden(
-                "the request does not come from the page of this session",
-                limit=f"the header {CSRF_HEADER}",
-                remedy="load the page again",
-            )
+            raise Forbidden("api-security.request-not-come-page", limit=f"the header {CSRF_HEADER}")
 
     def _own_connection(self, scope: Scope, identity: Identity | None) -> str | None:
         """The live connection that a request names, if it is one of the same session."""
@@ -299,10 +292,7 @@ class Gate:
             NotAllowed: the live connection that the request names has ended.
         """
         if named is not None and self._sockets.owner(named) is None:
-            raise NotAllowed(
-                "the connection of the page that asked for this has ended since: nothing was done",
-                remedy="wait until the page is connected again, look at the axis, and ask again",
-            )
+            raise NotAllowed("api-security.connection-page-asked-ended")
 
     def _dress(self, scope: Scope, message: Message) -> None:
         headers = MutableHeaders(scope=message)
@@ -322,7 +312,7 @@ class Gate:
                 self._admission.require_rate(_address(scope))
             needs = self._policy.needs("WS", scope["path"])
             if not needs:
-                raise NotFound(f"there is nothing at {scope['path']}")
+                raise NotFound("api-security.nothing-2", scope=scope["path"])
             for matched in needs:
                 self._require(matched, identity, None)
             self._sockets.require_room("" if identity is None else identity.session)
@@ -353,10 +343,10 @@ def require_right(people: People, identity: Identity, right: Right, drive: str |
         return
     if right not in identity.rights:
         raise Forbidden(
-            f"{identity.person} may not do this",
+            "api-security.may-not",
             value=str(identity.role),
             limit=str(right),
-            remedy="ask an administrator of this station",
+            person=identity.person,
         )
 
 

@@ -53,10 +53,7 @@ def require_message(people: People, identity: Identity, message: Message) -> Non
     """
     need = MESSAGES.get(type(message))
     if need is None:
-        raise Forbidden(
-            f"nobody may send {type(message).__name__}",
-            remedy="a new message must stand in backend/api/security/messages.py",
-        )
+        raise Forbidden("api-security.nobody-may-send", name=type(message).__name__)
     if need == "always":
         return
     named = getattr(message, "drive", None)

@@ -21,7 +21,7 @@ def header(headers: Iterable[tuple[bytes, bytes]], name: bytes) -> str | None:
     """
     found = [value for key, value in headers if key == name]
     if len(found) > 1:
-        raise Forbidden(f"the header {name.decode()} is there twice")
+        raise Forbidden("api-security.header-twice", name=name.decode())
     return found[0].decode("latin-1") if found else None
 
 
@@ -48,10 +48,9 @@ class Addresses:
         host = header(headers, b"host")
         if host is None or not self._is_ours(_name(host).lower(), local_address):
             raise Forbidden(
-                "this address of the server is not one that it answers to",
+                "api-security.address-server-not-answers",
                 value=host,
                 limit=", ".join(sorted(self.names | self.behind)),
-                remedy="open the address that the terminal shows",
             )
         origin = header(headers, b"origin")
         if origin is not None:
@@ -60,14 +59,10 @@ class Addresses:
             if _name(host).lower() in self.behind:
                 schemes = {"http", "https"}
             if place != host or scheme not in schemes:
-                raise Forbidden(
-                    "the request comes from another page",
-                    value=origin,
-                    remedy="use the page of this server",
-                )
+                raise Forbidden("api-security.request-comes-another-page-use-page", value=origin)
         site = header(headers, b"sec-fetch-site")
         if changes and site not in (None, "same-origin", "none"):
-            raise Forbidden("the request comes from another page", value=site)
+            raise Forbidden("api-security.request-comes-another-page", value=site)
 
     def _is_ours(self, name: str, local_address: str | None) -> bool:
         if name in self.names or name in self.behind:

@@ -95,7 +95,7 @@ def own_account(accounts: Accounts, me: Identity) -> Account:
         Forbidden: there is none.
     """
     if me.kind != "session":
-        raise Forbidden("this needs a log-in with a password", remedy="log in")
+        raise Forbidden("api-security.needs-log-password")
     return accounts.directory.owner(me.session)
 
 

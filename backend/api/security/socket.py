@@ -91,9 +91,11 @@ class OpenSockets:
             TooOften: it has as many as it may.
         """
         if session and sum(each.session == session for each in self._open) >= MOST_PER_SESSION:
-            raise TooOften(f"{MOST_PER_SESSION} connections of one log-in are open", 1.0)
+            raise TooOften(
+                "api-security.connections-log-open", 1.0, most_per_session=MOST_PER_SESSION
+            )
         if len(self._open) >= MOST_SOCKETS:
-            raise TooOften(f"{MOST_SOCKETS} pages are open", 1.0)
+            raise TooOften("api-security.pages-open", 1.0, most_sockets=MOST_SOCKETS)
 
     @contextmanager
     def open(self, socket: GuardedSocket) -> Iterator[None]:

@@ -47,7 +47,7 @@ async def export_set(
     except BadSet:
         raise
     except NotAllowed as error:
-        raise NotFound(error.message, value=file) from error
+        raise NotFound(error.text, value=file) from error
     profile = _family(content.profile)
     stem = file.removesuffix(".sdset").encode("ascii", "replace").decode().replace("?", "_")
     name = f"{stem}.{kind}"
@@ -83,7 +83,7 @@ async def store_list(
     async for chunk in request.stream():
         data += chunk
         if len(data) > MAX_BYTES:
-            raise BadSet(f"{file} is larger than {MAX_BYTES} bytes", remedy="choose another file")
+            raise BadSet("api-sets.larger-bytes", file=file, max_bytes=MAX_BYTES)
     text, found = import_list(bytes(data), _family(profile), file, datetime.now(UTC))
     stored = await bench.records.store.call(bench.sets.store, file, text, overwrite=overwrite)
     bench.journal.add(f"imported {stored}: {len(found.readings)} parameters")

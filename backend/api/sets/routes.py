@@ -74,7 +74,7 @@ async def _existing(bench: Bench, file: str, version: int | None = None) -> byte
     except NotAllowed as error:
         if error.kind not in ("not-allowed", "not-found"):
             raise
-        raise NotFound(error.message, value=file, remedy=error.remedy) from error
+        raise NotFound(error.text, value=file, remedy=error.remedy_text) from error
 
 
 async def _parsed(bench: Bench, file: str, version: int | None) -> ParameterSet:
@@ -98,7 +98,7 @@ async def upload_set(
     async for chunk in request.stream():
         data += chunk
         if len(data) > MAX_BYTES:
-            raise BadSet(f"{file} is larger than {MAX_BYTES} bytes", remedy="choose another file")
+            raise BadSet("api-sets.larger-bytes", file=file, max_bytes=MAX_BYTES)
     store = bench.records.store
     name = await store.call(bench.sets.store, file, bytes(data), overwrite=overwrite)
     return await _info(bench, name)
@@ -126,7 +126,7 @@ async def diff(
     """
     drive = member.drive
     if (file is None) == (against is None):
-        raise OutOfRange("give either file or against", remedy="choose one thing to compare with")
+        raise OutOfRange("api-sets.give-either-file-against")
     if file is not None:
         content = await _parsed(bench, file, version)
         rows, label = list(content.rows), file

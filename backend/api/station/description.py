@@ -59,20 +59,19 @@ async def _upload(request: Request, file: str) -> bytes:
         data += chunk
         if len(data) > MAX_BYTES:
             raise BadDescription(
-                f"{file} is larger than {MAX_BYTES >> 20} MiB",
+                "api-station.larger-mib",
                 limit=f"{MAX_BYTES} bytes",
-                remedy="choose the description of this one drive, not of the whole catalogue",
+                file=file,
+                max_mib=MAX_BYTES >> 20,
             )
     if not data:
-        raise BadDescription(f"{file} is empty", remedy="choose an ESI, EDS or DCF file")
+        raise BadDescription("api-station.empty", file=file)
     return bytes(data)
 
 
 def _require_new(name: str) -> None:
     if name in drive_names():
-        raise BadDescription(
-            f"there is a profile {name!r} already", value=name, remedy="choose another name"
-        )
+        raise BadDescription("api-station.profile-already", value=name)
 
 
 @router.post("/descriptions/devices", openapi_extra=_BODY)
@@ -117,10 +116,7 @@ async def read_dictionary(bench: TheBench, request: ReadDictionaryRequest) -> Jo
         seen = await bench.buses.scan(request.url, [request.station], lambda _fraction, _step: None)
         found = next((f for f in seen if f.station == request.station), None)
         if found is None:
-            raise NotAllowed(
-                f"nothing answers at {place}",
-                remedy="check power, cable, station number and line settings",
-            )
+            raise NotAllowed("api-station.nothing-answers", place=place)
         link = await bench.buses.open(request.url)
         try:
             task = await drive_task(link, found, request.profile, progress)

@@ -91,12 +91,7 @@ async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> Eth
 async def ethercat_permissions(url: Annotated[str, Query()]) -> EthercatPermissions:
     """What is missing to use an interface that need not be opened yet."""
     if not url.startswith(_SCHEME):
-        raise OutOfRange(
-            f"{url} is no EtherCAT bus",
-            value=url,
-            limit=f"{_SCHEME}INTERFACE",
-            remedy="choose a bus whose address begins with ethercat://",
-        )
+        raise OutOfRange("api-station.no-ethercat-bus", value=url, limit=f"{_SCHEME}INTERFACE")
     interface = url.removeprefix(_SCHEME)
     # It becomes part of commands that somebody copies into a terminal.
     require_interface(interface)
@@ -115,11 +110,7 @@ async def clear_counters(
     seen = (await link.survey()).stations
     chosen = [s.station for s in seen if request.station in (None, s.station) and not s.lost]
     if request.station is not None and not chosen:
-        raise NotAllowed(
-            f"station {request.station} of {request.url} does not answer",
-            value=request.station,
-            remedy="check its supply and cable, then scan the segment again",
-        )
+        raise NotAllowed("api-station.station-not-answer", value=request.station, url=request.url)
     for station in chosen:
         await link.clear_port_counters(station)
     bench.journal.add(f"{request.url}: error counters of {len(chosen)} stations cleared")
@@ -200,14 +191,12 @@ async def _require_loadable(member: Member, link: EthercatLink, station: int) ->
         expected = (known.vendor_id, known.product_code) if known else told
         if told != expected and None not in expected:
             raise NotAllowed(
-                f"{drive.name}: another drive answers at station {station}",
-                drive=drive.name,
-                remedy="check the cables, then scan",
+                "api-station.another-drive-answers-station", drive=drive.name, station=station
             )
         return
     await confirm_identity(drive)
     if await member.axis.state() in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
-        raise NotAllowed(f"{drive.name} is enabled", drive=drive.name, remedy="disable it first")
+        raise NotAllowed("api-station.enabled", drive=drive.name)
 
 
 async def _to_the_end(
@@ -237,21 +226,20 @@ async def _body(request: Request, file: str) -> bytes:
         data += chunk
         if len(data) > _MAX_FIRMWARE_BYTES:
             raise OutOfRange(
-                f"{file} is larger than {_MAX_FIRMWARE_BYTES >> 20} MiB",
+                "api-station.larger-mib-right-file",
                 limit=f"{_MAX_FIRMWARE_BYTES} bytes",
-                remedy="is this the right file? The firmware of a drive is smaller",
+                file=file,
+                max_firmware_mib=_MAX_FIRMWARE_BYTES >> 20,
             )
     if not data:
-        raise OutOfRange(f"{file} is empty", remedy="choose the maker's firmware file")
+        raise OutOfRange("api-station.empty-choose-maker", file=file)
     return bytes(data)
 
 
 def _link(bench: Bench, url: str) -> EthercatLink:
     link = bench.buses.opened.get(url)
     if not isinstance(link, EthercatLink):
-        raise NotFound(
-            f"{url} is no opened EtherCAT bus", value=url, remedy="scan it on the Connect page"
-        )
+        raise NotFound("api-station.no-opened-ethercat-bus", value=url)
     return link
 
 
@@ -283,11 +271,7 @@ def _firmware_port(member: Member) -> tuple[EthercatLink, int]:
     for port in member.drive.ports:
         if isinstance(port.link, EthercatLink) and port.spec is not None and port.spec.foe:
             return port.link, port.station
-    raise NotAllowed(
-        f"{member.drive.name}: its profile does not say that it takes firmware over EtherCAT",
-        drive=member.drive.name,
-        remedy="use the maker's own tool",
-    )
+    raise NotAllowed("api-station.profile-not-say-takes", drive=member.drive.name)
 
 
 def _station(

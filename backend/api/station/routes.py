@@ -209,7 +209,7 @@ async def remove_drive(bench: TheBench, member: Controlled) -> Response:
 def _job(bench: TheBench, job_id: str) -> Job:
     job = bench.jobs.get(job_id)
     if job is None:
-        raise NotFound(f"there is no job {job_id!r}", value=job_id)
+        raise NotFound("api-station.no-job", value=job_id)
     return job
 
 

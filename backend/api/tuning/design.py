@@ -144,11 +144,7 @@ async def read_gains(member: TheMember) -> GainInfo:
 async def write_gains(bench: TheBench, member: Controlled, request: GainWrite) -> Undo:
     """Write gains or a stiffness level and make them act; saving is another step."""
     if (request.gains is None) == (request.level is None):
-        raise OutOfRange(
-            "give either gains or a level",
-            drive=member.drive.name,
-            remedy="give one of the two",
-        )
+        raise OutOfRange("api-tuning.give-either-gains-level", drive=member.drive.name)
     if request.gains is not None:
         g = request.gains
         wanted = _gains(g.speed_bandwidth_hz, g.integral_hz, g.position_1_s, g.inertia_kgm2)
@@ -189,12 +185,13 @@ def _require_untouched(drive: Drive, undo: Undo, now: Mapping[str, int]) -> None
         raw = now.get(key)
         if raw is not None and raw not in (left, undo.before[key]):
             raise NotAllowed(
-                f"{drive.name}: {key} is {raw} now, where this change had left {left}: it was "
-                "changed again since, so nothing was taken back",
-                drive=drive.name, parameter=key, value=raw, limit=str(left),
-                remedy="look at the list of changes; take it back all the same, or write the "
-                "value that you want",
-            )  # fmt: skip
+                "api-tuning.now-change-left-changed",
+                drive=drive.name,
+                parameter=key,
+                value=raw,
+                limit=str(left),
+                left=left,
+            )
 
 
 @lru_cache(maxsize=4)
@@ -202,7 +199,7 @@ def _evaluated(file: Path, _changed_ns: int) -> sweep_evaluation.SweepResult:
     """A stored response; a person who drags a notch asks for the same one many times a second."""
     measurement = unpack(file.read_bytes(), file.name)
     if measurement.meta.get("tool") != "sweep":
-        raise BadMeasurement(f"{file.name} is not a frequency response", value=file.name)
+        raise BadMeasurement("api-tuning.not-frequency-response", value=file.name)
     try:
         return sweep_evaluation.reevaluate(measurement.arrays, measurement.meta)
     except ValueError as error:

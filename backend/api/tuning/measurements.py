@@ -38,7 +38,7 @@ def load_measurement(bench: Bench, name: str) -> Measurement:
     except BadMeasurement:
         raise
     except NotAllowed as error:
-        raise NotFound(error.message, value=name) from error
+        raise NotFound(error.text, value=name) from error
 
 
 def measurement_head(bench: Bench, name: str) -> Head:
@@ -52,7 +52,7 @@ def measurement_head(bench: Bench, name: str) -> Head:
     except BadMeasurement:
         raise
     except NotAllowed as error:
-        raise NotFound(error.message, value=name) from error
+        raise NotFound(error.text, value=name) from error
 
 
 def info_of(name: str, found: Head) -> MeasurementInfo:
@@ -109,7 +109,7 @@ async def download_measurement(bench: TheBench, name: str) -> Response:
     try:
         data = await asyncio.to_thread(bench.measurements.read, name)
     except NotAllowed as error:
-        raise NotFound(error.message, value=name) from error
+        raise NotFound(error.text, value=name) from error
     return Response(
         data,
         media_type="application/octet-stream",
@@ -125,10 +125,7 @@ async def upload_measurement(
     data = await request.body()
     if len(data) > _MAX_BYTES:
         raise OutOfRange(
-            f"{name} is too large",
-            value=len(data),
-            limit=f"{_MAX_BYTES} bytes",
-            remedy="import one measurement at a time, as this program exported it",
+            "api-tuning.too-large", value=len(data), limit=f"{_MAX_BYTES} bytes", name=name
         )
     whole = name.removesuffix(SUFFIX) + SUFFIX
     stored = await asyncio.to_thread(bench.measurements.store, whole, data)
@@ -141,4 +138,4 @@ async def delete_measurement(bench: TheBench, name: str) -> None:
     try:
         bench.measurements.delete(name)
     except NotAllowed as error:
-        raise NotFound(error.message, value=name) from error
+        raise NotFound(error.text, value=name) from error

@@ -40,7 +40,7 @@ class LoginBudgets:
         """
         wait = self._pairs.wait_s(_pair(name, address, device))
         if wait > 0:
-            raise TooOften("too many wrong tries", wait)
+            raise TooOften("people.too-many-wrong-tries", wait)
 
     def tried(self, name: str, address: str, device: str = "") -> None:
         """Count a try as a wrong one, until `succeeded` says otherwise."""

@@ -61,10 +61,10 @@ class AccountsMarker:
             return Marker("", b"")
         except OSError as error:
             raise AccountsGone(
-                f"{self.path} cannot be read ({error.strerror}), so it is not known whether this "
-                "station has accounts",
+                "people.cannot-read-not-known",
                 value=str(self.path),
-                remedy="let the user that servodeck runs as read it",
+                path=self.path,
+                strerror=error.strerror,
             ) from error
 
     def write(self) -> Marker:
@@ -94,11 +94,9 @@ class AccountsMarker:
         folder = self.path.parent
         since = f" since {found.since}" if found.since else ""
         raise AccountsGone(
-            f"this station has had accounts{since}, and its database {database} has no "
-            "administrator: it was emptied, lost or replaced. The station does not start, as "
-            "without accounts whoever reaches it could move axes",
+            "people.station-accounts-database-no",
             value=str(database),
-            remedy="restore a backup: `servodeck restore ARCHIVE --replace --config "
-            f"{folder}`; or begin with new accounts on purpose: `servodeck people add NAME "
-            f"--role administrator --config {folder}`",
+            since=since,
+            database=database,
+            folder=folder,
         )

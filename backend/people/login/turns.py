@@ -38,12 +38,12 @@ class _Lane:
         waiting = self._places.get(place)
         if waiting is None:
             if len(self._places) >= MOST_PLACES:
-                raise TooOften("too many log-ins at once", _RETRY_S)
+                raise TooOften("people.too-many-log-ins", _RETRY_S)
             waiting = self._places[place] = deque()
         if len(waiting) >= MOST_OF_PLACE:
             oldest = waiting.popleft()
             if not oldest.done():
-                oldest.set_exception(TooOften("too many log-ins at once", _RETRY_S))
+                oldest.set_exception(TooOften("people.too-many-log-ins", _RETRY_S))
         mine: Waiting = asyncio.get_running_loop().create_future()
         waiting.append(mine)
         return mine

@@ -36,9 +36,10 @@ def si_raw(parameter: Parameter, value: float) -> int:
     factor = _SI.get(parameter.unit)
     if factor is None:
         raise NotAllowed(
-            f"{parameter.key} {parameter.name}: its unit {parameter.unit!r} cannot be converted",
+            "autotune.unit-cannot-converted",
             parameter=parameter.key,
-            remedy="enter the value by hand on the Parameters page",
+            key=parameter.name,
+            parameter_unit=parameter.unit,
         )
     return round(parameter.to_raw(value / factor))
 

@@ -48,9 +48,8 @@ def spec_of(drive: Drive) -> GainSpec:
     """Raises NotAllowed where the profile knows no gains."""
     if drive.profile.gains is None:
         raise NotAllowed(
-            f"{drive.name}: the profile of {drive.profile.title} does not name its gains",
-            drive=drive.name, remedy="set them on the Parameters page",
-        )  # fmt: skip
+            "autotune.profile-not-name-gains", drive=drive.name, profile_title=drive.profile.title
+        )
     return drive.profile.gains
 
 
@@ -124,10 +123,11 @@ def plan_gains(
     spec = spec_of(drive)
     if spec.convention == "unit":
         raise NotAllowed(
-            f"{drive.name}: the manual does not print what the gains of {drive.profile.title} "
-            "mean, so none can be computed",
-            drive=drive.name, remedy=_by_hand(drive),
-        )  # fmt: skip
+            "autotune.manual-not-print-gains",
+            drive=drive.name,
+            remedy=_by_hand(drive),
+            profile_title=drive.profile.title,
+        )
     raw: dict[str, int] = {}
     if spec.inertia is not None and spec.inertia_meaning is not None:
         raw[spec.inertia] = _inertia_raw(drive, spec, inertia_kgm2, rotor_kgm2)
@@ -211,10 +211,8 @@ def _inertia_raw(
         return si_raw(parameter, inertia_kgm2)
     if not rotor_kgm2:
         raise NotAllowed(
-            f"{drive.name}: its load inertia is a ratio to the motor's, which is not known",
-            drive=drive.name, parameter=parameter.key,
-            remedy="enter the motor's inertia, as its nameplate or data sheet tells it",
-        )  # fmt: skip
+            "autotune.load-inertia-ratio-motor", drive=drive.name, parameter=parameter.key
+        )
     load = max(inertia_kgm2 - rotor_kgm2, 0.0)
     if spec.inertia_meaning == "load":
         return si_raw(parameter, load)
@@ -242,11 +240,7 @@ def plan_level(drive: Drive, level: int) -> dict[str, int]:
     """
     table = _table(drive)
     if table is None:
-        raise NotAllowed(
-            f"{drive.name} has no stiffness levels",
-            drive=drive.name,
-            remedy="write the gains themselves",
-        )
+        raise NotAllowed("autotune.no-stiffness-levels", drive=drive.name)
     raw = {table.level_key: level}
     if table.mode_key is not None and table.table_raw is not None:
         raw[table.mode_key] = table.table_raw
@@ -264,9 +258,8 @@ def loops_of(drive: Drive, facts: AxisFacts) -> DriveLoops:
     """
     if facts.current_bandwidth_hz is None:
         raise NotAllowed(
-            f"{drive.name}: the bandwidth of the current loop is not known, so no loop can be "
-            "predicted", drive=drive.name, remedy=_by_hand(drive),
-        )  # fmt: skip
+            "autotune.bandwidth-current-loop-not", drive=drive.name, remedy=_by_hand(drive)
+        )
     spec = spec_of(drive)
     highest = None
     if spec.speed is not None:

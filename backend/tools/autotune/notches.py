@@ -152,10 +152,8 @@ async def _learn_free(
         envelope = notch_effect.room_to_tremble(how.envelope, at_rev, outcome.ends_rev)
     if envelope is None:
         raise NotAllowed(
-            f"{axis.drive.name} stands too near to an end to measure what its notches do",
-            drive=axis.drive.name, value=round(at_rev, 4),
-            remedy="jog it away from the end, then tune again",
-        )  # fmt: skip
+            "autotune.stands-too-near-end", drive=axis.drive.name, value=round(at_rev, 4)
+        )
     found = outcome.result
     rigid = excite.Rigid(found.inertia_kgm2.value, found.coulomb_nm.value)
     rate = 1.0 / cycle_s(session)

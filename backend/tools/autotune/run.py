@@ -216,19 +216,17 @@ async def _pre_checks(axis: Axis, settings: AutotuneSettings) -> AxisFacts:
                          remedy="remove the cause and reset the fault")  # fmt: skip
     if drive.pending:
         raise NotAllowed(
-            f"{drive.name}: {len(drive.pending)} parameters wait to take effect",
-            drive=drive.name, remedy="write the settings, or restart the drive, and try again",
-        )  # fmt: skip
+            "autotune.parameters-wait-take-effect",
+            drive=drive.name,
+            pending_count=len(drive.pending),
+        )
     # Gains without a meaning and a motor whose inertia is not known are told before it moves.
     if settings.apply or gain_tool.spec_of(drive).convention == "unit":
         rotor = await gain_tool.rotor_inertia(axis, settings.motor_inertia_kgm2)
         gain_tool.plan_gains(drive, Gains(1.0, 1.0, 1.0, 1.0), rotor or 1e-4, rotor)
     facts = await read_facts(axis, settings.rated_torque_nm, settings.motor_inertia_kgm2)
     if not facts.torque_known:
-        raise NotAllowed(
-            f"{drive.name}: its rated torque is not known, so no gain can be computed",
-            drive=drive.name, remedy="give the rated torque of the motor",
-        )  # fmt: skip
+        raise NotAllowed("autotune.rated-torque-not-known", drive=drive.name)
     return facts
 
 
@@ -258,9 +256,10 @@ def _soft_gains(axis: Axis, facts: AxisFacts) -> dict[str, int]:
 def _require_inertia(axis: Axis, outcome: inertia_evaluation.InertiaOutcome) -> None:
     if not outcome.result.identifiable:
         raise NotAllowed(
-            f"{axis.drive.name}: the inertia cannot be identified: {outcome.result.verdict}",
-            drive=axis.drive.name, remedy="widen the envelope as the text says, and try again",
-        )  # fmt: skip
+            "autotune.inertia-cannot-identified",
+            drive=axis.drive.name,
+            verdict=outcome.result.verdict,
+        )
 
 
 def _sweep_settings(
@@ -279,12 +278,12 @@ def _sweep_settings(
 def _require_torque(axis: Axis, mechanics: sweep_evaluation.SweepResult) -> None:
     if mechanics.saturated_share > _SATURATED:
         raise NotAllowed(
-            f"{axis.drive.name}: the torque was at its limit, or not what was commanded, for "
-            f"{mechanics.saturated_share:.0%} of the measurement, so nothing is designed from it",
-            drive=axis.drive.name, value=round(mechanics.saturated_share, 3),
+            "autotune.torque-limit-not-commanded",
+            drive=axis.drive.name,
+            value=round(mechanics.saturated_share, 3),
             limit=f"{_SATURATED:g}",
-            remedy="raise the drive's torque limits, or lower the envelope's torque",
-        )  # fmt: skip
+            saturated_share=mechanics.saturated_share,
+        )
 
 
 async def _design(
@@ -299,11 +298,16 @@ async def _design(
     )  # fmt: skip
     if not made.candidates:
         raise NotAllowed(
-            f"{drive.name}: {made.caution}, and no careful one is safe either", drive=drive.name,
+            "autotune.no-careful-safe-either",
+            drive=drive.name,
             remedy="; ".join(
                 [*found.mechanics.warnings, "look at the mechanics first: coupling, belt, play"]
             ),
-        )  # fmt: skip
+            caution=made.caution,
+            detail="; ".join(
+                [*found.mechanics.warnings, "look at the mechanics first: coupling, belt, play"]
+            ),
+        )
     return made
 
 
@@ -348,11 +352,9 @@ async def apply_and_verify(
         applied, again = await first_that_holds(trials, _order(found, "robust"), how)
     if applied is None:
         raise NotAllowed(
-            f"{axis.drive.name}: no candidate kept its promise when it was verified: "
-            + "; ".join(each for each in (*trials.tried, clock.told()) if each),
+            "autotune.no-candidate-kept-promise",
             drive=axis.drive.name,
-            remedy="all parameters are as before; look for play and loose parts, measure again, "
-            "or choose gains by hand",
+            detail="; ".join(each for each in (*trials.tried, clock.told()) if each),
         )
     verified = applied.verified
     twice = again.told(verified) if again else ""

@@ -70,9 +70,9 @@ def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) 
         )
     except ValueError as error:
         raise NotAllowed(
-            f"the moves are too short to be evaluated: {error}",
+            "inertia.moves-too-short-evaluated",
             limit=f"{settings.envelope.travel_rev:g} rev",
-            remedy="allow more travel or time",
+            cause=str(error),
         ) from error
     reference = _reference_inertia(facts)
     if found.load_ratio is None and reference and np.isfinite(found.inertia_kgm2.value):

@@ -225,10 +225,7 @@ def _stood(recording: Recording, speed_rpm: npt.NDArray[np.float64]) -> bool:
 
 def _too_heavy(axis: Axis, error: EnvelopeExceeded) -> EnvelopeExceeded:
     return EnvelopeExceeded(
-        f"{axis.drive.name}: a short move takes more torque than is permitted: {error.message}",
-        halt=error.halt,
-        drive=axis.drive.name,
-        remedy="look for a closed brake, a blocked axis or gains that are far too high",
+        "inertia.short-move-takes-more", halt=error.halt, drive=axis.drive.name, cause=error.text
     )
 
 
@@ -336,16 +333,16 @@ def _moves(
         )  # fmt: skip
     except ValueError as error:
         raise OutOfRange(
-            f"{axis.drive.name}: the envelope does not allow the moves: {error}",
-            remedy="raise the envelope's torque",
+            "inertia.envelope-not-allow-moves", axis_drive=axis.drive.name, cause=str(error)
         ) from error
     duration_s = trajectory.velocity_rad_s.size / rate
     if duration_s > envelope.time_s:
         raise OutOfRange(
-            f"{axis.drive.name}: the moves would take {duration_s:.3g} s",
-            value=duration_s, limit=f"{envelope.time_s:g} s",
-            remedy="allow more time, speed or torque, or less travel",
-        )  # fmt: skip
+            "inertia.moves-take",
+            value=duration_s,
+            limit=f"{envelope.time_s:g} s",
+            axis_drive=axis.drive.name,
+        )
     tail = np.zeros(round(0.2 * rate))
     played = np.concatenate([trajectory.velocity_rad_s, tail])
     needed = rough.inertia_kgm2 * np.concatenate([trajectory.acceleration_rad_s2, tail])

@@ -86,19 +86,18 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
     turning = np.array([units.velocity(v) for _, v in raws])
     if float(np.std(torque)) > _RESTLESS_PERCENT and float(np.std(turning)) > _RESTLESS_RPM:
         raise NotAllowed(
-            f"{drive.name} does not stand still under its speed loop: the torque swings by "
-            f"{float(np.ptp(torque)):.3g} % and the speed by {float(np.ptp(turning)):.3g} rpm",
+            "inertia.not-stand-still-under",
             drive=drive.name,
-            remedy="lower the gains of the speed loop and try again",
+            ptp_percent=float(np.ptp(torque)),
+            ptp_rpm=float(np.ptp(turning)),
         )
     if abs(float(np.mean(turning))) > _FALLING_RPM:
         raise Interrupted(
-            f"{drive.name} turns with {float(np.mean(turning)):.3g} rpm and "
-            f"{float(np.mean(torque)):.3g} % of its rated torque while its speed loop is to hold "
-            "it", drive=drive.name,
-            remedy="the drive cannot hold it: look at the supply of its power stage, its torque "
-            "limits, its gains and the load",
-        )  # fmt: skip
+            "inertia.turns-rpm-rated-torque",
+            drive=drive.name,
+            np_rpm=float(np.mean(turning)),
+            np_percent=float(np.mean(torque)),
+        )
     return float(np.mean(torque)) / 100.0 * facts.rated_torque_nm
 
 
@@ -153,12 +152,11 @@ async def probe_axis(
     # An encoder shows a twisting shaft or play in a brake; a turning axis is another matter.
     if moved < _STOOD * enough:
         raise NotAllowed(
-            f"{drive.name} does not move with {peak / rated:.0%} of its rated torque",
+            "inertia.not-move-rated-torque",
             drive=drive.name,
             value=round(moved, 4),
             limit=f"{enough:.3g} rad/s",
-            remedy="look for a closed brake, a blocked axis or a torque limit; raise the "
-            "envelope's torque only if the machine allows it",
+            peak=peak / rated,
         )
     return _judged(drive.name, recording, rated)
 
@@ -184,11 +182,7 @@ def require_right_sign(name: str, recording: Recording) -> None:
 
 
 def _wrong_sign(name: str) -> NotAllowed:
-    return NotAllowed(
-        f"{name} moves against its torque: the sign of torque or speed is wrong",
-        drive=name,
-        remedy="check motor phases, encoder direction and the polarity settings",
-    )
+    return NotAllowed("inertia.moves-against-torque-sign", drive=name)
 
 
 @dataclass(frozen=True)

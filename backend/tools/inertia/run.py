@@ -70,10 +70,11 @@ async def inertia(
     ends = settings.ends_rev if settings.scheme == "taught" else None
     if ends is not None and not ends[0] < units.position(home) < ends[1]:
         raise OutOfRange(
-            f"{axis.drive.name} stands at {units.position(home):.4g} rev, outside the taught ends",
-            value=units.position(home), limit=f"{ends[0]:g}…{ends[1]:g} rev",
-            remedy="jog it between the ends, or teach them again",
-        )  # fmt: skip
+            "inertia.stands-rev-outside-taught",
+            value=units.position(home),
+            limit=f"{ends[0]:g}…{ends[1]:g} rev",
+            axis_drive=axis.drive.name,
+        )
     progress(0.0, "a first short move")
     look = await first_look(axis, session, settings, facts, home, ends)
     if settings.scheme == "limited":
@@ -128,10 +129,11 @@ async def inertia(
 
 def _check(settings: InertiaSettings) -> None:
     if settings.scheme == "taught" and settings.ends_rev is None:
-        raise OutOfRange("the taught scheme needs both ends", remedy="jog to each end and take it")
+        raise OutOfRange("inertia.taught-scheme-needs-both")
     if not 1 <= settings.repetitions <= 10:
-        raise OutOfRange("1 to 10 repetitions are possible", value=settings.repetitions,
-                         limit="1…10", remedy="choose a number within the limit")  # fmt: skip
+        raise OutOfRange(
+            "inertia.10-repetitions-possible", value=settings.repetitions, limit="1…10"
+        )
 
 
 def _where(

@@ -66,18 +66,16 @@ def signal(settings: GeneratorSettings, cycle_s: float) -> Signal:
     """
     if not 0 < settings.duration_s <= _MAX_S:
         raise OutOfRange(
-            f"a duration of {settings.duration_s:g} s is outside 0 to {_MAX_S:g} s",
-            value=settings.duration_s,
-            limit=f"0…{_MAX_S:g} s",
+            "jog.duration-outside", value=settings.duration_s, limit=f"0…{_MAX_S:g} s", max_s=_MAX_S
         )
     nyquist = 0.5 / cycle_s
     highest = max(settings.frequency_hz, settings.frequency_end_hz)
     if settings.shape in ("sine", "chirp") and not 0 < highest < nyquist / 2:
         raise OutOfRange(
-            f"{highest:g} Hz cannot be played at a cycle of {cycle_s * 1e3:g} ms",
+            "jog.hz-cannot-played-cycle",
             value=highest,
             limit=f"below {nyquist / 2:g} Hz",
-            remedy="lower the frequency or shorten the cycle",
+            cycle_ms=cycle_s * 1e3,
         )
     count = max(2, round(settings.duration_s / cycle_s))
     t: Signal = np.arange(count, dtype=np.float64) * np.float64(cycle_s)
@@ -175,12 +173,10 @@ def _require_inside(drive: Drive, settings: GeneratorSettings) -> None:
     limit, say = limits[settings.mode]
     if abs(settings.amplitude) > limit:
         raise OutOfRange(
-            f"{drive.name}: an amplitude of {say(settings.amplitude)} is more than the "
-            f"envelope allows ({say(limit)})",
+            "jog.amplitude-more-envelope-allows",
             drive=drive.name,
             value=say(settings.amplitude),
             limit=say(limit),
-            remedy="lower the amplitude or widen the envelope",
         )
 
 
@@ -230,11 +226,7 @@ async def jog_cyclic(
             begin = await drive.raw(drive.require("position_target"))
         await session.cyclic.halt(station)
         if not await axis.standstill(2.0):
-            raise LinkTimeout(
-                f"{drive.name} still moves 2 s after the jog was released",
-                drive=drive.name,
-                remedy="use the machine's emergency stop",
-            )
+            raise LinkTimeout("jog.still-moves-after-jog", drive=drive.name)
         moved = units.position(await axis.position_raw() - start)
     return {"reason": reason, "moved_rev": moved}
 
@@ -283,10 +275,7 @@ async def _alive(axis: Axis, session: CyclicSession, hold: Hold) -> str:
 
 def _cycle(session: CyclicSession) -> float:
     if session.state is None:
-        raise NotAllowed(
-            f"{session.link.url}: the cyclic exchange does not run",
-            remedy="start it on the Connect page",
-        )
+        raise NotAllowed("jog.cyclic-exchange-not-run", url=session.link.url)
     return session.state.cycle_s
 
 
@@ -320,8 +309,10 @@ async def play_through(
     while (elapsed := time.monotonic() - began) < duration_s or _plays(session, station):
         if elapsed > _PATIENCE * duration_s + _STATE_TIMEOUT_S:
             raise LinkTimeout(
-                f"station {station}: a signal of {duration_s:g} s did not end in {elapsed:.0f} s",
-                remedy="look at the link quality: the computer skips many cycles",
+                "jog.station-signal-not-end",
+                station=station,
+                duration_s=duration_s,
+                elapsed_s=elapsed,
             )
         await session.cyclic.renew(station)
         _raise_if_ended(axis, session)

@@ -56,10 +56,7 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
     """
     drive, units = axis.drive, await axis.require_certain_scales()
     if settings.direction not in (-1, 1):
-        raise OutOfRange(
-            f"direction {settings.direction} is neither 1 nor -1",
-            remedy="give 1 or -1 as the direction",
-        )
+        raise OutOfRange("jog.direction-neither-nor", direction=settings.direction)
     require_scale(axis, units, settings)
     envelope = Envelope(settings.travel_rev, settings.speed_rpm, settings.torque_percent, 3600.0)
     ramps = {drive.require("profile_velocity"): units.velocity_raw(settings.speed_rpm)}
@@ -95,11 +92,10 @@ def require_scale(axis: Axis, units: AxisUnits, settings: JogSettings) -> None:
     units.require_certain()
     if units.velocity_raw(settings.speed_rpm) <= 0:
         raise OutOfRange(
-            f"{drive.name}: {settings.shown.say_speed(settings.speed_rpm)} is below the "
-            "resolution of its speed",
+            "jog.below-resolution-speed",
             drive=drive.name,
             value=settings.shown.speed(settings.speed_rpm),
-            remedy="choose a higher speed",
+            say_speed=settings.shown.say_speed(settings.speed_rpm),
         )
 
 
@@ -164,10 +160,7 @@ async def _observe(axis: Axis) -> tuple[int, int, State]:
         raw = readings[key].raw
         if not isinstance(raw, int):
             raise DriveError(
-                f"{drive.name}: {key} could not be read while jogging: {readings[key].error}",
-                drive=drive.name,
-                parameter=key,
-                remedy="check the cable; the axis stops by itself",
+                "jog.not-read-jogging", drive=drive.name, parameter=key, error=readings[key].error
             )
         values.append(raw)
     return values[1], values[2], drive.decode_state(values[0])
@@ -176,9 +169,8 @@ async def _observe(axis: Axis) -> tuple[int, int, State]:
 def _inside(axis: Axis, settings: JogSettings, moved_rev: float) -> None:
     if abs(moved_rev) > settings.travel_rev + TRAVEL_MARGIN_REV:
         raise NotAllowed(
-            f"{axis.drive.name} left the travel limit of the jog",
+            "jog.left-travel-limit-jog",
             drive=axis.drive.name,
             value=settings.shown.travel(moved_rev),
             limit=f"{settings.shown.say(settings.travel_rev)} from the start",
-            remedy="check load and gearing; an external force may move the axis",
         )

@@ -65,11 +65,7 @@ def aligned(
         low, high = low + len(samples), high + len(samples)
     last = np.flatnonzero(valid)
     if last.size < 0.5 * (0 if ended_early else len(sent)) or not last.size:
-        raise LinkLost(
-            f"{drive}: the set-points do not come back from the bus as they were sent",
-            drive=drive,
-            remedy="look at the link quality; the computer or the bus is overloaded",
-        )
+        raise LinkLost("measuring.set-points-not-come", drive=drive)
     count = int(last[-1]) + 1 if ended_early else len(sent)
     return table[:count], valid[:count]
 

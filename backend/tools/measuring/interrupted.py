@@ -32,9 +32,13 @@ class Interrupted(NotAllowed):
 def interrupted(error: NotAllowed) -> Interrupted:
     """The same, as an end that nothing else may be tried after."""
     return Interrupted(
-        error.message, drive=error.drive, parameter=error.parameter, value=error.value,
-        limit=error.limit, remedy=error.remedy,
-    )  # fmt: skip
+        error.text,
+        drive=error.drive,
+        parameter=error.parameter,
+        value=error.value,
+        limit=error.limit,
+        remedy=error.remedy_text,
+    )
 
 
 def interrupted_by(axis: Axis, halt: Halted) -> Interrupted:
@@ -90,7 +94,4 @@ def raise_if_ended(axis: Axis, session: CyclicSession) -> None:
             )  # fmt: skip
         raise interrupted_by(axis, halt)
     if not session.running:
-        raise LinkLost(
-            f"{name}: the cyclic exchange ended during the measurement", drive=name,
-            remedy="look at the cable and at the drive's supply",
-        )  # fmt: skip
+        raise LinkLost("measuring.cyclic-exchange-ended-during", drive=name)

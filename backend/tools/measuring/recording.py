@@ -159,10 +159,7 @@ def cycle_s(session: CyclicSession) -> float:
         NotAllowed: none runs.
     """
     if session.state is None:
-        raise NotAllowed(
-            f"{session.link.url}: the cyclic exchange does not run",
-            remedy="start it on the Connect page",
-        )
+        raise NotAllowed("measuring.cyclic-exchange-not-run", url=session.link.url)
     return session.state.cycle_s
 
 
@@ -178,10 +175,10 @@ def require_signals(axis: Axis, session: CyclicSession, mode: Mode, offset: bool
         key = drive.key(role)
         if key is None or not session.carries(drive, key):
             raise NotAllowed(
-                f"{drive.name}: {role.replace('_', ' ')} is not part of the cyclic data",
+                "measuring.not-part-cyclic-data",
                 drive=drive.name,
                 parameter=key,
-                remedy="measure over a bus and a profile that carry it with every cycle",
+                replace=role.replace("_", " "),
             )
 
 
@@ -355,9 +352,10 @@ async def _drive_through(
             return False
         if time.monotonic() > deadline:
             raise LinkLost(
-                f"{axis.drive.name}: only {arrived} of {count} samples came back from the bus",
+                "measuring.samples-came-back-bus",
                 drive=axis.drive.name,
-                remedy="look at the link quality; the computer or the bus is overloaded",
+                arrived=arrived,
+                count=count,
             )
         await asyncio.sleep(_RENEW_S)
         raise_if_ended(axis, session)
@@ -417,7 +415,5 @@ async def quiet(axis: Axis, timeout_s: float = 3.0) -> None:
     """
     if not await axis.standstill(timeout_s):
         raise LinkTimeout(
-            f"{axis.drive.name} does not come to rest within {timeout_s:g} s",
-            drive=axis.drive.name,
-            remedy="stop what moves it, or lower the gains if it oscillates",
+            "measuring.not-come-rest-within", drive=axis.drive.name, timeout_s=timeout_s
         )

@@ -25,11 +25,7 @@ async def settle(axis: Axis, *, asked: bool) -> JobResult:
     """
     drive = axis.drive
     if await axis.state() is State.OPERATION_ENABLED or not await axis.standstill(_STANDS_S):
-        raise NotAllowed(
-            f"{drive.name}: values are put back only while the axis stands and is not enabled",
-            drive=drive.name,
-            remedy="stop and disable the axis first",
-        )
+        raise NotAllowed("measuring.values-put-back-axis", drive=drive.name)
     await confirm_identity(drive)
     back: dict[str, Raw] = {}
     left: dict[str, str] = {}

@@ -41,11 +41,7 @@ async def write_settings(axis: Axis, values: Mapping[str, int]) -> dict[str, int
     for key, raw in values.items():
         drive.check(drive.parameter(key), raw)
     if values and await axis.state() is State.OPERATION_ENABLED:
-        raise NotAllowed(
-            f"{drive.name}: settings are changed only while the motor is not enabled",
-            drive=drive.name,
-            remedy="disable the axis first",
-        )
+        raise NotAllowed("measuring.settings-changed-motor-not", drive=drive.name)
     before = {key: await drive.raw(key) for key in values}
     written: list[str] = []
     try:
@@ -96,11 +92,7 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
             failed.append(f"write settings: {error.message}")
     drive.owed.settle(back)
     if failed:
-        raise RestoreFailed(
-            f"{drive.name}: not restored: {'; '.join(failed)}",
-            drive=drive.name,
-            remedy=PUT_BACK_LATER,
-        )
+        raise RestoreFailed("measuring.not-restored", drive=drive.name, failed="; ".join(failed))
 
 
 async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
@@ -116,9 +108,12 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
         owed = {debt.key: debt.raw for debt in drive.owed.debts}
         left = ", ".join(f"{key} (was {owed[key]})" for key in before if key in owed)
         raise RestoreFailed(
-            f"{error.message}; not restored: {left}",
+            "measuring.not-restored-2",
             drive=drive.name,
             remedy="; ".join(said for said in (error.remedy, PUT_BACK_LATER) if said),
+            cause=error.text,
+            left=left,
+            detail="; ".join(said for said in (error.remedy, PUT_BACK_LATER) if said),
         ) from error
 
 

@@ -39,18 +39,15 @@ async def find_ends(
     if available < needed:
         percent = 100.0 * needed / facts.rated_torque_nm
         raise OutOfRange(
-            f"{drive.name}: {settings.search_torque_percent:g} % of torque cannot move this axis "
-            "safely against its friction and load",
-            value=settings.search_torque_percent, limit=f"at least {percent:.3g} %",
-            remedy="raise the torque of the search, or teach the ends by jog",
-        )  # fmt: skip
+            "moves.torque-cannot-move-axis",
+            value=settings.search_torque_percent,
+            limit=f"at least {percent:.3g} %",
+            drive_name=drive.name,
+        )
     wanted = units.torque_raw(settings.search_torque_percent)
     limits = {key: limited(await drive.raw(key), wanted) for key in await torque_limits(drive)}
     if not limits:
-        raise NotAllowed(
-            f"{drive.name}: this family has no torque limit that could protect the ends",
-            drive=drive.name, remedy="teach the ends by jog",
-        )  # fmt: skip
+        raise NotAllowed("moves.family-no-torque-limit", drive=drive.name)
     found = []
     async with temporary(axis, limits):
         for number, direction in enumerate((-1.0, 1.0)):
@@ -107,9 +104,10 @@ async def _creep(
     end = units.position(await axis.position_raw())
     if not stall.found:
         raise NotAllowed(
-            f"{axis.drive.name} found no end within {way:g} rev",
-            drive=axis.drive.name, value=float(np.ptp(recording.position_rad)) / _TURN,
+            "moves.found-no-end-within",
+            drive=axis.drive.name,
+            value=float(np.ptp(recording.position_rad)) / _TURN,
             limit=f"{way:g} rev",
-            remedy="use the free scheme if it turns without ends, or allow a longer search",
-        )  # fmt: skip
+            way_rev=way,
+        )
     return end

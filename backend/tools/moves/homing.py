@@ -43,11 +43,10 @@ async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobR
     known = {method.method: method for method in drive.profile.homing_methods}
     if settings.method not in known:
         raise OutOfRange(
-            f"{drive.name} has no homing method {settings.method}",
+            "moves.no-homing-method",
             drive=drive.name,
             value=settings.method,
             limit=", ".join(str(m) for m in sorted(known)),
-            remedy="choose one of the listed methods",
         )
     writes: dict[str, int] = {drive.require("homing_method"): settings.method}
     for role, value in (
@@ -78,9 +77,8 @@ async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobR
 def _integer(name: str, reading: Reading) -> int:
     if not isinstance(reading.raw, int):
         raise LinkTimeout(
-            f"{name}: {reading.key} could not be read while homing: {reading.error}",
-            drive=name, parameter=reading.key, remedy="check the cable",
-        )  # fmt: skip
+            "moves.not-read-homing", drive=name, parameter=reading.key, error=reading.error
+        )
     return reading.raw
 
 
@@ -98,17 +96,10 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
         status = await axis.status_word()
         if drive.decode_state(status) is not State.OPERATION_ENABLED:
             causes = "; ".join(await axis.blocked_by()) or "it left Operation enabled"
-            raise NotAllowed(
-                f"{drive.name} broke off homing: {causes}",
-                drive=drive.name,
-                remedy="see the Alarms page",
-            )
+            raise NotAllowed("moves.broke-off-homing", drive=drive.name, causes=causes)
         if not own and status & cia402.STATUS_HOMING_ERROR:
             raise NotAllowed(
-                f"{drive.name} reports a homing error (status bit 13) with method "
-                f"{settings.method}",
-                drive=drive.name,
-                remedy="check the switches' wiring and functions, the method and its speeds",
+                "moves.reports-homing-error-status", drive=drive.name, method=settings.method
             )
         elapsed = time.monotonic() - began
         attained = bool(status & homed_bit) and (own or status & cia402.STATUS_TARGET_REACHED)
@@ -128,17 +119,14 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
             guard.interrupt()
         if units.position(travelled) > 2.5 * settings.envelope.travel_rev:
             raise NotAllowed(
-                f"{drive.name} travelled {shown.say(units.position(travelled))} without finding "
-                "home",
+                "moves.travelled-without-finding-home",
                 drive=drive.name,
                 limit=f"{shown.say(settings.envelope.travel_rev)} each way",
-                remedy="check the switch that the method looks for, or widen the travel limit",
+                say=shown.say(units.position(travelled)),
             )
         if elapsed > settings.envelope.time_s:
             raise LinkTimeout(
-                f"{drive.name} did not find home within {settings.envelope.time_s:g} s",
-                drive=drive.name,
-                remedy="check the switch that the method looks for, or allow more time",
+                "moves.not-find-home-within", drive=drive.name, time_s=settings.envelope.time_s
             )
         progress(min(0.95, elapsed / settings.envelope.time_s), "searching home")
         await asyncio.sleep(_POLL_S)

@@ -35,10 +35,9 @@ def require_identification(axis: Axis) -> DriveIdentification:
     spec = axis.drive.profile.functions.identification
     if spec is None:
         raise NotAllowed(
-            f"{axis.drive.name}: {axis.drive.profile.title} has no identification that can be "
-            "started from here",
+            "moves.no-identification-started",
             drive=axis.drive.name,
-            remedy="identify the inertia on the Tune page",
+            profile_title=axis.drive.profile.title,
         )
     return spec
 
@@ -57,9 +56,7 @@ async def identify(axis: Axis, settings: IdentifySettings, progress: Progress) -
     spec = require_identification(axis)
     if not settings.confirmed:
         raise NotAllowed(
-            f"{drive.name}: the identification needs your agreement: {spec.warning}",
-            drive=drive.name,
-            remedy="read the text and confirm",
+            "moves.identification-needs-your-agreement", drive=drive.name, warning=spec.warning
         )
     before = {key: r.raw for key, r in (await drive.read_many(spec.keys)).items()}
     word = cia402.ENABLE_OPERATION
@@ -88,11 +85,7 @@ async def _until_done(
         elapsed = time.monotonic() - began
         if drive.decode_state(await axis.status_word()) is not State.OPERATION_ENABLED:
             causes = "; ".join(await axis.blocked_by()) or "it left Operation enabled"
-            raise NotAllowed(
-                f"{drive.name} broke off the identification: {causes}",
-                drive=drive.name,
-                remedy="see the Alarms page",
-            )
+            raise NotAllowed("moves.broke-off-identification", drive=drive.name, causes=causes)
         status = await drive.raw(spec.status_key)
         name = names.get(status, str(status))
         busy = busy or (status not in spec.done and status not in spec.failed and status != 0)
@@ -100,33 +93,30 @@ async def _until_done(
             return
         if busy and status in spec.failed:
             raise Rejected(
-                f"{drive.name}: the drive reports that its identification failed",
+                "moves.drive-reports-identification-failed",
                 code=status,
                 drive=drive.name,
                 parameter=spec.status_key,
                 value=status,
-                remedy="check the load, the travel that it may use, and its limits",
             )
         if not busy and elapsed > _BEGIN_S:
             raise LinkTimeout(
-                f"{drive.name} does not begin its identification (state: {name})",
+                "moves.not-begin-identification-state",
                 drive=drive.name,
                 parameter=spec.status_key,
-                remedy="its firmware may want another mode; use the Tune page instead",
+                name=name,
             )
         travelled = abs(units.position(await axis.position_raw() - start))
         if travelled > limit.travel_rev:
             raise NotAllowed(
-                f"{drive.name} travelled {travelled:.4g} rev in its identification",
+                "moves.travelled-rev-identification",
                 drive=drive.name,
                 limit=f"{limit.travel_rev:g} rev",
-                remedy="allow more travel, or give the drive fewer revolutions",
+                travelled_rev=travelled,
             )
         if elapsed > limit.time_s:
             raise LinkTimeout(
-                f"{drive.name}: the identification took longer than {limit.time_s:g} s",
-                drive=drive.name,
-                remedy="allow more time",
+                "moves.identification-took-longer", drive=drive.name, time_s=limit.time_s
             )
         progress(min(0.95, elapsed / limit.time_s), name)
         await asyncio.sleep(_POLL_S)

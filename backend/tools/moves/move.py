@@ -142,11 +142,7 @@ def _require_watchdog_or_consent(axis: Axis, consent: bool) -> None:
     exchanging = axis.session is not None and axis.session.running
     watched = exchanging and spec is not None and spec.watchdog.present
     if not watched and not consent:
-        raise NotAllowed(
-            f"{axis.drive.name}: {CONSENT}",
-            drive=axis.drive.name,
-            remedy="agree to this text, or use a position move",
-        )
+        raise NotAllowed("moves.no-watchdog-drive-active", drive=axis.drive.name)
 
 
 async def _ramps(axis: Axis, settings: MoveSettings) -> dict[str, int]:
@@ -157,12 +153,11 @@ async def _ramps(axis: Axis, settings: MoveSettings) -> dict[str, int]:
     if settings.speed_rpm is not None:
         if settings.speed_rpm > settings.envelope.speed_rpm:
             raise OutOfRange(
-                f"{drive.name}: {shown.say_speed(settings.speed_rpm)} is above the envelope's "
-                f"{shown.say_speed(settings.envelope.speed_rpm)}",
+                "moves.above-envelope-lower-speed",
                 drive=drive.name,
                 value=shown.speed(settings.speed_rpm),
                 limit=shown.say_speed(settings.envelope.speed_rpm),
-                remedy="lower the speed or widen the envelope",
+                say_speed=shown.say_speed(settings.speed_rpm),
             )
         if settings.mode == "PP":
             values[drive.require("profile_velocity")] = units.velocity_raw(settings.speed_rpm)
@@ -171,12 +166,10 @@ async def _ramps(axis: Axis, settings: MoveSettings) -> dict[str, int]:
         keys = await ramp_keys(drive)
         if keys[0] == keys[1] and ramps[0] != ramps[1]:
             raise OutOfRange(
-                f"{drive.name}: this drive brakes by its acceleration {keys[0]}, it has no "
-                "deceleration of its own",
+                "moves.drive-brakes-acceleration-no",
                 drive=drive.name,
                 parameter=keys[0],
                 value=ramps[1],
-                remedy="give the same acceleration and deceleration",
             )
         for key, ramp in zip(keys, ramps, strict=True):
             if ramp is not None:
@@ -198,12 +191,12 @@ def _require_reachable(
     if abs(target - start) > units.position_raw(envelope.travel_rev):
         away = shown.say(units.position(target - start), "+.4g")
         raise OutOfRange(
-            f"{drive.name}: a target {away} from the start point is outside the travel limit of "
-            f"{shown.say(envelope.travel_rev)}",
+            "moves.target-start-point-outside",
             drive=drive.name,
             value=shown.travel(units.position(target)),
             limit=f"{shown.say(envelope.travel_rev)} from the start",
-            remedy="choose a nearer target or a wider travel limit",
+            away=away,
+            say=shown.say(envelope.travel_rev),
         )
     drive.check(drive.parameter(drive.require("position_target")), target)
 
@@ -242,11 +235,10 @@ async def _to(axis: Axis, target: int, watch: _Watch, progress: Progress | None)
             return
         if time.monotonic() > deadline:
             raise LinkTimeout(
-                f"{drive.name} did not reach its target within {envelope.time_s:g} s: "
-                f"it stands {envelope.shown.say(units.position(position - target), '+.4g')} "
-                "from it",
+                "moves.not-reach-target-within",
                 drive=drive.name,
-                remedy="look for a limit, a blocked axis, too little torque or too short a time",
+                time_s=envelope.time_s,
+                say=envelope.shown.say(units.position(position - target), "+.4g"),
             )
         await asyncio.sleep(_POLL_S)
 
@@ -276,11 +268,11 @@ def _require_inside(axis: Axis, units: AxisUnits, settings: MoveSettings) -> tup
             for each in (settings.target, limit)
         )
         raise OutOfRange(
-            f"{drive.name}: {target} is above the envelope's {allowed}",
+            "moves.above-envelope",
             drive=drive.name,
             value=shown.speed(settings.target) if velocity else settings.target,
             limit=allowed,
-            remedy="lower the target or widen the envelope",
+            target=target,
         )
     role = "velocity_target" if velocity else "torque_target"
     raw = (units.velocity_raw if velocity else units.torque_raw)(settings.target)
@@ -312,28 +304,24 @@ async def _still_inside(axis: Axis, watch: _Watch) -> int:
         raw = readings[key].raw
         if not isinstance(raw, int):
             raise LinkTimeout(
-                f"{drive.name}: {key} could not be read during motion: {readings[key].error}",
+                "moves.not-read-during-motion",
                 drive=drive.name,
                 parameter=key,
-                remedy="check the cable",
+                error=readings[key].error,
             )
         raws.append(raw)
     status, position, velocity = raws
     if drive.decode_state(status) is not State.OPERATION_ENABLED:
         causes = "; ".join(await axis.blocked_by()) or "it left Operation enabled"
-        raise NotAllowed(
-            f"{drive.name} stopped during the move: {causes}",
-            drive=drive.name,
-            remedy="see the Alarms page",
-        )
+        raise NotAllowed("moves.stopped-during-move", drive=drive.name, causes=causes)
     moved, shown = abs(units.position(position - watch.start)), envelope.shown
     if moved > envelope.travel_rev * 1.02 + 0.05:
         raise NotAllowed(
-            f"{drive.name} left the travel limit: {shown.say(moved)} from the start",
+            "moves.left-travel-limit-start",
             drive=drive.name,
             value=shown.travel(moved),
             limit=shown.say(envelope.travel_rev),
-            remedy="check load and limits",
+            say=shown.say(moved),
         )
     watch.guard.look(position, velocity, asked_s)
     return status

@@ -61,15 +61,14 @@ async def run_procedure(
     texts = [step.text for step in procedure.steps if isinstance(step, ConfirmStep)]
     if texts and not confirmed:
         raise NotAllowed(
-            f"{drive.name}: {procedure.title} needs your agreement: {' '.join(texts)}",
+            "moves.needs-your-agreement",
             drive=drive.name,
-            remedy="read the text and confirm",
+            procedure_title=procedure.title,
+            texts=" ".join(texts),
         )
     if procedure.requires_stop and await axis.state() is State.OPERATION_ENABLED:
         raise NotAllowed(
-            f"{drive.name}: {procedure.title} is possible only while the motor is not enabled",
-            drive=drive.name,
-            remedy="disable the axis first",
+            "moves.possible-motor-not-enabled", drive=drive.name, procedure_title=procedure.title
         )
     words = describe(procedure)
     moves = any(_energises(drive, step) for step in procedure.steps)
@@ -154,21 +153,20 @@ async def _poll(axis: Axis, step: PollStep) -> None:
             return
         if raw in step.failed:
             raise Rejected(
-                f"{drive.name}: {step.key} reads {raw}, which means that it failed",
+                "moves.reads-means-failed",
                 code=raw,
                 drive=drive.name,
                 parameter=step.key,
                 value=raw,
-                remedy="see the drive's manual at this procedure",
             )
         if time.monotonic() > deadline:
             raise LinkTimeout(
-                f"{drive.name}: {step.key} still reads {raw} after {step.timeout_s:g} s",
+                "moves.still-reads-after",
                 drive=drive.name,
                 parameter=step.key,
                 value=raw,
                 limit=f"{step.equals} within {step.timeout_s:g} s",
-                remedy="read the parameter again; the drive may need longer",
+                timeout_s=step.timeout_s,
             )
         await asyncio.sleep(_POLL_S)
 
@@ -185,10 +183,7 @@ async def _reconnect(axis: Axis, timeout_s: float) -> None:
         except DriveError as error:
             if time.monotonic() > deadline:
                 raise LinkTimeout(
-                    f"{axis.drive.name} does not answer {timeout_s:g} s after its restart",
-                    drive=axis.drive.name,
-                    remedy="check its power and address; its communication settings may have "
-                    "changed with the restart",
+                    "moves.not-answer-after-restart", drive=axis.drive.name, timeout_s=timeout_s
                 ) from error
             await asyncio.sleep(_POLL_S)
         else:

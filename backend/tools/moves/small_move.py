@@ -82,10 +82,12 @@ async def small_move(
             moved = await axis.position_raw() - start
     if abs(moved - settings.increments) > _ARRIVED * abs(settings.increments) + 2:
         raise NotAllowed(
-            f"{drive.name} moved {moved} of {settings.increments} increments",
-            drive=drive.name, value=moved, limit=str(settings.increments),
-            remedy="look for a closed brake or a blocked axis, or permit a little more torque",
-        )  # fmt: skip
+            "moves.moved-increments",
+            drive=drive.name,
+            value=moved,
+            limit=str(settings.increments),
+            increments=settings.increments,
+        )
     scale = measured_scale(*seen.evenly(), cycle)
     axis.moved_small(moved, scale)
     return {
@@ -123,16 +125,22 @@ def _check(axis: Axis, settings: SmallMoveSettings) -> None:
     most = longest_allowed(axis)
     if not 0 < abs(settings.increments) <= most:
         raise OutOfRange(
-            f"{axis.drive.name}: {settings.increments} increments: a small move may have 1 to "
-            f"{most} now", drive=axis.drive.name, value=settings.increments, limit=f"1…{most}",
-            remedy="begin small: each move may be ten times as long as the one before",
-        )  # fmt: skip
+            "moves.increments-small-move-may",
+            drive=axis.drive.name,
+            value=settings.increments,
+            limit=f"1…{most}",
+            most=most,
+        )
     low, high = _TORQUE_PERCENT
     if not low <= settings.torque_percent <= high:
         raise OutOfRange(
-            f"{axis.drive.name}: a small move takes {low:g} to {high:g} % of rated torque at most",
-            drive=axis.drive.name, value=settings.torque_percent, limit=f"{low:g}…{high:g} %",
-        )  # fmt: skip
+            "moves.small-move-takes-rated",
+            drive=axis.drive.name,
+            value=settings.torque_percent,
+            limit=f"{low:g}…{high:g} %",
+            low=low,
+            high_percent=high,
+        )
 
 
 def _path(increments: int, cycle: float) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

@@ -141,10 +141,7 @@ async def tried_with(
     drive = axis.drive
     spec = drive.profile.notch
     if spec is None or not unknown(drive):
-        raise NotAllowed(
-            f"{drive.name}: what its notches do is printed in the manual",
-            drive=drive.name, remedy="write them: nothing has to be measured",
-        )  # fmt: skip
+        raise NotAllowed("notch.notches-printed-manual", drive=drive.name)
     slot = spec.slots[0]
     units, home = await axis.units(), await axis.position_raw()
     off = await plan_notches(drive, [])
@@ -217,10 +214,7 @@ def _sequence(
             base=not still,
         )
     except ValueError as error:
-        raise NotAllowed(
-            f"the envelope does not allow to measure the notches: {error}",
-            remedy="widen travel, speed or torque of the envelope",
-        ) from error
+        raise NotAllowed("notch.envelope-not-allow-measure", cause=str(error)) from error
     # Another period tells no more: tried on axes that turn and on such that tremble.
     return _one_period(made[0])
 
@@ -354,11 +348,7 @@ def _meaning(
     """What the trials say together."""
     seen = [(trial, effect.notch) for trial, effect in effects if effect is not None]
     if not seen:
-        raise NotAllowed(
-            f"{drive.name}: its notch at {centre} Hz does nothing that the torque shows",
-            drive=drive.name,
-            remedy="look whether another function of the drive owns the notches",
-        )
+        raise NotAllowed("notch.notch-hz-nothing-torque", drive=drive.name, centre_hz=centre)
     if seen[0][0].depth is None:
         scale = float(np.mean([notch.width_hz / trial.width for trial, notch in seen]))
         depth = float(np.mean([notch.depth_db for _trial, notch in seen]))

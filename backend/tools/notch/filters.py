@@ -62,18 +62,16 @@ def spec_of(profile: Profile, drive: str) -> NotchSpec:
     """Raises NotAllowed where the family documents no notch."""
     if profile.notch is None:
         raise NotAllowed(
-            f"{drive}: {profile.title} documents no notch filters", drive=drive,
-            remedy="lower the loop gain, or stiffen the mechanics",
-        )  # fmt: skip
+            "notch.documents-no-notch-filters", drive=drive, profile_title=profile.title
+        )
     return profile.notch
 
 
 def _slot(spec: NotchSpec, number: int, drive: str) -> NotchSlot:
     if not 0 <= number < len(spec.slots):
         raise OutOfRange(
-            f"{drive} has no notch {number + 1}", drive=drive, value=number + 1,
-            limit=f"1…{len(spec.slots)}", remedy="choose one of its notches",
-        )  # fmt: skip
+            "notch.no-notch", drive=drive, value=number + 1, limit=f"1…{len(spec.slots)}"
+        )
     return spec.slots[number]
 
 
@@ -118,9 +116,12 @@ def encode(
             raw, made, note = _encoded(profile, spec, slot, notch, meaning)
         except ValueError as error:
             raise OutOfRange(
-                f"{drive}: notch {number + 1}: {error}", drive=drive,
-                value=f"{notch.center_hz:g} Hz", remedy="move its centre or change its width",
-            ) from error  # fmt: skip
+                "notch.notch",
+                drive=drive,
+                value=f"{notch.center_hz:g} Hz",
+                number=number + 1,
+                cause=str(error),
+            ) from error
     raw |= _enable(profile, slot, notch is not None, enable_now)
     return Preview(number, notch, raw, made, note)
 
@@ -148,11 +149,7 @@ def off_raw(profile: Profile, frequency_key: str) -> int:
     default = parameter.default_raw
     if isinstance(default, int) and default in (0, high):
         return default
-    raise NotAllowed(
-        f"{parameter.key} {parameter.name}: the manual does not say how this notch is switched off",
-        parameter=parameter.key,
-        remedy="leave it as it is, or give it a frequency far above the loop's bandwidth",
-    )
+    raise NotAllowed("notch.manual-not-say-how", parameter=parameter.key, key=parameter.name)
 
 
 def _encoded(
@@ -304,9 +301,12 @@ async def plan_notches(
     spec = spec_of(drive.profile, drive.name)
     if len(wanted) > len(spec.slots):
         raise OutOfRange(
-            f"{drive.name} has {len(spec.slots)} notches, not {len(wanted)}", drive=drive.name,
-            value=len(wanted), limit=str(len(spec.slots)),
-        )  # fmt: skip
+            "notch.notches-not",
+            drive=drive.name,
+            value=len(wanted),
+            limit=str(len(spec.slots)),
+            slots=len(spec.slots),
+        )
     words = {s.enable_key: await drive.raw(s.enable_key) for s in spec.slots if s.enable_key}
     raw: dict[str, int] = {}
     for number, slot in enumerate(spec.slots):

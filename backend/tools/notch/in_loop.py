@@ -69,11 +69,7 @@ async def measure_meaning_in_loop(
     """
     require_signals(axis, session, Mode.CSV, False)
     if mechanics.model is None:
-        raise NotAllowed(
-            f"{axis.drive.name}: whether its loop stays stable with a notch is not known, since "
-            "no mechanical model explains its response", drive=axis.drive.name,
-            remedy="measure the frequency response again, with more excitation",
-        )  # fmt: skip
+        raise NotAllowed("notch.whether-loop-stays-stable", drive=axis.drive.name)
     settings = SweepSettings(
         envelope, loop="speed", realisations=1, rated_torque_nm=facts.rated_torque_nm,
         inertia_kgm2=inertia_kgm2, hold=mechanics.hold,
@@ -132,10 +128,7 @@ class _Beside:
         fixed = gains.loops_of(self.axis.drive, replace(facts, torque_filter_hz=None))
         lowest = safe_centre_hz(self._loop, self.plant, fixed.response)
         if lowest is None:
-            raise NotAllowed(
-                f"{name}: its speed loop is so stiff that a notch might make it swing while what "
-                "it does is measured", drive=name, remedy="lower the speed gain, and tune again",
-            )  # fmt: skip
+            raise NotAllowed("notch.speed-loop-stiff-notch", drive=name)
         return lowest
 
     async def notched(self, told: Callable[[float], None]) -> NotchEffect:

@@ -130,11 +130,15 @@ def _demand(settings: StepSettings, rate: float) -> npt.NDArray[np.float64]:
         highest, name, travelled = settings.speed_rpm, "rpm", abs(settings.size)
     if highest > envelope.speed_rpm or travelled > envelope.travel_rev:
         raise OutOfRange(
-            f"the step needs {highest:.4g} {name} and {travelled:.3g} rev, more than the envelope "
-            f"of {envelope.speed_rpm:g} rpm and {envelope.travel_rev:g} rev",
-            value=settings.size, limit=f"{envelope.speed_rpm:g} rpm, {envelope.travel_rev:g} rev",
-            remedy="take a smaller step or a wider envelope",
-        )  # fmt: skip
+            "step.step-needs-rev-more",
+            value=settings.size,
+            limit=f"{envelope.speed_rpm:g} rpm, {envelope.travel_rev:g} rev",
+            highest=highest,
+            name=name,
+            travelled_rev=travelled,
+            speed_rpm=envelope.speed_rpm,
+            travel_rev=envelope.travel_rev,
+        )
     if settings.kind == "speed":
         return np.concatenate([lead, np.full(hold, settings.size), np.zeros(hold)])
     way = run_up(

@@ -45,20 +45,21 @@ def check(settings: SweepSettings) -> None:
         OutOfRange: naming the value and its limit.
     """
     if not 0.01 <= settings.share <= 0.9:
-        raise OutOfRange("the excitation takes 1 to 90 % of the permitted torque",
-                         value=settings.share, limit="0.01…0.9")  # fmt: skip
+        raise OutOfRange(
+            "sweep.excitation-takes-90-permitted", value=settings.share, limit="0.01…0.9"
+        )
     if not 1 <= settings.realisations <= 8:
-        raise OutOfRange("1 to 8 realisations are possible", value=settings.realisations,
-                         limit="1…8")  # fmt: skip
+        raise OutOfRange("sweep.realisations-possible", value=settings.realisations, limit="1…8")
     if settings.excitation == "stepped" and settings.loop == "none":
-        raise OutOfRange("a stepped sine lasts too long for an axis that no loop holds",
-                         remedy="measure it with the speed loop closed")  # fmt: skip
+        raise OutOfRange("sweep.stepped-sine-lasts-too")
     if settings.f_min_hz < 3.0:
-        raise OutOfRange("the lowest line must lie above the base motion, at 3 Hz or more",
-                         value=settings.f_min_hz, limit="3 Hz")  # fmt: skip
+        raise OutOfRange("sweep.lowest-line-must-lie", value=settings.f_min_hz, limit="3 Hz")
     if settings.f_max_hz is not None and settings.f_max_hz < 4 * settings.f_min_hz:
-        raise OutOfRange("the band must span at least two octaves", value=settings.f_max_hz,
-                         limit=f"{4 * settings.f_min_hz:g} Hz or more")  # fmt: skip
+        raise OutOfRange(
+            "sweep.band-must-span-least",
+            value=settings.f_max_hz,
+            limit=f"{4 * settings.f_min_hz:g} Hz or more",
+        )
 
 
 def chosen_loop(axis: Axis, settings: SweepSettings, probed: Probed) -> Literal["none", "speed"]:
@@ -89,11 +90,10 @@ def held_by_loop(axis: Axis, wanted: Loop, pull_nm: float) -> Literal["speed"]:
     """
     if wanted == "none":
         raise NotAllowed(
-            f"{axis.drive.name}: a load of {pull_nm:.3g} Nm pulls the axis, so it cannot be "
-            "measured without a closed loop",
+            "sweep.load-nm-pulls-axis",
             drive=axis.drive.name,
             value=round(pull_nm, 4),
-            remedy="measure with the speed or position loop closed",
+            pull_nm=pull_nm,
         )
     return "speed"
 
@@ -171,10 +171,7 @@ def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence
             base=settings.base_motion, waveform=settings.excitation,
         )  # fmt: skip
     except ValueError as error:
-        raise OutOfRange(
-            f"the envelope does not allow this measurement: {error}",
-            remedy="widen travel, speed or torque of the envelope",
-        ) from error
+        raise OutOfRange("sweep.envelope-not-allow-measurement", cause=str(error)) from error
 
 
 def _reference_size(setup: Setup, position: bool) -> tuple[float, float]:

@@ -66,9 +66,9 @@ async def preview(axis: Axis, settings: SweepSettings, sample_rate_hz: float) ->
         )
     except ValueError as error:
         raise OutOfRange(
-            f"{axis.drive.name}: the envelope does not allow this measurement: {error}",
+            "sweep.envelope-not-allow-measurement-widen-travel",
             drive=axis.drive.name,
-            remedy="widen travel, speed or torque of the envelope",
+            cause=str(error),
         ) from error
     factor = 100.0 / rated if settings.kind == "mechanics" else _SHOWN[settings.kind][1]
     unit = "% of rated torque" if settings.kind == "mechanics" else _SHOWN[settings.kind][0]

@@ -57,12 +57,7 @@ def needed(drive: Drive, link: Link) -> bool:
 def require_consent(session: CyclicSession, drive: Drive, consent: bool) -> None:
     """Raises NotAllowed where nothing in the drive ends a speed and nobody agreed to that."""
     if not consent and session.unwatched(drive):
-        raise NotAllowed(
-            f"{drive.name}: {CONSENT}",
-            drive=drive.name,
-            remedy="activate the drive's travel limits, keep a hand on the emergency stop, and "
-            "agree to this measurement",
-        )
+        raise NotAllowed("sweep.drive-no-watchdog-ends", drive=drive.name)
 
 
 async def require_travel_limits(axis: Axis) -> None:
@@ -80,14 +75,7 @@ async def require_travel_limits(axis: Axis) -> None:
         return
     if switch is not None and await drive.raw(switch) and await axis.status_word() & _HOMED:
         return
-    raise NotAllowed(
-        f"{drive.name}: none of its own travel limits is active, so nothing would stop the axis "
-        "if this computer fell silent",
-        drive=drive.name,
-        parameter=switch,
-        remedy="assign a positive and a negative limit to its inputs, or home it and switch its "
-        "software limits on",
-    )
+    raise NotAllowed("sweep.none-travel-limits-active", drive=drive.name, parameter=switch)
 
 
 async def _limits_in_use(drive: Drive) -> bool:
@@ -123,9 +111,7 @@ async def prepared(
         return
     await require_travel_limits(axis)
     if await axis.state() is State.OPERATION_ENABLED:
-        raise NotAllowed(
-            f"{drive.name} is enabled", drive=drive.name, remedy="disable it before the measurement"
-        )
+        raise NotAllowed("sweep.enabled", drive=drive.name)
     ramps = [drive.require("profile_acceleration"), drive.require("profile_deceleration")]
     limits = list(await existing(drive, [drive.key("max_torque")]))
     modes = await axis.restorable_mode()
@@ -206,11 +192,7 @@ async def _require_signed(axis: Axis, session: CyclicSession, envelope: Envelope
             raise
         raise _other_way(drive) from error
     if not await axis.standstill(2.0):
-        raise LinkTimeout(
-            f"{drive.name} still turns after its speed was tried",
-            drive=drive.name,
-            remedy="use the machine's emergency stop",
-        )
+        raise LinkTimeout("sweep.still-turns-after-speed", drive=drive.name)
     turned = recording.position_rad[-1] - recording.position_rad[0]
     if turned > 0.1 * abs(speed) / 60.0 * 2 * np.pi * _TRIED_S:
         raise _other_way(drive)
@@ -218,9 +200,5 @@ async def _require_signed(axis: Axis, session: CyclicSession, envelope: Envelope
 
 def _other_way(drive: Drive) -> NotAllowed:
     return NotAllowed(
-        f"{drive.name} does not turn backwards at a low negative speed: it takes negative speeds "
-        "for something else",
-        drive=drive.name,
-        parameter=drive.key("velocity_target"),
-        remedy="this drive cannot be measured by its speed; see its page in the documentation",
+        "sweep.not-turn-backwards-low", drive=drive.name, parameter=drive.key("velocity_target")
     )

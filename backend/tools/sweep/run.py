@@ -117,9 +117,7 @@ async def sweep(
         return await meanwhile(evaluated, back())
     except ValueError as error:
         raise NotAllowed(
-            f"{axis.drive.name}: the recording cannot be evaluated: {error}",
-            drive=axis.drive.name,
-            remedy="raise the excitation, or look for lost samples and saturated torque",
+            "sweep.recording-cannot-evaluated", drive=axis.drive.name, cause=str(error)
         ) from error
 
 

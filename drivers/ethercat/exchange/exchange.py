@@ -79,14 +79,9 @@ class Exchange:
     def start(self, done: Done) -> None:
         """Exchange process data and bring every configured station to OP."""
         if not self._images:
-            raise NotAllowed(
-                "configure the cyclic data first", remedy="start the exchange on the page Connect"
-            )
+            raise NotAllowed("ethercat.configure-cyclic-data-first")
         if self.loop is not None:
-            raise NotAllowed(
-                "the cyclic exchange runs already",
-                remedy="stop the exchange first to choose another cycle",
-            )
+            raise NotAllowed("ethercat.cyclic-exchange-runs-already")
         listening = [s for s in self._stations if s.number not in self.setups]
         loop = CyclicLoop(
             self._segment,
@@ -261,19 +256,13 @@ class Exchange:
             NotAllowed: no cyclic exchange, or the station has no process data.
         """
         if self.loop is None:
-            raise NotAllowed("the cyclic exchange does not run", remedy="start it first")
+            raise NotAllowed("ethercat.cyclic-exchange-not-run")
         for image in self.loop.images:
             if image.station == number:
                 if image.lost:
-                    raise NotAllowed(
-                        f"station {number} does not answer at present",
-                        remedy="check its supply and cable; it is taken up again by itself",
-                    )
+                    raise NotAllowed("ethercat.station-not-answer-present", station=number)
                 return image.axis
-        raise NotAllowed(
-            f"station {number} has no cyclic data",
-            remedy="stop the exchange and start it again: all axes then take part",
-        )
+        raise NotAllowed("ethercat.station-no-cyclic-data", station=number)
 
     def play(self, trajectories: Sequence[Message]) -> int:
         """Begin trajectories together in the next cycle; returns its number.
@@ -304,9 +293,10 @@ class Exchange:
                 continue
             if index in (0x6040, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2):
                 raise NotAllowed(
-                    f"{index:04X}:{subindex:02X} belongs to the cyclic exchange while it runs",
+                    "ethercat.belongs-cyclic-exchange-runs",
                     parameter=f"{index:04X}:{subindex:02X}",
-                    remedy="enable, disable and move through the axis, or stop the exchange",
+                    index=index,
+                    subindex=subindex,
                 )
             (value,) = layout((entry,)).unpack(data)
             self.axis(station).outputs[place] = value

@@ -144,10 +144,12 @@ def _direction(
             entries.append(entry)
         elif number < needed:
             raise NotAllowed(
-                f"station {station}: {address} cannot be in the cyclic data: {reason}",
+                "ethercat.station-cannot-cyclic-data",
                 parameter=str(address),
                 limit=f"{most} objects" + (f", {room} bytes" if room is not None else ""),
-                remedy="map fewer signals, or use a mode that needs fewer setpoints",
+                station=station,
+                address=address,
+                reason=reason,
             )
         else:
             reasons[address.index or 0, address.subindex] = reason
@@ -206,10 +208,10 @@ def _fixed(
     usable = [s for s in sets if must <= reached[s.index]]
     if not usable:
         raise NotAllowed(
-            f"station {station}: none of the drive's fixed process data carries"
-            f" {', '.join(sorted(must))}",
+            "ethercat.station-none-drive-fixed",
             limit="fixed process data: " + ", ".join(f"{s.index:04X}h" for s in sets),
-            remedy="use a mode whose setpoints one of these sets carries",
+            station=station,
+            must=", ".join(sorted(must)),
         )
     best = max(usable, key=lambda s: (len(want & reached[s.index]), s.index == default))
     words = tuple(_word(part) for part in best.layout)

@@ -73,9 +73,7 @@ class Preparation:
         cycle_ns = int(message["cycle_ns"])
         if not CYCLE_NS[0] <= cycle_ns <= CYCLE_NS[1]:
             raise NotAllowed(
-                f"a cycle of {cycle_ns / 1000:g} µs is not possible",
-                limit="250 µs to 10 ms",
-                remedy="choose a cycle within the limit",
+                "ethercat.cycle-not-possible", limit="250 µs to 10 ms", cycle_us=cycle_ns / 1000
             )
         interpolation_period(cycle_ns)
         self._stations = stations
@@ -142,9 +140,12 @@ class Preparation:
         number, plan = next(iter(wrong.items()))
         told = self._segment.sizes(number)
         raise SpoiltMap(
-            f"station {number} maps {told[0]} bytes of outputs and {told[1]} of inputs,"
-            f" {plan.rx.size} and {plan.tx.size} were written",
-            remedy="the drive keeps a mapping of its own: use its fixed process data",
+            "ethercat.station-maps-bytes-outputs",
+            station=number,
+            told=told[0],
+            other_told=told[1],
+            rx_size=plan.rx.size,
+            tx_size=plan.tx.size,
         )
 
     def _fits(self, number: int, plan: StationSetup) -> bool:
@@ -239,10 +240,7 @@ class Preparation:
         while len(results) + len(errors) < len(jobs):
             if time.monotonic() > deadline:
                 self._lanes.drop(f"{doing} takes longer than {_SETUP_S:g} s")
-                raise LinkTimeout(
-                    f"{doing} takes longer than {_SETUP_S:g} s",
-                    remedy="check supply and cables of all stations, then start the exchange again",
-                )
+                raise LinkTimeout("ethercat.takes-longer", doing=doing, setup_s=_SETUP_S)
             if not self._lanes.step():
                 time.sleep(0.0002)
         for number, error in errors.items():

@@ -156,10 +156,7 @@ class EthercatCyclic:
             LinkLost: the exchange broke off meanwhile; the motion ended with it.
         """
         if self._played.get(station, self._generation) != self._generation:
-            raise LinkLost(
-                f"station {station}: the cyclic exchange broke off, the motion has ended",
-                remedy="see the log for the reason; begin the motion again",
-            )
+            raise LinkLost("ethercat.station-cyclic-exchange-broke", station=station)
         await self._host.call({"op": "renew", "station": station}, _ANSWER_S)
 
     async def halt(self, station: int | None = None) -> None:
@@ -245,8 +242,7 @@ class EthercatCyclic:
         except TimeoutError:
             await self._halt_all(stations)
             raise LinkTimeout(
-                f"a motion of {takes_s:g} s did not end in {_PATIENCE} times this time",
-                remedy="look at the link quality: the computer skips many cycles",
+                "ethercat.motion-not-end-times", takes_s=takes_s, patience=_PATIENCE
             ) from None
         except BaseException:
             await self._halt_all(stations)
@@ -295,7 +291,7 @@ class EthercatCyclic:
         await self._host.call({"op": "start"}, _START_S)
         ring = self._host.ring
         if ring is None:
-            raise LinkLost("the EtherCAT process ended")
+            raise LinkLost("ethercat.ethercat-process-ended")
         self._reader = reader = ring.reader(self._fields)
         self._draining = asyncio.get_running_loop().create_task(self._drain(reader))
 
@@ -348,7 +344,7 @@ class EthercatCyclic:
     def _check_names(self, signals: Sequence[CyclicSignal]) -> None:
         names = [signal.channel for signal in signals]
         if len(set(names)) != len(names):
-            raise NotAllowed("two signals have the same channel name")
+            raise NotAllowed("ethercat.two-signals-same-channel")
 
     def _check_cycle(self, station: int, cycle_s: float) -> None:
         profile = self._profiles.get(station)
@@ -358,10 +354,12 @@ class EthercatCyclic:
         high = spec.cycle_max_us if spec is not None else None
         if (low is not None and cycle_us < low) or (high is not None and cycle_us > high):
             raise NotAllowed(
-                f"station {station} takes cycles of {low} to {high} µs, not {cycle_us:g} µs",
+                "ethercat.station-takes-cycles-not",
                 value=cycle_us,
                 limit=f"{low}…{high} µs",
-                remedy="choose another cycle time",
+                station=station,
+                low=low,
+                high_us=high,
             )
 
     async def _drain(self, reader: RingReader) -> None:

@@ -18,6 +18,7 @@ from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.registers import TRIES, read_again
 from drivers.ethercat.wire.steps import Read, Steps, Write
 from drivers.motion.interpolation import interpolation_period
+from texts.message import text
 
 FMMU, SYNC_MANAGERS = 0x600, 0x800
 _FMMU_COUNT = 0x004
@@ -70,7 +71,7 @@ def spare(station: Station) -> Steps[None]:
     """
     count = yield from read_again(_FMMU_COUNT, 1)
     if count is None:
-        raise ProtocolError(f"station {station.number} stopped answering: it is left alone")
+        raise ProtocolError("ethercat.station-stopped-answering-left", station=station.number)
     for _ in range(TRIES if count[0] else 0):
         if (yield Write(FMMU, bytes(16 * count[0]))) is not None:
             return
@@ -90,9 +91,15 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
             if (yield from _has_them_anyway(station, assign[direction], pdo)):
                 continue
             raise NotAllowed(
-                f"station {station.number} does not take these process data: {error.message}",
+                "ethercat.station-not-take-process-data",
                 parameter=error.parameter,
-                remedy=_FIXED if error.code == _READ_ONLY else error.remedy,
+                remedy=(
+                    text("ethercat.try-process-data-fixed-others")
+                    if error.code == _READ_ONLY
+                    else error.remedy_text
+                ),
+                station=station.number,
+                cause=error.text,
             ) from error
     value, exponent = interpolation_period(setup.cycle_ns)
     for index, sub, data in (
@@ -215,23 +222,19 @@ def arm_watchdog(station: Station, setup: StationSetup) -> Steps[None]:
     milliseconds = setup.watchdog_ms
     divider = yield from read_again(WATCHDOG_DIVIDER, 2)
     if divider is None:
-        raise ProtocolError(f"station {station.number} does not answer for its watchdog")
+        raise ProtocolError("ethercat.station-not-answer-watchdog", station=station.number)
     # ETG.1000.4 clause 6.3: unit is 40 ns times (divider + 2).
     unit_ns = 40 * (int.from_bytes(divider, "little") + 2)
     ticks = round(milliseconds * 1e6 / unit_ns)
     if not 0 < ticks <= 0xFFFF:
         raise NotAllowed(
-            f"a watchdog of {milliseconds:g} ms does not fit station {station.number}",
-            remedy="choose a watchdog time nearer to the cycle",
+            "ethercat.watchdog-ms-not-fit", milliseconds_ms=milliseconds, station=station.number
         )
     yield Write(WATCHDOG_TIME, struct.pack("<H", ticks))
     told = yield from read_again(WATCHDOG_TIME, 2)
     watched = yield from _watch_outputs()
     if told != struct.pack("<H", ticks) or watched < bool(setup.rx.size):
-        raise NotAllowed(
-            f"station {station.number} does not take its process-data watchdog",
-            remedy="cyclic motion is refused: nothing would stop the axis if the computer died",
-        )
+        raise NotAllowed("ethercat.station-not-take-process", station=station.number)
 
 
 def _watch_outputs() -> Steps[int]:
@@ -278,7 +281,7 @@ def check_places(station: Station, setup: StationSetup, clock: Callable[[], floa
     """
     managers = yield from read_again(SYNC_MANAGERS, 8 * _MANAGERS)
     if managers is None:
-        raise ProtocolError(f"station {station.number} stopped answering while it was being set up")
+        raise ProtocolError("ethercat.station-stopped-answering-being", station=station.number)
     placed = 0
     for number in range(2, _MANAGERS):
         start, length = struct.unpack_from("<HH", managers, 8 * number)
@@ -288,21 +291,10 @@ def check_places(station: Station, setup: StationSetup, clock: Callable[[], floa
     if placed < needed:
         told, within_reach = yield from sii.process_data_places(clock)
         if told >= needed and not within_reach:
-            raise NotAllowed(
-                f"station {station.number}: its EEPROM tells where its process data are only behind"
-                " 4096 bytes of other things, which is farther than the search reads",
-                remedy=_NOT_MOVED,
-            )
+            raise NotAllowed("ethercat.station-eeprom-tells-process", station=station.number)
         if told >= needed:
-            raise FoundInPart(
-                f"station {station.number} was found only in part: its EEPROM tells where its"
-                " process data are, but the search missed it",
-                remedy="try again; this computer was too busy, or the cable loses frames",
-            )
-        raise NotAllowed(
-            f"station {station.number}: its EEPROM does not tell where its process data are",
-            remedy=_NOT_MOVED,
-        )
+            raise FoundInPart("ethercat.station-found-part-eeprom", station=station.number)
+        raise NotAllowed("ethercat.station-eeprom-not-tell", station=station.number)
 
 
 def take_snapshot() -> Steps[Snapshot]:
@@ -311,7 +303,7 @@ def take_snapshot() -> Steps[Snapshot]:
     managers = yield from read_again(SYNC_MANAGERS, 32)
     delay = yield from read_again(_DC_DELAY, 4)
     if fmmu is None or managers is None:
-        raise ProtocolError("the slave stopped answering while it was being set up")
+        raise ProtocolError("ethercat.slave-stopped-answering-being")
     return Snapshot(fmmu, managers, delay or bytes(4))
 
 
@@ -362,11 +354,7 @@ def start_sync0(station: Station, setup: StationSetup, clock: Callable[[], float
     deadline = clock() + _SYNC_TRY_S
     while not (yield from _sync0_started(setup)):
         if clock() > deadline:
-            raise LinkLost(
-                f"station {station.number}: its SYNC0 could not be started, frames are lost again"
-                " and again",
-                remedy="check the cables, and that this computer is not overloaded",
-            )
+            raise LinkLost("ethercat.station-sync0-not-started", station=station.number)
 
 
 def _sync0_started(setup: StationSetup) -> Steps[bool]:
@@ -403,6 +391,6 @@ def _restore_clock(snapshot: Snapshot, dc_time: Callable[[], int]) -> Steps[None
     offset = yield Read(_DC_OFFSET, 8)
     here = yield Read(_DC_SYSTEM_TIME, 8)
     if offset is None or here is None:
-        raise DriveError("the slave stopped answering while its clock was set")
+        raise DriveError("ethercat.slave-stopped-answering-clock")
     shifted = struct.unpack("<q", offset)[0] + dc_time() - struct.unpack("<q", here)[0]
     yield Write(_DC_OFFSET, struct.pack("<q", shifted))

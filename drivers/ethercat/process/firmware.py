@@ -48,10 +48,7 @@ def load(
     """
     boot = yield from sii.boot_mailbox(clock)
     if where == "BOOT" and boot is None:
-        raise NotAllowed(
-            f"station {station.number} names no mailboxes for BOOT in its EEPROM",
-            remedy="load the file in PREOP",
-        )
+        raise NotAllowed("ethercat.station-names-no-mailboxes", station=station.number)
     if boot is not None and where != "PREOP":
         entered = yield from _enter_boot(station, boot, managers, clock, tell, where)
         if entered:
@@ -145,9 +142,10 @@ def _back(station: Station, managers: bytes, clock: Callable[[], float]) -> Step
         except (LinkLost, LinkTimeout) as error:
             if clock() > deadline:
                 raise LinkLost(
-                    f"station {station.number} took the file and did not come back within"
-                    f" {_BACK_S:g} s ({error.message})",
-                    remedy="switch the drive off and on, then scan",
+                    "ethercat.station-took-file-not",
+                    station=station.number,
+                    back_s=_BACK_S,
+                    cause=error.text,
                 ) from error
         else:
             return

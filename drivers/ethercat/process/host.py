@@ -126,7 +126,7 @@ class Host:
             done(None, error)
         except (KeyError, TypeError, ValueError, struct.error) as error:
             # A wrong request must not end the process that moves axes.
-            done(None, ProtocolError(f"a request that cannot be carried out ({error!r})"))
+            done(None, ProtocolError("ethercat.request-cannot-carried-out", cause=str(error)))
 
     def send(self, message: Message) -> None:
         """Queue a message; a slow server never holds up the wire."""

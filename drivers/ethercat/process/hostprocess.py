@@ -112,8 +112,7 @@ class HostProcess:
         """
         if not self.running or self._socket is None:
             raise LinkLost(
-                f"the EtherCAT process for {self._interface} is not running: {self.words}",
-                remedy="it is started again by itself; or open the bus again",
+                "ethercat.ethercat-process-not-running", interface=self._interface, words=self.words
             )
         number = next(self._numbers)
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
@@ -128,7 +127,7 @@ class HostProcess:
                 return await future
         except TimeoutError:
             raise LinkTimeout(
-                f"the EtherCAT process did not answer {message['op']!r} within {timeout_s:g} s"
+                "ethercat.ethercat-process-not-answer", message=message["op"], timeout_s=timeout_s
             ) from None
         finally:
             self._waiting.pop(number, None)
@@ -143,9 +142,9 @@ class HostProcess:
         except OSError as error:
             # No memory, no file descriptor, no process to be had: all of that may pass.
             raise LinkLost(
-                f"the EtherCAT process for {self._interface} cannot be started: "
-                f"{error.strerror or error}",
-                remedy="look at memory, disk and open files of this computer",
+                "ethercat.ethercat-process-cannot-started",
+                interface=self._interface,
+                strerror=error.strerror or error,
             ) from error
         ours.setblocking(False)
         self._socket = ours
@@ -157,8 +156,9 @@ class HostProcess:
                 await asyncio.shield(self._ready)
         except TimeoutError:
             raise LinkTimeout(
-                f"the EtherCAT process for {self._interface} did not start within {timeout_s:g} s",
-                remedy="end other programs that keep this computer busy, then try again",
+                "ethercat.ethercat-process-not-start",
+                interface=self._interface,
+                timeout_s=timeout_s,
             ) from None
         self.words = "open"
 
@@ -252,7 +252,7 @@ class HostProcess:
             try:
                 await asyncio.get_running_loop().sock_sendall(ours, data)
             except OSError as error:
-                raise LinkLost("the EtherCAT process ended") from error
+                raise LinkLost("ethercat.ethercat-process-ended") from error
 
     async def _look_after(self) -> None:
         """Give signs of life, and replace a child that died or hangs."""

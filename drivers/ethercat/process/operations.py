@@ -80,12 +80,9 @@ class Operations:
         """
         handler = self._handlers.get(message["op"])
         if handler is None:
-            raise ProtocolError(f"unknown operation {message['op']!r} between our processes")
+            raise ProtocolError("ethercat.unknown-operation-between-our", message=message["op"])
         if not self.roster.is_open:
-            raise LinkLost(
-                f"the interface {self.segment.interface} is gone",
-                remedy="it is opened again by itself as soon as it is back",
-            )
+            raise LinkLost("ethercat.interface-gone", interface=self.segment.interface)
         handler(message, done)
 
     def use_spare_time(self) -> None:
@@ -223,10 +220,10 @@ class Operations:
     def _state(self, message: Message, done: Done) -> None:
         station = self._calm_station(message)
         if self.loop is not None:
-            raise Busy("the cyclic exchange owns the states", remedy="stop it first")
+            raise Busy("ethercat.cyclic-exchange-owns-states")
         target = AlState[message["state"]]
         if target is AlState.OP:
-            raise NotAllowed("OP needs cyclic data", remedy="start the cyclic exchange")
+            raise NotAllowed("ethercat.op-needs-cyclic-data")
         steps = transactions.change_state(station, target, time.monotonic)
         self.lanes.submit(station.number, "mailbox", steps, done)
 
@@ -279,21 +276,13 @@ class Operations:
         station = self._calm_station(message)
         alias = int(message["alias"])
         if not 0 <= alias <= 0xFFFF:
-            raise OutOfRange(
-                f"{alias} is no alias",
-                value=alias,
-                limit="0…65535",
-                remedy="choose a number within the limit",
-            )
+            raise OutOfRange("ethercat.no-alias", value=alias, limit="0…65535")
         if self.loop is not None:
-            raise Busy("the segment is busy", remedy="stop the cyclic exchange first")
+            raise Busy("ethercat.segment-busy")
 
         def ended(told: int | None, error: DriveError | None) -> None:
             if error is None and told != alias:
-                error = ProtocolError(
-                    f"the alias reads back as {told}, {alias} was written",
-                    remedy="write it again; if it stays, its memory may be protected or defective",
-                )
+                error = ProtocolError("ethercat.alias-reads-back-written", told=told, alias=alias)
             if error is None:
                 self.roster.new_aliases.add(station.number)
             done({"alias": told}, error)
@@ -304,7 +293,7 @@ class Operations:
     def _foe(self, message: Message, done: Done) -> None:
         station = self._calm_station(message)
         if self.loop is not None:
-            raise Busy("the cyclic exchange runs", remedy="stop it before loading firmware")
+            raise Busy("ethercat.cyclic-exchange-runs")
 
         def ended(where: str | None, error: DriveError | None) -> None:
             self._loading.discard(station.number)
@@ -336,10 +325,7 @@ class Operations:
         """
         station = self.roster.station(message)
         if station.number in self._loading:
-            raise Busy(
-                f"station {station.number} is being loaded with firmware and cannot move",
-                remedy="wait for the end of the download",
-            )
+            raise Busy("ethercat.station-being-loaded-firmware", station=station.number)
         return station
 
     # Cyclic --------------------------------------------------------------------------------
@@ -359,13 +345,12 @@ class Operations:
         for number in message["stations"]:
             if not 1 <= number <= len(self.roster.stations):
                 raise LinkLost(
-                    f"there is no station {number}: {len(self.roster.stations)} were found",
-                    remedy="check its supply and cable, then scan the segment again",
+                    "ethercat.no-station-found", station=number, stations=len(self.roster.stations)
                 )
         self.roster.exchange.prepare(self.roster.stations)
         for number in message["stations"]:
             if self.roster.stations[number - 1].badly_found:
-                raise FoundInPart(f"station {number} was found only in part", remedy="try again")
+                raise FoundInPart("ethercat.station-found-part", station=number)
         identities = {n: self.roster.stations[n - 1].identity for n in message["stations"]}
         _require_same(message.get("identities"), identities)
         answer = self.roster.exchange.configure(self.roster.stations, message)
@@ -424,10 +409,7 @@ def _require_same(
     """
     for number, identity in (before or {}).items():
         if list(now[number]) != list(identity):
-            raise NotAllowed(
-                f"another drive than before answers at station {number}",
-                remedy="end the cyclic exchange, scan, and check the cables",
-            )
+            raise NotAllowed("ethercat.another-drive-before-answers", station=number)
 
 
 def _word(data: bytes) -> int:

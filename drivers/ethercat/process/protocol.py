@@ -61,7 +61,9 @@ class Unpacker:
         while len(self._buffer) >= 4:
             (length,) = _LENGTH.unpack_from(self._buffer)
             if length > MAX_MESSAGE_BYTES:
-                raise errors.ProtocolError(f"a message of {length} bytes between our processes")
+                raise errors.ProtocolError(
+                    "ethercat.message-bytes-between-our", length_bytes=length
+                )
             if len(self._buffer) < 4 + length:
                 break
             body = bytes(self._buffer[4 : 4 + length])

@@ -262,10 +262,7 @@ class Roster:
     def attach(self) -> None:
         """Search the segment and make the stations; blocks for as long as SOEM takes."""
         if self.exchange.loop is not None:
-            raise Busy(
-                "the cyclic exchange runs on this segment",
-                remedy="stop it first: a search resets every drive",
-            )
+            raise Busy("ethercat.cyclic-exchange-runs-segment")
         self._ring.host_lives_until(
             time.monotonic_ns() + int(_FIND_S * 1e9), "searching the segment"
         )
@@ -322,16 +319,15 @@ class Roster:
             # A drive that was without supply, or behind a cut cable, when the others were found.
             self._want_search()
             raise LinkLost(
-                f"there is no station {number} on {self.segment.interface}:"
-                f" {len(self.stations)} were found",
-                remedy="check supply and cables; it is looked for again by itself while no axis is "
-                "enabled",
+                "ethercat.no-station-found-check-supply",
+                station=number,
+                interface=self.segment.interface,
+                stations=len(self.stations),
             )
         station = self.stations[number - 1]
         if station.lost:
             raise LinkLost(
-                f"station {number} ({station.name}) does not answer",
-                remedy="check supply and cable; it is taken up again by itself",
+                "ethercat.station-not-answer", station=number, other_station=station.name
             )
         return station
 

@@ -100,10 +100,11 @@ class Segment:
                 os.close(descriptor)
             self._unlock()
             raise LinkLost(
-                f"the interface {self.interface} could not be opened"
-                f" ({permissions.check(self.interface).words()})",
+                "ethercat.interface-not-opened",
                 remedy="; ".join(permissions.check(self.interface).commands)
                 or "check that the interface is a wired Ethernet one",
+                interface=self.interface,
+                check=permissions.check(self.interface).words(),
             ) from error
         self.socket_fd = min(_sockets() - before)
         self._index = socket.if_nametoindex(self.interface)
@@ -139,7 +140,7 @@ class Segment:
             LinkLost: it is not open.
         """
         if self._master is None:
-            raise LinkLost(f"the interface {self.interface} is not open")
+            raise LinkLost("ethercat.interface-not-open", interface=self.interface)
         return self._master
 
     def find(self) -> int:
@@ -161,12 +162,9 @@ class Segment:
             if 0 < count <= MAX_STATIONS:
                 break
         if count == _TOO_MANY or count > MAX_STATIONS:
-            raise ProtocolError(f"more than {MAX_STATIONS} slaves on one segment")
+            raise ProtocolError("ethercat.more-slaves-segment", max_stations=MAX_STATIONS)
         if count == _OTHER_FRAME:
-            raise LinkLost(
-                f"answers on {self.interface} come too late to be told apart",
-                remedy="this computer is too busy, or another master is on the segment: try again",
-            )
+            raise LinkLost("ethercat.answers-come-too-late", interface=self.interface)
         self._fresh = True
         self.slaves = tuple(self.master.slaves) if count > 0 else ()
         return len(self.slaves)
@@ -243,13 +241,13 @@ class Segment:
         """
         if expected_bytes > IO_MAP_BYTES:
             raise NotAllowed(
-                f"the process data of all drives take {expected_bytes} bytes,"
-                f" {IO_MAP_BYTES} are possible",
+                "ethercat.process-data-all-drives",
                 limit=f"{IO_MAP_BYTES} bytes",
-                remedy="map fewer signals or use fewer drives at a time",
+                expected_bytes=expected_bytes,
+                io_map_bytes=IO_MAP_BYTES,
             )
         if not self._fresh:
-            raise NotAllowed("process data are mapped once after a search", remedy="search again")
+            raise NotAllowed("ethercat.process-data-mapped-once")
         self._fresh = False
         self.forget_errors()
         self.master.manual_state_change = 1
@@ -261,10 +259,7 @@ class Segment:
         except pysoem.ConfigMapError as error:
             self.forget_errors()
             told = sorted({_mapping_error(item) for item in error.error_list})
-            raise SpoiltMap(
-                f"the process data could not be mapped: {'; '.join(told)}",
-                remedy="try again; if it stays so, the drive refuses what was mapped",
-            ) from error
+            raise SpoiltMap("ethercat.process-data-not-mapped", told="; ".join(told)) from error
         self.mapped = True
 
     def set_output(self, station: int, data: bytes) -> None:
@@ -273,7 +268,9 @@ class Segment:
         slave = self.slaves[station - 1]
         size = len(slave.output)
         if len(data) != size:
-            raise ProtocolError(f"{len(data)} bytes of outputs for {size} of station {station}")
+            raise ProtocolError(
+                "ethercat.bytes-outputs-station", bytes=len(data), size=size, station=station
+            )
         slave.output = data
 
     def sizes(self, station: int) -> tuple[int, int]:
@@ -303,13 +300,14 @@ class Segment:
 
     def _check_mapped(self) -> None:
         if not self.mapped:
-            raise NotAllowed("there are no process data before they are mapped")
+            raise NotAllowed("ethercat.no-process-data-before")
 
     def _check_interface(self) -> None:
         if not 0 < len(self.interface.encode()) <= _NAME_LIMIT:
             raise LinkLost(
-                f"{self.interface!r} cannot be an interface: names have 1 to {_NAME_LIMIT} letters",
-                remedy="choose one of the interfaces that the page Connect lists",
+                "ethercat.cannot-interface-names-letters",
+                interface=self.interface,
+                name_limit=_NAME_LIMIT,
             )
         require_interface(self.interface)
         report = permissions.check(self.interface)
@@ -332,11 +330,7 @@ def _lock(interface: str) -> socket.socket:
         lock.bind(f"\0servodeck-ethercat-{interface}")
     except OSError as error:
         lock.close()
-        raise Busy(
-            f"another servodeck already uses the interface {interface}",
-            remedy="ask that one, as with --server on the command line, or close it first:"
-            " two masters on one segment disturb each other",
-        ) from error
+        raise Busy("ethercat.another-servodeck-already-uses", interface=interface) from error
     return lock
 
 

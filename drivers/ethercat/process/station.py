@@ -13,6 +13,7 @@ from drivers.ethercat.wire.al_status import ERROR_BIT, AlState, al_status_text, 
 from drivers.ethercat.wire.mailbox import Mailbox
 from drivers.ethercat.wire.registers import GONE_S, TRIES, read_again
 from drivers.ethercat.wire.steps import Pause, Read, Steps, Write
+from texts.message import text
 
 AL_CONTROL, AL_STATUS = 0x120, 0x130
 _SYNC_MANAGERS, _NO_MAILBOXES = 0x800, 0x0016
@@ -75,14 +76,10 @@ class Station:
         """
         if self.badly_found:
             raise LinkLost(
-                f"station {self.number} ({self.name}) was found only in part: frames were lost",
-                remedy="the segment is searched again by itself as soon as no axis is moved by it",
+                "ethercat.station-found-part-frames", station=self.number, name=self.name
             )
         if self.mailbox is None:
-            raise NotAllowed(
-                f"station {self.number} ({self.name}) has no mailbox: no parameters",
-                remedy="only its inputs and outputs can be used, in the cyclic exchange",
-            )
+            raise NotAllowed("ethercat.station-no-mailbox-no", station=self.number, name=self.name)
         return self.mailbox
 
     def require_parameters(self) -> None:
@@ -95,9 +92,12 @@ class Station:
             return
         told = al_status_text(self.al_code)
         raise LinkLost(
-            f"station {self.number} is in {state_name(self.al_state)}: {told.text} (AL status"
-            f" {self.al_code:#06x}); it answers for no parameter before that is mended",
-            remedy=told.remedy or "switch the drive off and on",
+            "ethercat.station-al-status-answers",
+            remedy=(told.remedy_text or text("ethercat.try-switch-drive-off")),
+            station=self.number,
+            state_name=state_name(self.al_state),
+            text=told.text,
+            al_code=self.al_code,
         )
 
 
@@ -167,28 +167,31 @@ def change_state(
             raise _refused(station, target)
         if clock() > deadline:
             raise LinkTimeout(
-                f"station {station.number} is still in {state_name(station.al_state)} after"
-                f" {limit_s:g} s, {target.name} was requested",
-                remedy="the drive may still be starting: try again",
+                "ethercat.station-still-after-requested",
+                station=station.number,
+                state_name=state_name(station.al_state),
+                limit_s=limit_s,
+                target=target.name,
             )
         yield Pause(pause_s)
         pause_s = min(pause_s * 2, 0.01)
 
 
 def _gone(station: Station) -> LinkLost:
-    return LinkLost(
-        f"station {station.number} does not answer",
-        remedy="check the drive's supply and the cable before it; it is taken up again by itself",
-    )
+    return LinkLost("ethercat.station-not-answer-check-drive", station=station.number)
 
 
 def _refused(station: Station, target: AlState) -> NotAllowed:
     known = al_status_text(station.al_code)
     return NotAllowed(
-        f"station {station.number} refuses {target.name} and is in"
-        f" {state_name(station.al_state)}: {known.text} (AL status {station.al_code:#06x})",
+        "ethercat.station-refuses-al-status",
         limit=f"AL status {station.al_code:#06x}",
-        remedy=known.remedy or None,
+        remedy=(known.remedy_text or None),
+        station=station.number,
+        target=target.name,
+        state_name=state_name(station.al_state),
+        text=known.text,
+        al_code=station.al_code,
     )
 
 

@@ -111,7 +111,7 @@ def _upload_segments(
             break
         toggle ^= 0x10
     if len(data) != size:
-        raise ProtocolError(f"the drive announced {size} bytes and sent {len(data)}")
+        raise ProtocolError("ethercat.drive-announced-bytes-sent", size_bytes=size, count=len(data))
 
 
 def download(
@@ -205,9 +205,7 @@ def stop_write(box: Mailbox, index: int, subindex: int, data: bytes) -> Steps[No
 
 def stopped_first() -> NotAllowed:
     """The error of a write that a stop has overtaken before it was sent."""
-    return NotAllowed(
-        "a stop came first: this was not written", remedy="write it again if it is still wanted"
-    )
+    return NotAllowed("ethercat.stop-came-first-not")
 
 
 def settle(box: Mailbox, *, force: bool = False) -> Steps[None]:

@@ -80,18 +80,17 @@ def _until_acknowledged(box: Mailbox, mail: bytes, packet: int, timeout_s: float
         if code == _ACK:
             told = int.from_bytes(answer[2:6], "little")
             if told != packet:
-                raise ProtocolError(f"the drive acknowledged packet {told} instead of {packet}")
+                raise ProtocolError(
+                    "ethercat.drive-acknowledged-packet-instead", told=told, packet=packet
+                )
             return
         if code == _ERROR:
             raise _refused(answer)
         if code != _BUSY:
-            raise ProtocolError(f"unexpected FoE answer {code}")
+            raise ProtocolError("ethercat.unexpected-foe-answer", number=code)
         waited += 0.05
         if waited > timeout_s:
-            raise DriveError(
-                f"the drive has been busy for {timeout_s:g} s with packet {packet}",
-                remedy="leave the drive switched on and load the file again",
-            )
+            raise DriveError("ethercat.drive-busy-packet", timeout_s=timeout_s, packet=packet)
         yield Pause(0.05)
 
 
@@ -100,11 +99,7 @@ def _refused(answer: bytes) -> Rejected:
     text = _ERRORS.get(code, "a reason of the maker's own")
     told = answer[6:].split(b"\0", 1)[0].decode("utf-8", "replace").strip()
     words = f"{text}: {told}" if told else text
-    return Rejected(
-        f"the drive refused the file: {words} (FoE {code:#06x})",
-        code=code,
-        remedy="check file, password and state; the drive keeps its old firmware until the end",
-    )
+    return Rejected("ethercat.drive-refused-file-foe", code=code, words=words, number=code)
 
 
 def _is_foe(mail: Mail) -> bool:

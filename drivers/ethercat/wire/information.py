@@ -61,7 +61,7 @@ def describe_object(box: Mailbox, index: int) -> Steps[ObjectInfo]:
     parts = yield from _info(box, 0x03, struct.pack("<H", index), 0x04)
     data = b"".join(parts)
     if len(data) < 6:
-        raise ProtocolError(f"the description of {index:04X} has only {len(data)} bytes")
+        raise ProtocolError("ethercat.description-bytes", index=index, bytes=len(data))
     told, data_type, max_subindex, code = struct.unpack("<HHBB", data[:6])
     return ObjectInfo(told, _text(data[6:]), data_type, code & 0x0F, max_subindex)
 
@@ -72,7 +72,7 @@ def describe_entry(box: Mailbox, index: int, subindex: int) -> Steps[EntryDescri
     parts = yield from _info(box, 0x05, struct.pack("<HBB", index, subindex, wanted), 0x06)
     data = b"".join(parts)
     if len(data) < 10:
-        raise ProtocolError(f"the description of {index:04X}:{subindex:02X} is too short")
+        raise ProtocolError("ethercat.description-too-short", index=index, subindex=subindex)
     told, sub, info, data_type, bits, access = struct.unpack("<HBBHHH", data[:10])
     rest = data[10:]
     size = (bits + 7) // 8
@@ -119,14 +119,11 @@ def _info_once(box: Mailbox, opcode: int, data: bytes, answer_code: int) -> Step
         if left == 0:
             return parts
         if sum(map(len, parts)) > MAX_BYTES:
-            raise ProtocolError("the drive's description does not end")
+            raise ProtocolError("ethercat.drive-description-not-end")
         answer = yield from box.receive(matches, box.timeout_s)
         if answer[2] & 0x7F != 0x07 and int.from_bytes(answer[4:6], "little") != left - 1:
             box.unsettled = True
-            raise ProtocolError(
-                "a part of the drive's description of itself is missing",
-                remedy="read it again; or make the profile from its ESI file",
-            )
+            raise ProtocolError("ethercat.part-drive-description-itself")
 
 
 def _text(data: bytes) -> str:

@@ -212,7 +212,7 @@ class Lanes:
         except (struct.error, ValueError, IndexError) as error:
             # Whatever a slave sends, the process that moves axes goes on.
             lane.running.remove(job)
-            told = ProtocolError(f"the drive sent something that cannot be read ({error})")
+            told = ProtocolError("ethercat.drive-sent-something-cannot", cause=str(error))
             job.done(None, told)
             return None
         job.calm = isinstance(step, Gap)

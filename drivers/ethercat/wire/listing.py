@@ -73,9 +73,7 @@ def object_of(address: Address) -> tuple[int, int]:
     """
     if address.index is None:
         raise NotAllowed(
-            f"{address} has no object index: EtherCAT does not reach it",
-            parameter=str(address),
-            remedy="connect the drive over the link that has it as well",
+            "ethercat.no-object-index-ethercat", parameter=str(address), address=address
         )
     return address.index, address.subindex
 
@@ -92,9 +90,12 @@ def fitted(address: Address, data: bytes) -> bytes:
     if len(data) > size and not any(data[size:]):
         return data[:size]
     raise ProtocolError(
-        f"{address} came with {len(data)} bytes, its type {address.type} has {size}",
+        "ethercat.came-bytes-type",
         parameter=str(address),
-        remedy="the drive's firmware may be of another version: compare with its dictionary",
+        address=address,
+        bytes=len(data),
+        type=address.type,
+        size=size,
     )
 
 
@@ -113,10 +114,7 @@ def _late(answer: bytes | Message) -> bool:
 
 
 def _not_asked(station: int) -> NotAsked:
-    return NotAsked(
-        f"station {station} left so much unanswered that this was not asked",
-        remedy="read again; if it stays mute, switch the drive off and on",
-    )
+    return NotAsked("ethercat.station-left-much-unanswered", station=station)
 
 
 def _value(answer: bytes | Message | NotAsked) -> bytes:
@@ -124,5 +122,5 @@ def _value(answer: bytes | Message | NotAsked) -> bytes:
         return answer
     if isinstance(answer, NotAsked):
         # One of its own for every place, as the caller names the parameter in it.
-        raise NotAsked(answer.message, remedy=answer.remedy)
+        raise NotAsked(answer.text, remedy=answer.remedy_text)
     raise error_from_wire(answer)  # type: ignore[arg-type]

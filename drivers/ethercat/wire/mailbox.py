@@ -82,7 +82,9 @@ def frame(protocol: int, counter: int, payload: bytes, size: int) -> bytes:
         ProtocolError: the payload does not fit.
     """
     if len(payload) + 6 > size:
-        raise ProtocolError(f"{len(payload)} bytes do not fit the mailbox of {size} bytes")
+        raise ProtocolError(
+            "ethercat.bytes-not-fit-mailbox", payload_count_bytes=len(payload), size_bytes=size
+        )
     header = struct.pack("<HHBB", len(payload), 0, 0, protocol | counter << 4)
     return (header + payload).ljust(size, b"\0")
 
@@ -96,7 +98,7 @@ def parse(data: bytes) -> Mail:
     length = int.from_bytes(data[:2], "little")
     if length > len(data) - 6:
         raise ProtocolError(
-            f"the drive's mailbox announces {length} bytes, it has room for {len(data) - 6}"
+            "ethercat.drive-mailbox-announces-bytes", length_bytes=length, count=len(data) - 6
         )
     return Mail(data[5] & 0x0F, data[6 : 6 + length])
 
@@ -275,10 +277,7 @@ class Mailbox:
                 continue
             if now > deadline:
                 self.unsettled = True
-                raise LinkTimeout(
-                    "the drive did not answer in time",
-                    remedy="read again; if it stays mute, switch the drive off and on",
-                )
+                raise LinkTimeout("ethercat.drive-not-answer-time")
             if not delivered and now > resend_at and not self.stopping:
                 # The same counter: a slave that did get the mail drops the copy.
                 delivered = (yield Write(self.out_address, mail)) is not None
@@ -382,18 +381,12 @@ class Mailbox:
     def _raise_error(self, payload: bytes) -> None:
         code = int.from_bytes(payload[2:4], "little")
         text = _ERRORS.get(code, f"mailbox error {code:#06x}")
-        raise ProtocolError(f"the drive refused the mail: {text}")
+        raise ProtocolError("ethercat.drive-refused-mail", text=text)
 
 
 def _overtaken() -> Overtaken:
-    return Overtaken(
-        "a stop was sent first: whether this arrived before it is unknown",
-        remedy="read the value back",
-    )
+    return Overtaken("ethercat.stop-sent-first-whether")
 
 
 def _lost() -> LinkLost:
-    return LinkLost(
-        "the station no longer answers",
-        remedy="check the drive's supply and the cable before it; it is taken up again by itself",
-    )
+    return LinkLost("ethercat.station-no-longer-answers")

@@ -84,9 +84,10 @@ def _not_in_use(
     if not isinstance(told, bytes) or subindex <= (count := int.from_bytes(told, "little")):
         return None
     return NotInUse(
-        f"not in use: {index:04X}:00 counts {count} entries",
+        "ethercat.not-use-00-counts",
         parameter=f"{index:04X}:{subindex:02X}",
-        remedy="set the count higher first, or read this entry by itself",
+        index=index,
+        count=count,
     )
 
 

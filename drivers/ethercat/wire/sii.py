@@ -173,10 +173,7 @@ def _command(command: int, word: int, clock: Callable[[], float]) -> Steps[None]
             raise _gone()
     status = yield from _ready(clock)
     if status & _FAILED:
-        raise ProtocolError(
-            f"the drive's EEPROM refuses word {word:#06x} (status {status:#06x})",
-            remedy="switch the drive off and on and try again",
-        )
+        raise ProtocolError("ethercat.drive-eeprom-refuses-word", word=word, status=status)
 
 
 def _ready(clock: Callable[[], float]) -> Steps[int]:
@@ -187,10 +184,7 @@ def _ready(clock: Callable[[], float]) -> Steps[int]:
         if not status & _BUSY:
             return status
         if asked > deadline:  # not what was asked before this computer stood still for a moment
-            raise LinkTimeout(
-                f"the drive's EEPROM stays busy for {_TIMEOUT_S:g} s",
-                remedy="try again; if it stays so, switch the drive off and on",
-            )
+            raise LinkTimeout("ethercat.drive-eeprom-stays-busy", timeout_s=_TIMEOUT_S)
         yield Pause(_POLL_S)
 
 
@@ -211,4 +205,4 @@ def _register(register: int, size: int, clock: Callable[[], float]) -> Steps[byt
 
 
 def _gone() -> LinkLost:
-    return LinkLost("the station does not answer", remedy="check its supply and cable")
+    return LinkLost("ethercat.station-not-answer-check-supply")

@@ -64,17 +64,10 @@ def open_pty(path: Path) -> tuple[int, int]:
         NotAllowed: the system has no pseudo-terminals (Windows).
     """
     if sys.platform == "win32":
-        raise NotAllowed(
-            "virtual serial drives need pseudo-terminals, which Windows does not have",
-            limit="Linux, macOS",
-            remedy="run the demo on Linux or macOS; real drives on COM ports work here",
-        )
+        raise NotAllowed("virtual.virtual-serial-drives-need", limit="Linux, macOS")
     ours = path.is_symlink() and str(path.readlink()).startswith("/dev/pts/")
     if (path.exists() or path.is_symlink()) and not ours:
-        raise LinkLost(
-            f"{path} exists and is no virtual wire",
-            remedy="choose another path, or remove the file",
-        )
+        raise LinkLost("virtual.exists-no-virtual-wire", path=path)
     master, slave = os.openpty()
     tty.setraw(slave)
     set_blocking(master, False)

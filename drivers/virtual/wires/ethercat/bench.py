@@ -27,21 +27,19 @@ def axes_of_bench(path: Path, url: str | None) -> list[AxisSpec]:
     urls = bench.urls("ethercat")
     if url is None:
         if len(urls) != 1:
-            raise NotAllowed(
-                f"bench file {path} has {len(urls)} EtherCAT buses",
-                value=len(urls),
-                remedy="choose one with --on",
-            )
+            raise NotAllowed("virtual.bench-file-ethercat-buses", value=len(urls), path=path)
         url = urls[0]
     found = sorted(bench.on(url), key=lambda pair: pair[1])
     if not found:
-        raise NotAllowed(f"bench file {path} has no drive on {url}", value=url)
+        raise NotAllowed("virtual.bench-file-no-drive", value=url, path=path)
     stations = [station for _, station in found]
     if stations != list(range(1, len(found) + 1)):
         raise NotAllowed(
-            f"bench file {path}: EtherCAT stations are places on the cable: they must be "
-            f"1…{len(found)}, not {', '.join(map(str, stations))}",
+            "virtual.bench-file-ethercat-stations",
             value=stations,
+            path=path,
+            found_count=len(found),
+            stations=", ".join(map(str, stations)),
         )
     return [axis for axis, _ in found]
 

@@ -129,7 +129,7 @@ class VirtualSegment:
             selector.register(handle, selectors.EVENT_READ)
             while b"\n" not in self._buffer:
                 if not selector.select(max(0.0, deadline - time.monotonic())):
-                    raise LinkTimeout(f"the virtual segment is silent for {timeout_s:.1f} s")
+                    raise LinkTimeout("virtual.virtual-segment-silent", timeout_s=timeout_s)
                 data = os.read(handle, 65536)
                 if not data:
                     raise self._ended()
@@ -144,4 +144,4 @@ class VirtualSegment:
         self._words.seek(0)
         text = self._words.read().decode(errors="replace").strip().splitlines()
         reason = text[-1] if text else f"exit status {self._process.poll()}"
-        return LinkLost(f"the virtual segment has ended: {reason}")
+        return LinkLost("virtual.virtual-segment-ended", reason=reason)

@@ -39,8 +39,7 @@ class InterfaceLock:
         except OSError as error:
             self._socket.close()
             raise LinkLost(
-                f"another virtual segment already answers on {interface}",
-                remedy="stop it or choose another interface",
+                "virtual.another-virtual-segment-already", interface=interface
             ) from error
 
     def release(self) -> None:
@@ -55,14 +54,11 @@ def open_socket(interface: str) -> socket.socket:
         LinkLost: no such interface or no permission; the message says which.
     """
     if len(interface.encode()) > 15:
-        raise LinkLost(f"interface name {interface!r} is longer than 15 bytes")
+        raise LinkLost("virtual.interface-name-longer-15", interface=interface)
     try:
         raw = socket.socket(AF_PACKET, socket.SOCK_RAW, 0)
     except PermissionError as error:
-        raise LinkLost(
-            "no permission for raw sockets",
-            remedy="run inside a private network (see drivers.virtual.wires.netns) or as root",
-        ) from error
+        raise LinkLost("virtual.no-permission-raw-sockets") from error
     try:
         raw.setsockopt(_SOL_PACKET, _PACKET_IGNORE_OUTGOING, 1)
         raw.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
@@ -70,7 +66,9 @@ def open_socket(interface: str) -> socket.socket:
         raw.bind((interface, _ETH_P_ECAT))
     except OSError as error:
         raw.close()
-        raise LinkLost(f"cannot use interface {interface}: {error.strerror}") from error
+        raise LinkLost(
+            "virtual.cannot-use-interface", interface=interface, strerror=error.strerror
+        ) from error
     raw.setblocking(False)
     return raw
 

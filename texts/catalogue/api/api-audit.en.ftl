@@ -1,0 +1,2 @@
+api-audit_since-must-before-until = since must be before until
+    .remedy = exchange the two

@@ -1,0 +1,4 @@
+api-people_no-session = there is no such session
+api-people_no-token = there is no such token
+api-people_script-invites-nobody = a script invites nobody
+    .remedy = do it on the page

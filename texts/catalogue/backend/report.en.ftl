@@ -1,0 +1,10 @@
+report_change-written-drive-not = the change was written to the drive, but not to the report's list: { $cause }
+    .remedy = free some space; note the values by hand
+report_measurements-different-drives = the measurements are of different drives
+    .remedy = make one report for each drive
+report_no-report = { QUOTED($value) } is no report
+    .remedy = choose one of the list
+report_no-report-choose-list = there is no report { $value }
+    .remedy = choose one of the list; another person may have deleted it
+report_report-cannot-show-measures = a report cannot show what { QUOTED($tool) } measures
+report_result-not-complete = the result of { $tool } is not complete: { $cause }

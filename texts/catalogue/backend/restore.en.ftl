@@ -1,0 +1,1 @@
+restore_cannot-removed = { $file } cannot be removed: { $strerror }

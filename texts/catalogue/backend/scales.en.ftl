@@ -1,0 +1,14 @@
+scales_increments-per-revolution-unknown = { $drive }: increments per revolution are unknown, so { $value } cannot be converted
+    .remedy = set feed constant and gear ratio on the Parameters page
+scales_missing = { $kind }: { $replace } is missing
+    .remedy = fill in the dimensions of the mechanics
+scales_no-electronic-gear-known = { $profile_title } has no electronic gear that is known here
+    .remedy = set its unit parameters by hand on the Parameters page
+scales_ratio-not-fit = { $profile_title }: a ratio of { NUM($value, format: ".6g") } does not fit { $above } and { $below }
+    .remedy = choose a coarser or finer user increment
+scales_rpm-gentler-drive-longest = { $drive }: { NUM($value, format: "g") } rpm/s is gentler than this drive can be: its longest ramp ({ $parameter }) takes { NUM($longest_ms, format: "g") } ms for { NUM($reference_rpm, format: "g") } rpm
+    .remedy = choose { NUM($gentlest, format: "g") } rpm/s or more, and a low speed to begin with
+scales_travel-needs-mechanics-say = { $drive }: travel in { $value } needs mechanics that say how far a revolution moves it
+    .remedy = keep the mechanics on the Mechanics page, or type revolutions
+scales_units-tool-hold = { $drive }: { $parameter_number } { $key } is { $value }; the units of this tool hold for { $raw }
+    .remedy = set it back to { $raw }. { $help }

@@ -1,0 +1,8 @@
+scope_already = there are { $most } already
+    .remedy = delete some that are not needed
+scope_no = there is no { $value }
+    .remedy = choose from the list
+scope_no-snapshot-scope = { $value } is no snapshot of the scope: { $why }
+    .remedy = choose a file that the Scope page wrote
+scope_not-stored-disk-nearly = { $path } was not stored: the disk is nearly full, { $free_mib } MiB are left
+    .remedy = free some space

@@ -1,0 +1,31 @@
+link_bytes-came-bytes = { $bytes } bytes came for a { $data_type } of { $calcsize_bytes } bytes
+    .remedy = the drive's firmware may be of another version: compare with its dictionary
+link_drive = the drive { $action }{ $where }: { $text }{ $number }
+link_gives-option-twice = { QUOTED($value) } gives an option twice
+link_must-whole-number = { $name }={ $value } must be a whole number from { $low } to { $high }
+link_names-no-adapter = { QUOTED($value) } names no adapter
+link_no-bus-url-must = { QUOTED($value) } is no bus URL: it must start with { $schemes }
+link_no-channel-kind-adapter = { QUOTED($value) } is no channel of this kind of CAN adapter
+    .remedy = write it like { $limit }
+link_no-multicast-address = { QUOTED($value) } is no multicast address
+    .remedy = write canopen://udp_multicast/239.74.163.2
+link_no-network-interface = { QUOTED($value) } is no network interface
+    .remedy = choose one of the interfaces that the page Connect lists
+link_no-number = { $value } is no number of { $data_type }
+link_no-row-bytes-hexadecimal = { QUOTED($value) } is no row of bytes in hexadecimal
+    .remedy = write two hexadecimal digits for each byte
+link_no-serial-port = { QUOTED($value) } is no serial port
+    .remedy = give the device itself, as /dev/ttyUSB0, /dev/serial/by-id/… or COM3
+link_no-serial-port-give-device = { $value } is no serial port
+    .remedy = give the device of the adapter, as /dev/ttyUSB0
+link_no-serial-port-plug-adapter = there is no serial port { $value }
+    .remedy = plug the adapter in; ports found now: { $ports_found }
+link_not-fit = { $value } does not fit { $data_type } ({ $low } to { $high })
+link_not-number = { QUOTED($value) } is not a { $data_type } number
+link_not-whole-number-needs = { $value } is not a whole number, { $data_type } needs one
+link_parity-must-none-even = parity={ $value } must be N (none), E (even) or O (odd)
+link_terminal-servodeck-itself-runs = { $value } is the terminal that servodeck itself runs in
+    .remedy = give the device of the adapter, as /dev/ttyUSB0
+link_urls-no-option = { $scheme } URLs have no option { QUOTED($value) }
+link_wire-running-demo = { $bus } is a wire that only a running demo has
+    .remedy = start 'servodeck demo', or give the path of a real or virtual port

@@ -1,0 +1,136 @@
+"""Words of a message from the catalogue (Fluent), one file for each room and language.
+
+The files of a room are read when its first message is shown. Numbers are written without grouping
+of digits; ``NUM($x, format: ".1f")`` writes one as Python's format does, ``QUOTED($x)`` a name in
+quotes. The page renders the same files with the same functions (`webui/src/i18n/message.ts`).
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fluent.runtime import FluentBundle, FluentResource
+from fluent.runtime.resolver import Pattern
+from fluent.runtime.types import FluentInt, FluentType
+
+from texts.message import JOINED, PROSE, Language, Param, Text
+
+CATALOGUE = Path(__file__).with_name("catalogue")
+_LOCALES: dict[Language, str] = {"en": "en", "zh": "zh-Hans"}
+
+
+class _Real(FluentType):
+    """A number with a point, written as Python writes it."""
+
+    def __init__(self, value: float) -> None:
+        self.value = value
+
+    def format(self, locale: object) -> str:  # noqa: ARG002
+        return repr(self.value)
+
+
+def _num(value: Any, format: str = "") -> str:  # noqa: A002 - Fluent's name of the option
+    """Format a number; what is no number passes as it is."""
+    if isinstance(value, _Real):
+        return value.value.__format__(format)
+    return int(value).__format__(format) if isinstance(value, int) else str(value)
+
+
+def _quoted(value: Any) -> str:
+    """A name in quotes; a number as it is."""
+    return repr(str(value)) if isinstance(value, str) else _num(value)
+
+
+#: The library's type is narrower than what it calls: functions have options, and may return text.
+_FUNCTIONS: dict[str, Any] = {"NUM": _num, "QUOTED": _quoted}
+
+
+def identifier(code: str) -> str:
+    """The identifier of a code in the catalogue's files, which know no dots."""
+    return code.replace(".", "_")
+
+
+@cache
+def files() -> dict[str, Path]:
+    """By room the path of its texts without language and ending."""
+    found = sorted(CATALOGUE.rglob("*.en.ftl"))
+    return {each.name.removesuffix(".en.ftl"): each.with_name(each.name[:-7]) for each in found}
+
+
+@cache
+def bundle(room: str, language: Language) -> FluentBundle | None:
+    """All texts of one room in one language; None where the catalogue has no such room."""
+    place = files().get(room)
+    if place is None:
+        return None
+    made = FluentBundle([_LOCALES[language]], functions=_FUNCTIONS, use_isolating=False)
+    file = place.with_name(f"{place.name}.{language}.ftl")
+    if file.is_file():
+        made.add_resource(FluentResource(file.read_text("utf-8")))
+    return made
+
+
+def render(message: Text, language: Language) -> str:
+    """The sentence; a code that the catalogue lacks is shown with its facts."""
+    if message.code == PROSE:
+        return _as_words(message.params.get("words"), language)
+    if message.code == JOINED:
+        parts = [_as_words(v, language) for k, v in message.params.items() if k != "joint"]
+        joint = str(message.params.get("joint", "; "))
+        return (_CHINESE_JOINTS.get(joint, joint) if language == "zh" else joint).join(parts)
+    return _pattern(message, language) or _bare(message, language)
+
+
+def has_text(code: str) -> bool:
+    """Whether the catalogue has words for this code, or this part of one."""
+    return _found(code, "en") is not None
+
+
+_CHINESE_JOINTS = {"; ": "；", ": ": "：", ", ": "、", " ": ""}
+
+
+def _found(code: str, language: Language) -> tuple[FluentBundle, Pattern] | None:
+    own, _, attribute = code.partition("/")
+    bundled = bundle(own.partition(".")[0], language)
+    if bundled is None or not bundled.has_message(identifier(own)):
+        return None
+    entry = bundled.get_message(identifier(own))
+    pattern = entry.attributes.get(attribute) if attribute else entry.value
+    return None if pattern is None else (bundled, pattern)
+
+
+def _pattern(message: Text, language: Language) -> str | None:
+    # Words in another language are better than none.
+    found = _found(message.code, language) or _found(message.code, "en")
+    if found is None:
+        return None
+    bundled, pattern = found
+    args = {name: _argument(value, language) for name, value in message.params.items()}
+    shown, _problems = bundled.format_pattern(pattern, args)
+    return str(shown)
+
+
+def _argument(value: Param, language: Language) -> object:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int) and not isinstance(value, Enum):
+        return FluentInt(value, useGrouping=False)
+    if isinstance(value, float):
+        return _Real(value)
+    return _as_words(value, language)
+
+
+def _as_words(value: Param, language: Language) -> str:
+    if isinstance(value, Text):
+        return render(value, language)
+    if isinstance(value, Enum):
+        return str(value.value)
+    return "" if value is None else str(value)
+
+
+def _bare(message: Text, language: Language) -> str:
+    facts = ", ".join(f"{k}={_as_words(v, language)}" for k, v in message.params.items())
+    return f"{message.code} ({facts})" if facts else message.code
